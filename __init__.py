@@ -5,29 +5,29 @@ unregistered in reverse order; each does the same with its own modules. `bpy` is
 so this folder can be read as a plain Python package (by a test collector) without Blender.
 """
 
-ROOMS = ("scene", "operators", "panels")
+PACKAGES = ("scene", "operators", "panels")
 
 
 def register():
     """Register all packages; if one fails, unregister those before it and raise its error."""
-    standing = []
+    registered = []
     try:
-        for room in _rooms():
-            room.register()
-            standing.append(room)
+        for package in _iter_packages():
+            package.register()
+            registered.append(package)
     except BaseException:
-        for room in reversed(standing):
-            room.unregister()
+        for package in reversed(registered):
+            package.unregister()
         raise
 
 
 def unregister():
     """Unregister all packages in reverse order."""
-    for room in reversed(list(_rooms())):
-        room.unregister()
+    for package in reversed(list(_iter_packages())):
+        package.unregister()
 
 
-def _rooms():
+def _iter_packages():
     from importlib import import_module
 
-    return (import_module(f".{name}", __package__) for name in ROOMS)
+    return (import_module(f".{name}", __package__) for name in PACKAGES)

@@ -11,10 +11,10 @@ import importlib.util
 import pathlib
 import sys
 
-BESIDE = "beyond_mocap_batch"
+LOCAL_PACKAGE = "beyond_mocap_batch"
 
 
-def extension():
+def find_extension():
     """Find the package of the enabled extension; without one, load the folder of this file.
 
     Returns:
@@ -28,18 +28,18 @@ def extension():
             return name
     folder = pathlib.Path(__file__).resolve().parent
     spec = importlib.util.spec_from_file_location(
-        BESIDE, folder / "__init__.py", submodule_search_locations=[str(folder)]
+        LOCAL_PACKAGE, folder / "__init__.py", submodule_search_locations=[str(folder)]
     )
     package = importlib.util.module_from_spec(spec)
-    sys.modules[BESIDE] = package
+    sys.modules[LOCAL_PACKAGE] = package
     spec.loader.exec_module(package)
-    return BESIDE
+    return LOCAL_PACKAGE
 
 
 def main():
     """Run the command after `--`; return its exit status."""
     arguments = sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else sys.argv[1:]
-    command = importlib.import_module(f"{extension()}.operators.command")
+    command = importlib.import_module(f"{find_extension()}.operators.command")
     return command.run(arguments)
 
 

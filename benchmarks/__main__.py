@@ -44,7 +44,7 @@ LIMIT = 900.0
 """Seconds of clock time that a section may take."""
 
 
-def measured(name: str) -> list[str]:
+def measure_section(name: str) -> list[str]:
     """Measure a section in this process.
 
     Args:
@@ -52,7 +52,7 @@ def measured(name: str) -> list[str]:
     Returns:
         Its lines of Markdown.
     """
-    effort.on_one_core()
+    effort.bind_to_one_core()
     lines = []
     for title, module, function in SECTIONS[name][1]:
         lines += [f"### {title}", ""] if title else []
@@ -60,7 +60,7 @@ def measured(name: str) -> list[str]:
     return lines
 
 
-def apart(name: str, limit: float) -> tuple[list[str], bool]:
+def measure_in_subprocess(name: str, limit: float) -> tuple[list[str], bool]:
     """Measure a section in a process of its own.
 
     Args:
@@ -71,13 +71,13 @@ def apart(name: str, limit: float) -> tuple[list[str], bool]:
     """
     command = [sys.executable, "-m", "benchmarks", name, "--here"]
     try:
-        done = subprocess.run(command, cwd=ROOT, stdout=subprocess.PIPE, text=True, timeout=limit)
+        process = subprocess.run(command, cwd=ROOT, stdout=subprocess.PIPE, text=True, timeout=limit)
     except subprocess.TimeoutExpired:
         return [f"Stopped after {limit:g} s: the section takes longer."], False
-    return (done.stdout.splitlines(), True) if done.returncode == 0 else (["The section failed."], False)
+    return (process.stdout.splitlines(), True) if process.returncode == 0 else (["The section failed."], False)
 
 
-def sections(path: Path) -> dict[str, list[str]]:
+def read_sections(path: Path) -> dict[str, list[str]]:
     """Read the sections of earlier results.
 
     Args:
@@ -96,39 +96,39 @@ def sections(path: Path) -> dict[str, list[str]]:
 
 def main() -> int:
     """Measure the chosen sections and write the results."""
-    options = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
-    options.add_argument("section", nargs="*", metavar="SECTION", help=f"all, or some of {', '.join(SECTIONS)}")
-    options.add_argument("--seconds", type=float, default=LIMIT, help="time limit of a section (default %(default)g)")
-    options.add_argument("--out", type=Path, default=ROOT / "benchmarks" / "results.md")
-    options.add_argument("--here", action="store_true", help="print one section, in this process, and write nothing")
-    chosen = options.parse_args()
-    if unknown := [name for name in chosen.section if name not in SECTIONS]:
-        options.error(f"no section {unknown[0]!r}: one of {', '.join(SECTIONS)}")
+    parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
+    parser.add_argument("section", nargs="*", metavar="SECTION", help=f"all, or some of {', '.join(SECTIONS)}")
+    parser.add_argument("--seconds", type=float, default=LIMIT, help="time limit of a section (default %(default)g)")
+    parser.add_argument("--out", type=Path, default=ROOT / "benchmarks" / "results.md")
+    parser.add_argument("--here", action="store_true", help="print one section, in this process, and write nothing")
+    options = parser.parse_args()
+    if unknown := [name for name in options.section if name not in SECTIONS]:
+        parser.error(f"no section {unknown[0]!r}: one of {', '.join(SECTIONS)}")
     if not (DATA / "mocap").is_dir():
         print(f"bench: {DATA} is missing; the benchmarks need its recordings and were skipped")
         return 0
-    if chosen.here:
-        print("\n".join(line for name in chosen.section for line in measured(name)))
+    if options.here:
+        print("\n".join(line for name in options.section for line in measure_section(name)))
         return 0
-    parts, whole = sections(chosen.out), True
+    parts, whole = read_sections(options.out), True
     with_what = f"Version {__version__}, Python {platform.python_version()}, numpy {np.__version__}, one core."
-    for name in chosen.section or SECTIONS:
-        lines, ended = apart(name, chosen.seconds)
-        whole &= ended
+    for name in options.section or SECTIONS:
+        lines, has_finished = measure_in_subprocess(name, options.seconds)
+        whole &= has_finished
         heading = f"## {SECTIONS[name][0]}"
         parts[heading] = [heading, "", with_what, "", *lines]
         print("\n".join(parts[heading]), flush=True)
         begin = ["# Results", "", "Written by `make bench`; seconds are processor time.", ""]
         text = "\n".join([*begin, *(line for part in parts.values() for line in [*part, ""])])
-        chosen.out.write_text(re_spaced(text), "utf-8")
+        options.out.write_text(normalize_blank_lines(text), "utf-8")
     return 0 if whole else 1
 
 
-def re_spaced(text: str) -> str:
+def normalize_blank_lines(text: str) -> str:
     """Remove repeated blank lines, and end the text with one newline."""
     lines = text.splitlines()
-    kept = [line for line, before in zip(lines, ["", *lines]) if line or before]
-    return "\n".join(kept).rstrip() + "\n"
+    selected = [line for line, before in zip(lines, ["", *lines]) if line or before]
+    return "\n".join(selected).rstrip() + "\n"
 
 
 if __name__ == "__main__":

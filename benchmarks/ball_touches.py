@@ -21,7 +21,7 @@ from benchmarks.places import DATA, ROOT
 from beyond_mocap.ball.tracked.solve import SolvedBall, solve_ball
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.files.tracking.tracking import Match, MatchPlayer, read_match
-from beyond_mocap.synthetic.ground_truth.planted import Feed, planted_match, sample_feed
+from beyond_mocap.synthetic.ground_truth.planted import Feed, build_match, sample_feed
 
 MATCHES = {"nl2019": "nl2019_half1.dat", "dutch": "dutch_6min.dat"}
 BY_HAND = ROOT / "benchmarks" / "touches_by_hand.csv"
@@ -38,13 +38,13 @@ TOLERANCE = 0.1
 _COLUMNS = ("match", "row", "time_s", "until_s", "player", "part", "word", "note")
 
 
-def match_of(name: str) -> Match:
+def read_recorded_match(name: str) -> Match:
     """Read one of the recorded matches."""
     return read_match(DATA / "tracking" / "match" / MATCHES[name])
 
 
 @dataclass(frozen=True)
-class Measured:
+class FeedResult:
     """One match or feed with its score.
 
     Attributes:
@@ -57,10 +57,10 @@ class Measured:
     name: str
     score: Score
     solved: SolvedBall
-    reading: Reading
+    reading: TouchAnnotation
 
 
-def thinned(match: Match, every: int = 1, heights: bool = True) -> Match:
+def thin_match(match: Match, every: int = 1, heights: bool = True) -> Match:
     """Keep every so many samples of a match, with or without heights."""
     part = slice(None, None, every)
     ball = match.ball[part].copy()
@@ -71,7 +71,7 @@ def thinned(match: Match, every: int = 1, heights: bool = True) -> Match:
                  periods=match.periods, notes=match.notes)  # fmt: skip
 
 
-def of_feed(feed: Feed) -> Match:
+def convert_feed(feed: Feed) -> Match:
     """Convert a synthetic feed to a match as it would be read."""
     players = tuple(MatchPlayer(name, team, name, i) for i, (name, team) in enumerate(zip(feed.ids, feed.teams)))
     end = float(feed.times[-1])
@@ -79,7 +79,7 @@ def of_feed(feed: Feed) -> Match:
                  width=feed.width, fps=feed.fps, provider="made", periods=((0.0, end),))
 
 
-def by_hand(name: str, match: Match, path: Path = BY_HAND, solved: SolvedBall | None = None) -> Measured:
+def compare_annotation(name: str, match: Match, path: Path = BY_HAND, solved: SolvedBall | None = None) -> FeedResult:
     """Compare one recorded match with an annotation.
 
     Args:
@@ -91,25 +91,25 @@ def by_hand(name: str, match: Match, path: Path = BY_HAND, solved: SolvedBall | 
     reading = read_touches(path, name.replace(",", " ").split()[0])
     start, end = reading.stretches[0][0] - MARGIN, reading.stretches[-1][1] + MARGIN
     solved = solved or solve_ball(match, start=start, end=end)
-    return Measured(name, _score(solved, reading), solved, reading)
+    return FeedResult(name, _compute_score(solved, reading), solved, reading)
 
 
-def _score(solved: SolvedBall, reading: Reading) -> Score:
-    return scored([touch.time for touch in solved.touches], [touch.player for touch in solved.touches], reading)
+def _compute_score(solved: SolvedBall, reading: TouchAnnotation) -> Score:
+    return score_touches([touch.time for touch in solved.touches], [touch.player for touch in solved.touches], reading)
 
 
-def planted(name: str, seconds: float = 180.0, seed: int = 11, **feed) -> Measured:
+def compare_synthetic(name: str, seconds: float = 180.0, seed: int = 11, **feed) -> FeedResult:
     """Compare a synthetic match, sampled like a feed, with its ground truth."""
-    match = planted_match(seconds, seed)
+    match = build_match(seconds, seed)
     touches = tuple(
-        ReadTouch(t.time, (t.player,), None, t.part, t.word) for t in match.touches if 1.2 < t.time < seconds - 1
+        AnnotatedTouch(t.time, (t.player,), None, t.part, t.label) for t in match.touches if 1.2 < t.time < seconds - 1
     )
-    solved = solve_ball(of_feed(sample_feed(match, **feed)))
-    reading = Reading(((1.2, seconds - 1.0),), touches, (ReadTouch(1.0),))
-    return Measured(name, _score(solved, reading), solved, reading)
+    solved = solve_ball(convert_feed(sample_feed(match, **feed)))
+    reading = TouchAnnotation(((1.2, seconds - 1.0),), touches, (AnnotatedTouch(1.0),))
+    return FeedResult(name, _compute_score(solved, reading), solved, reading)
 
 
-def event_reading(path: Path = EVENTS) -> Reading:
+def convert_events(path: Path = EVENTS) -> TouchAnnotation:
     """Convert events to an annotation.
 
     It holds what was certainly played; the others count neither way within the time by which an event may be off, nor
@@ -117,32 +117,32 @@ def event_reading(path: Path = EVENTS) -> Reading:
     """
     with open(path, newline="", encoding="utf-8") as file:
         rows = sorted(csv.DictReader(file), key=lambda event: float(event["time_s"]))
-    sure, doubts = [], []
+    touches, doubts = [], []
     for number, event in enumerate(rows):
         time, player = float(event["time_s"]), (event["player"],) if event["player"] else ()
         if event["type"] in _NO_TOUCH:
             again = [float(other["time_s"]) for other in rows[number:] if other["type"] in PLAYED]
-            doubts.append(ReadTouch(time - EVENT_SPREAD, (), again[0] - 0.5 if again else np.inf))
+            doubts.append(AnnotatedTouch(time - EVENT_SPREAD, (), again[0] - 0.5 if again else np.inf))
         elif event["sync"] == "touch" and event["type"] in PLAYED and player:
-            sure.append(ReadTouch(time, player))
+            touches.append(AnnotatedTouch(time, player))
         else:
-            doubts.append(ReadTouch(time - EVENT_SPREAD, player, time + EVENT_SPREAD))
-    return Reading(((0.0, max(touch.time for touch in sure) + 0.5),), tuple(sure), tuple(doubts))
+            doubts.append(AnnotatedTouch(time - EVENT_SPREAD, player, time + EVENT_SPREAD))
+    return TouchAnnotation(((0.0, max(touch.time for touch in touches) + 0.5),), tuple(touches), tuple(doubts))
 
 
-def against_events(match: Match) -> Measured:
+def compare_events(match: Match) -> FeedResult:
     """Compare all touches with the passes among the events.
 
     Events name the player who plays the ball away, so that earlier touches of the same player count neither way.
     """
-    solved, reading = solve_ball(match), event_reading()
-    on = [ReadTouch(a.time, (a.player,)) for a, b in zip(solved.touches, solved.touches[1:]) if a.player == b.player]
-    reading = replace(reading, doubts=(*reading.doubts, *on))
+    solved, reading = solve_ball(match), convert_events()
+    earlier_touches = [AnnotatedTouch(a.time, (a.player,)) for a, b in zip(solved.touches, solved.touches[1:]) if a.player == b.player]
+    reading = replace(reading, doubts=(*reading.doubts, *earlier_touches))
     times, players = [touch.time for touch in solved.touches], [touch.player for touch in solved.touches]
-    return Measured("dutch, passes among its events", scored_by_events(times, players, reading), solved, reading)
+    return FeedResult("dutch, passes among its events", score_with_offset(times, players, reading), solved, reading)
 
 
-def residuals(solved: SolvedBall) -> tuple[float, float, float]:
+def measure_residuals(solved: SolvedBall) -> tuple[float, float, float]:
     """Measure the trajectory's distance over the ground from measured samples.
 
     Returns:
@@ -153,22 +153,22 @@ def residuals(solved: SolvedBall) -> tuple[float, float, float]:
     return float(np.median(away)), float(np.percentile(away, 95)), float(solved.measured.mean())
 
 
-def told_apart(measured: Measured) -> str:
+def count_right_parts(measured: FeedResult) -> str:
     """Count how many of the right touches with an annotated part have that part."""
     pairs = [(measured.reading.touches[read].part, measured.solved.touches[i].part) for read, i in measured.score.right]
     known = [(read, found) for read, found in pairs if read]
     return f"{sum(read == found for read, found in known)} of {len(known)}"
 
 
-def line(measured: Measured) -> list[str]:
+def build_row(measured: FeedResult) -> list[str]:
     """Build a row of the table."""
     score = measured.score
     late = np.abs(score.errors)
-    median, p95, share = residuals(measured.solved)
+    median, p95, share = measure_residuals(measured.solved)
     return [measured.name, str(len(measured.reading.touches)), f"{score.precision:.3f}", f"{score.recall:.3f}",
             f"{score.f1:.3f}", str(len(score.doubtful)),
             f"{1000 * np.median(late):.0f} / {1000 * np.percentile(late, 95):.0f}" if len(late) else "-",
-            told_apart(measured), f"{score.offset:.2f}", f"{100 * median:.1f} / {100 * p95:.0f}",
+            count_right_parts(measured), f"{score.offset:.2f}", f"{100 * median:.1f} / {100 * p95:.0f}",
             f"{100 * share:.0f} %"]
 
 
@@ -177,28 +177,28 @@ COLUMNS = ("feed", "touches", "precision", "recall", "F1 at 0.1 s, right player"
            "measured")
 
 
-def all_measured(dutch: Match, half: Match, solved: SolvedBall) -> list[Measured]:
+def compare_all(dutch: Match, half: Match, solved: SolvedBall) -> list[FeedResult]:
     """Compare every feed. solved: the whole half."""
-    return [by_hand("dutch", dutch), by_hand("nl2019", half, solved=solved), by_hand("dutch, read later", dutch, LATER),
-            by_hand("nl2019, read later", half, LATER, solved), by_hand("dutch, no heights", thinned(dutch, 1, False)),
-            by_hand("nl2019, no heights", thinned(half, 1, False)), by_hand("dutch, 12.5 Hz", thinned(dutch, 2)),
-            by_hand("nl2019, 12.5 Hz", thinned(half, 2)),
-            by_hand("dutch, 8.3 Hz, no heights", thinned(dutch, 3, False)), against_events(dutch),
-            planted("synthetic, 25 Hz, 8 cm"), planted("synthetic, 25 Hz, 8 cm, half filled", filled=0.5),
-            planted("synthetic, 25 Hz, 8 cm, no heights", heights=False), planted("synthetic, 10 Hz, 8 cm", fps=10.0),
-            planted("synthetic, 10 Hz, 8 cm, no heights", fps=10.0, heights=False)]
+    return [compare_annotation("dutch", dutch), compare_annotation("nl2019", half, solved=solved), compare_annotation("dutch, read later", dutch, LATER),
+            compare_annotation("nl2019, read later", half, LATER, solved), compare_annotation("dutch, no heights", thin_match(dutch, 1, False)),
+            compare_annotation("nl2019, no heights", thin_match(half, 1, False)), compare_annotation("dutch, 12.5 Hz", thin_match(dutch, 2)),
+            compare_annotation("nl2019, 12.5 Hz", thin_match(half, 2)),
+            compare_annotation("dutch, 8.3 Hz, no heights", thin_match(dutch, 3, False)), compare_events(dutch),
+            compare_synthetic("synthetic, 25 Hz, 8 cm"), compare_synthetic("synthetic, 25 Hz, 8 cm, half filled", filled=0.5),
+            compare_synthetic("synthetic, 25 Hz, 8 cm, no heights", find_heights=False), compare_synthetic("synthetic, 10 Hz, 8 cm", fps=10.0),
+            compare_synthetic("synthetic, 10 Hz, 8 cm, no heights", fps=10.0, find_heights=False)]
 
 
 def section() -> list[str]:
     """Build the lines for results.md."""
-    dutch, half = match_of("dutch"), match_of("nl2019")
-    took, solved = effort.seconds(lambda: solve_ball(half), 1)
+    dutch, half = read_recorded_match("dutch"), read_recorded_match("nl2019")
+    took, solved = effort.measure_seconds(lambda: solve_ball(half), 1)
     lines = [f"- the whole half (46 min) is solved in {took:.1f} s (target 60)", ""]
-    return [*lines, *format_head(COLUMNS), *(format_row(line(one)) for one in all_measured(dutch, half, solved))]
+    return [*lines, *format_head(COLUMNS), *(format_row(build_row(one)) for one in compare_all(dutch, half, solved))]
 
 
 @dataclass(frozen=True)
-class ReadTouch:
+class AnnotatedTouch:
     """An annotated touch.
 
     Attributes:
@@ -217,7 +217,7 @@ class ReadTouch:
 
 
 @dataclass(frozen=True)
-class Reading:
+class TouchAnnotation:
     """The annotation of a match.
 
     Attributes:
@@ -227,8 +227,8 @@ class Reading:
     """
 
     stretches: tuple[tuple[float, float], ...]
-    touches: tuple[ReadTouch, ...]
-    doubts: tuple[ReadTouch, ...] = ()
+    touches: tuple[AnnotatedTouch, ...]
+    doubts: tuple[AnnotatedTouch, ...] = ()
 
     @property
     def seconds(self) -> float:
@@ -273,7 +273,7 @@ class Score:
         return 2.0 * self.precision * self.recall / both if both else 0.0
 
 
-def scored(times: Sequence[float], players: Sequence[str], reading: Reading, tolerance: float = TOLERANCE,
+def score_touches(times: Sequence[float], players: Sequence[str], reading: TouchAnnotation, tolerance: float = TOLERANCE,
            offset: float = 0.0) -> Score:
     """Compare found touches with an annotation; those outside its stretches are left out.
 
@@ -285,8 +285,8 @@ def scored(times: Sequence[float], players: Sequence[str], reading: Reading, tol
         offset: s taken from the found times first.
     """
     times = np.asarray(times, float) - offset
-    inside = [i for i in np.argsort(times, kind="stable") if _within(times[i], reading.stretches)]
-    right = _pairs(times, players, inside, reading.touches, tolerance)
+    inside = [i for i in np.argsort(times, kind="stable") if _is_within(times[i], reading.stretches)]
+    right = _match_touches(times, players, inside, reading.touches, tolerance)
     found = {i for _, i in right}
     rest = [i for i in inside if i not in found]
     doubtful = [i for i in rest if any(_covers(doubt, times[i], players[i], tolerance) for doubt in reading.doubts)]
@@ -296,19 +296,19 @@ def scored(times: Sequence[float], players: Sequence[str], reading: Reading, tol
                  np.array([times[found] - reading.touches[read].time for read, found in right]), offset)
 
 
-def scored_by_events(times: Sequence[float], players: Sequence[str], reading: Reading, tolerance: float = TOLERANCE,
-                     most: float = 4.0) -> Score:
+def score_with_offset(times: Sequence[float], players: Sequence[str], reading: TouchAnnotation, tolerance: float = TOLERANCE,
+                     max_offset: float = 4.0) -> Score:
     """Compare with the one offset, up to `max_offset` seconds either way, that gives the highest F1."""
-    coarse = np.arange(-most, most + 1e-9, tolerance / 2.0)
-    best = max(coarse, key=lambda offset: _roughly(times, players, reading, tolerance, offset))
+    coarse = np.arange(-max_offset, max_offset + 1e-9, tolerance / 2.0)
+    best = max(coarse, key=lambda offset: _count_matches(times, players, reading, tolerance, offset))
     fine = best + np.arange(-tolerance / 2.0, tolerance / 2.0 + 1e-9, 0.01)
-    scores = [scored(times, players, reading, tolerance, float(offset)) for offset in fine]
+    scores = [score_touches(times, players, reading, tolerance, float(offset)) for offset in fine]
     most_right = max(score.f1 for score in scores)
     best = [score for score in scores if score.f1 == most_right]
     return best[len(best) // 2]
 
 
-def read_touches(path: str | os.PathLike, match: str) -> Reading:
+def read_touches(path: str | os.PathLike, match: str) -> TouchAnnotation:
     """Read the annotation of one match.
 
     Args:
@@ -322,38 +322,38 @@ def read_touches(path: str | os.PathLike, match: str) -> Reading:
         rows = csv.DictReader(file)
         if tuple(rows.fieldnames or ()) != _COLUMNS:
             raise InputError(path, f"columns {rows.fieldnames}", ",".join(_COLUMNS))
-        kinds: dict[str, list[ReadTouch]] = {"stretch": [], "touch": [], "unsure": []}
+        kinds: dict[str, list[AnnotatedTouch]] = {"stretch": [], "touch": [], "unsure": []}
         for row in rows:
             if row["match"] != match:
                 continue
             if row["row"] not in kinds:
                 raise InputError(path, f"row {row['row']!r} at {row['time_s']}", f"one of {', '.join(kinds)}")
-            kinds[row["row"]].append(_read(row))
+            kinds[row["row"]].append(_build_touch(row))
     if not kinds["stretch"]:
         raise InputError(path, f"no stretch of {match!r}", "a match with a stretch")
     stretches = tuple((row.time, row.until) for row in kinds["stretch"])
-    return Reading(stretches, tuple(kinds["touch"]), tuple(kinds["unsure"]))
+    return TouchAnnotation(stretches, tuple(kinds["touch"]), tuple(kinds["unsure"]))
 
 
-def _read(row: dict[str, str]) -> ReadTouch:
+def _build_touch(row: dict[str, str]) -> AnnotatedTouch:
     """Convert a row to a touch."""
     players = tuple(name for name in row["player"].split("|") if name)
     until = float(row["until_s"]) if row["until_s"] else None
-    return ReadTouch(float(row["time_s"]), players, until, row["part"], row["word"])
+    return AnnotatedTouch(float(row["time_s"]), players, until, row["part"], row["word"])
 
 
-def _within(time: float, stretches) -> bool:
+def _is_within(time: float, stretches) -> bool:
     """Return whether a time lies in a stretch."""
     return any(start <= time <= end for start, end in stretches)
 
 
-def _covers(doubt: ReadTouch, time: float, player: str, tolerance: float) -> bool:
+def _covers(doubt: AnnotatedTouch, time: float, player: str, tolerance: float) -> bool:
     """Return whether a doubt covers a touch."""
     end = doubt.time if doubt.until is None else doubt.until
     return doubt.time - tolerance <= time <= end + tolerance and (not doubt.players or player in doubt.players)
 
 
-def _pairs(times, players, inside, touches, tolerance: float) -> list[tuple[int, int]]:
+def _match_touches(times, players, inside, touches, tolerance: float) -> list[tuple[int, int]]:
     """Find the largest possible set of pairs (annotated, found); among those sets the nearest in time."""
     from scipy.optimize import linear_sum_assignment
 
@@ -368,7 +368,7 @@ def _pairs(times, players, inside, touches, tolerance: float) -> list[tuple[int,
     return [(int(row), int(inside[column])) for row, column in zip(rows, columns) if fits[row, column]]
 
 
-def _roughly(times, players, reading: Reading, tolerance: float, offset: float) -> float:
+def _count_matches(times, players, reading: TouchAnnotation, tolerance: float, offset: float) -> float:
     """Count the right ones at an offset, without matching each once: a fast upper bound."""
     times = np.asarray(times, float) - offset
     near = [np.flatnonzero(np.abs(times - touch.time) <= tolerance) for touch in reading.touches]

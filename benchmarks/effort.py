@@ -13,14 +13,14 @@ from pathlib import Path
 import numpy as np
 
 from beyond_mocap.files.bvh import bvh
-from beyond_mocap.library.build import build
+from beyond_mocap.library.build import build_library
 
 from .places import DATA, LIBRARIES, ROOT, scenario_files
 
 RUNS = 3  # the best of so many runs counts
 
 
-def seconds(work, runs: int = RUNS) -> tuple[float, object]:
+def measure_seconds(work, runs: int = RUNS) -> tuple[float, object]:
     """Measure the best processor time of several runs.
 
     With one thread on one core this is what a clock shows while nothing else runs, and it does not change when
@@ -34,28 +34,28 @@ def seconds(work, runs: int = RUNS) -> tuple[float, object]:
     """
     best, result = np.inf, None
     for _ in range(runs):
-        begun = time.process_time()
+        started = time.process_time()
         result = work()
-        best = min(best, time.process_time() - begun)
+        best = min(best, time.process_time() - started)
     return best, result
 
 
-def on_one_core() -> None:
+def bind_to_one_core() -> None:
     """Bind this process and those it starts to one core, where the system permits it."""
     if hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
 
 
-def blas_speed() -> str:
+def report_blas_speed() -> str:
     """Measure numpy's matrix products: official Blenders have no fast BLAS, so everything that multiplies is slower."""
     random = np.random.default_rng(0)
     a, b = (random.normal(size=(2000, 27)).astype(np.float32) for _ in range(2))
-    took, _ = seconds(lambda: [a @ b.T for _ in range(10)])
+    took, _ = measure_seconds(lambda: [a @ b.T for _ in range(10)])
     speed = 10 * 2 * 2000 * 2000 * 27 / took / 1e9
     return f"numpy multiplies at {speed:.0f} GFLOP/s (pip's some 100, one without BLAS 2 to 6)"
 
 
-def bvh_speed() -> str:
+def report_bvh_speed() -> str:
     """Measure how fast a long clip is read, in MB per second of the whole file."""
     source = DATA / "mocap" / "lafan1" / "walk1_subject1_walk2_filtered.bvh"
     head, _, motion = source.read_text().partition("MOTION")
@@ -65,11 +65,11 @@ def bvh_speed() -> str:
         many = rows[2:] * (24_000_000 // max(1, sum(map(len, rows[2:]))))
         long.write_text("\n".join([head + "MOTION", f"Frames: {len(many)}", rows[1], *many]) + "\n")
         size = long.stat().st_size / 1e6
-        best, _ = seconds(lambda: bvh.read(long))
+        best, _ = measure_seconds(lambda: bvh.read_bvh(long))
     return f"a clip of {size:.0f} MB: {size / best:.0f} MB/s from text to quaternions"
 
 
-def library_speed() -> str:
+def report_library_speed() -> str:
     """Measure the building of 150 clips of 120 frames at 30 fps, mirrored ones included, from text and from the cache.
 
     Built from the Bandai clips, cut or repeated to 120 frames: 75 files and their 75 mirror images.
@@ -85,15 +85,15 @@ def library_speed() -> str:
             Path(folder, name).write_text("\n".join([head + "MOTION", "Frames: 120", lines[1], *frames]) + "\n")
             rows.append(f"{name},0,119,,{'walking' if number % 2 else 'running'} front")
         Path(folder, "annotations.csv").write_text("\n".join(rows) + "\n")
-        cold, _ = seconds(lambda: build(folder, rebuild=True))
-        warm, _ = seconds(lambda: build(folder))
+        cold, _ = measure_seconds(lambda: build_library(folder, rebuild=True))
+        warm, _ = measure_seconds(lambda: build_library(folder))
     return (
         f"75 clips of 120 frames and their mirror images: {cold:.2f} s from text to clusters (target 5), {warm:.2f} s "
         "cached (target 0.3); Faustino 187 s and 12.9 s"
     )
 
 
-def peak_memory(name: str, folder: Path, cache: Path, number: int = 2) -> str:
+def report_peak_memory(name: str, folder: Path, cache: Path, number: int = 2) -> str:
     """Measure peak resident memory and seconds of the whole command, in a process of its own, with a cached library."""
     if not hasattr(os, "wait4"):
         return "peak memory: not known on this system"

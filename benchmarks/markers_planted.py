@@ -10,12 +10,12 @@ import numpy as np
 from benchmarks import effort
 from benchmarks.places import CMU_UNIT, DATA
 from beyond_mocap.files.bvh import bvh
-from beyond_mocap.markers.cleaning.clean import clean
-from beyond_mocap.markers.files.marker_set_text import chosen_set
+from beyond_mocap.markers.cleaning.clean import clean_trial
+from beyond_mocap.markers.files.marker_set_text import choose_set
 from beyond_mocap.markers.reconstruct import Reconstruction, ReconstructSettings, reconstruct
 from beyond_mocap.motion.motion import Motion
-from beyond_mocap.synthetic.ground_truth.planted_markers import Planted, planted, planted_error
-from beyond_mocap.synthetic.throws import throw
+from beyond_mocap.synthetic.ground_truth.planted_markers import SyntheticTrial, build_trial, measure_trial_error
+from beyond_mocap.synthetic.throws import build_throw
 
 CLIPS = {"walk": ("cmu10/test_walking_1.bvh", 0, 360), "run": ("cmu10/test_running_1.bvh", 0, 360),
          "kick": ("cmu10/10_01.bvh", 200, 560), "basketball": ("cmu10/train_basketball_1.bvh", 200, 560),
@@ -36,23 +36,23 @@ _OCCLUDED = 0.03  # share of the samples that are hidden
 
 
 @lru_cache(maxsize=None)
-def clip(name: str) -> Motion:
+def read_clip(name: str) -> Motion:
     """Read a recording, or generate the throw at 30 m/s."""
     if name == "throw":
-        return throw(speed=30.0, fps=200.0).motion
+        return build_throw(speed=30.0, fps=200.0).motion
     file, first, last = CLIPS[name]
     unit = CMU_UNIT if file.startswith("cmu") else None
-    return bvh.read(DATA / "mocap" / file, unit=unit).motion.frames(first, last)
+    return bvh.read_bvh(DATA / "mocap" / file, unit=unit).motion.frames(first, last)
 
 
-def settings(planted_set: str, **others) -> ReconstructSettings:
+def build_settings(planted_set: str, **others) -> ReconstructSettings:
     """Build the reconstruction settings of a marker set, without release, which is measured separately."""
-    return ReconstructSettings(marker_set=chosen_set(SHIPPED.get(planted_set, planted_set)), release="no", **others)
+    return ReconstructSettings(marker_set=choose_set(SHIPPED.get(planted_set, planted_set)), release="no", **others)
 
 
-def again(known: Planted, static: bool, chosen: ReconstructSettings) -> Reconstruction:
+def reconstruct_trial(known: SyntheticTrial, static: bool, settings: ReconstructSettings) -> Reconstruction:
     """Reconstruct a synthetic trial."""
-    return reconstruct(known.trial, known.static if static else None, settings=chosen)
+    return reconstruct(known.trial, known.static if static else None, settings=settings)
 
 
 def truth_table() -> list[str]:
@@ -66,9 +66,9 @@ def truth_table() -> list[str]:
                              "residual mm", "one segment mm", "worst angle", "worst centre"]),
     ]  # fmt: skip
     for name, marker_set in TRIED:
-        known = planted(clip(name), marker_set, seed=1, occlusion=_OCCLUDED)
+        known = build_trial(read_clip(name), marker_set, seed=1, occlusion=_OCCLUDED)
         for static in (True, False):
-            lines.append(_truth_row(name, marker_set, static, known))
+            lines.append(_build_truth_row(name, marker_set, static, known))
     return lines
 
 
@@ -76,36 +76,36 @@ def bone_table() -> list[str]:
     """Build the same without skin and noise: the error of the reconstruction itself."""
     lines = effort.format_head(["clip", "markers", "angles deg", "raw deg", "centres mm", "residual mm"])
     for name, marker_set in ON_BONE:
-        known = planted(clip(name), marker_set, seed=1, softness=0.0, noise=0.0)
-        made = again(known, True, settings(marker_set))
-        error = planted_error(known, made.motion)
+        known = build_trial(read_clip(name), marker_set, seed=1, softness=0.0, noise=0.0)
+        result = reconstruct_trial(known, True, build_settings(marker_set))
+        error = measure_trial_error(known, result.motion)
         lines.append(effort.format_row([name, marker_set, f"{np.degrees(error.angle):.2f}",
                                         f"{np.degrees(error.raw_angle):.2f}", f"{1e3 * error.centre:.1f}",
-                                        _rms_mm(made.solved.residual)]))
+                                        _format_rms_mm(result.solved.residual)]))
     return lines
 
 
-def _truth_row(name: str, marker_set: str, static: bool, known: Planted) -> str:
+def _build_truth_row(name: str, marker_set: str, static: bool, known: SyntheticTrial) -> str:
     """Build a row; a failure becomes its text."""
     begin = [name, marker_set, "yes" if static else "no"]
     try:
-        made = again(known, static, settings(marker_set))
-        error = planted_error(known, made.motion)
+        result = reconstruct_trial(known, static, build_settings(marker_set))
+        error = measure_trial_error(known, result.motion)
     except Exception as problem:  # noqa: BLE001 the table reports the failure and continues
         return effort.format_row([*begin, f"failed: {problem}"[:160], *[""] * 7])
-    solved = made.solved
+    solved = result.solved
     return effort.format_row([*begin, f"{np.degrees(error.angle):.2f}", f"{np.degrees(error.raw_angle):.2f}",
-                              f"{1e3 * error.centre:.1f}", f"{1e3 * error.worst_centre:.1f}", _rms_mm(solved.residual),
-                              _rms_mm(solved.single), _worst(error.angles, np.degrees(1.0), 1),
-                              _worst(error.centres, 1e3, 0)])
+                              f"{1e3 * error.centre:.1f}", f"{1e3 * error.worst_centre:.1f}", _format_rms_mm(solved.residual),
+                              _format_rms_mm(solved.single), _format_worst(error.angles, np.degrees(1.0), 1),
+                              _format_worst(error.centres, 1e3, 0)])
 
 
-def _rms_mm(values: np.ndarray) -> str:
+def _format_rms_mm(values: np.ndarray) -> str:
     """Format a root mean square in millimetres."""
     return f"{1e3 * np.sqrt(np.nanmean(values**2)):.1f}"
 
 
-def _worst(of: dict[str, float], scale: float, digits: int) -> str:
+def _format_worst(of: dict[str, float], scale: float, digits: int) -> str:
     """Format the worst joint with its value."""
     joint = max(of, key=of.get)
     return f"{joint} {scale * of[joint]:.{digits}f}"
@@ -118,23 +118,23 @@ def filter_table() -> list[str]:
     )
     for name, noise in (("walk", 5e-4), ("throw", 5e-4), ("throw", 2e-3)):
         marker_set = "driveline"
-        known = planted(clip(name), marker_set, seed=2, noise=noise)
-        for chosen in ("none", "butterworth", "kalman"):
-            made = again(known, True, settings(marker_set, filter=chosen, plant=False))
-            error, (found, true, accelerated) = planted_error(known, made.motion), _hand(known, made.motion)
-            lines.append(effort.format_row([f"{name}, noise {1e3 * noise:g} mm", chosen,
+        known = build_trial(read_clip(name), marker_set, seed=2, noise=noise)
+        for filter_name in ("none", "butterworth", "kalman"):
+            result = reconstruct_trial(known, True, build_settings(marker_set, filter=filter_name, plant=False))
+            error, (found, true, accelerated) = measure_trial_error(known, result.motion), _measure_hand(known, result.motion)
+            lines.append(effort.format_row([f"{name}, noise {1e3 * noise:g} mm", filter_name,
                                             f"{np.degrees(error.angle):.2f}", f"{1e3 * error.centre:.1f}",
                                             f"{found:.2f}", f"{true:.2f}", f"{accelerated:.1f} m/s^2"]))
     return lines
 
 
-def _hand(known: Planted, found: Motion) -> tuple[float, float, float]:
+def _measure_hand(known: SyntheticTrial, found: Motion) -> tuple[float, float, float]:
     """Measure the fastest wrist found and true, m/s, and the error of its acceleration, root mean square m/s^2."""
     from beyond_mocap.motion.motion import forward_kinematics
 
     places, _ = forward_kinematics(found)
     wrist, truth = places[:, found.skeleton.index("RightHand")], known.centre("RightHand")
-    moves = [np.gradient(way, 1.0 / found.fps, axis=0) for way in (wrist, truth)]
+    moves = [np.gradient(trajectory, 1.0 / found.fps, axis=0) for trajectory in (wrist, truth)]
     pulls = [np.gradient(move, 1.0 / found.fps, axis=0) for move in moves]
     fastest = [float(np.linalg.norm(move, axis=1).max()) for move in moves]
     return *fastest, float(np.sqrt(np.mean(np.sum((pulls[0] - pulls[1]) ** 2, axis=1))))
@@ -151,17 +151,17 @@ def fault_table() -> list[str]:
     ]  # fmt: skip
     for name, marker_set in SPOILED:
         for share in (0.05, 0.2):
-            lines.append(_fault_row(name, marker_set, share))
+            lines.append(_build_fault_row(name, marker_set, share))
     return lines
 
 
-def _fault_row(name: str, marker_set: str, share: float) -> str:
+def _build_fault_row(name: str, marker_set: str, share: float) -> str:
     """Build a row of faults."""
-    known = planted(clip(name), marker_set, seed=5, occlusion=share, swaps=4, jumps=8, unlabeled=3)
-    own = chosen_set(SHIPPED.get(marker_set, marker_set))
-    begun = time.process_time()
-    cleaned = clean(known.trial, own.clusters(known.trial.labels))
-    took = time.process_time() - begun
+    known = build_trial(read_clip(name), marker_set, seed=5, occlusion=share, swaps=4, jumps=8, unlabeled=3)
+    own = choose_set(SHIPPED.get(marker_set, marker_set))
+    started = time.process_time()
+    cleaned = clean_trial(known.trial, own.select_clusters(known.trial.labels))
+    took = time.process_time() - started
     trial = cleaned.trial
     names = known.trial.labels[: known.clean.shape[1]]
     after = trial.positions[:, [trial.labels.index(label) for label in names]]
@@ -169,35 +169,35 @@ def _fault_row(name: str, marker_set: str, share: float) -> str:
     apart = np.linalg.norm(after - known.clean, axis=-1)
     hidden = ~np.isfinite(before[..., 0])
     filled = hidden & np.isfinite(apart)
-    gone = 1e3 * apart[filled]
+    errors_mm = 1e3 * apart[filled]
     return effort.format_row([
         name, marker_set, f"{100 * hidden.mean():.0f} %", f"{100 * filled.sum() / max(hidden.sum(), 1):.0f} %",
-        f"{np.sqrt(np.mean(gone**2)):.1f}, {np.percentile(gone, 95):.1f}" if len(gone) else "",
-        *(_mended(known, names, apart, kind) for kind in ("swap", "jump", "unlabeled")), _false(known, cleaned.report),
+        f"{np.sqrt(np.mean(errors_mm**2)):.1f}, {np.percentile(errors_mm, 95):.1f}" if len(errors_mm) else "",
+        *(_count_fixed(known, names, apart, kind) for kind in ("swap", "jump", "unlabeled")), _count_false(known, cleaned.report),
         f"{1e3 * np.nanpercentile(apart, 99):.1f}", f"{len(trial) / max(took, 1e-9):.0f}",
     ])  # fmt: skip
 
 
-def _mended(known: Planted, names: tuple[str, ...], apart: np.ndarray, kind: str) -> str:
+def _count_fixed(known: SyntheticTrial, names: tuple[str, ...], apart: np.ndarray, kind: str) -> str:
     """Format how many faults are fixed, `3 of 4`: 9 in 10 samples are then within 15 mm of the truth."""
-    done = [fault for fault in known.faults if fault.kind == kind]
+    faults = [fault for fault in known.faults if fault.kind == kind]
     right = 0
-    for fault in done:
+    for fault in faults:
         own = [names.index(label) for label in fault.labels if label in names]
         right += bool(np.mean(apart[fault.start : fault.stop, own] < 0.015) > 0.9)
-    return f"{right} of {len(done)}"
+    return f"{right} of {len(faults)}"
 
 
-def _false(known: Planted, report) -> str:
+def _count_false(known: SyntheticTrial, report) -> str:
     """Format the number of swaps and jumps that are reported where none was planted."""
     counts = []
-    for kind, told in (("swap", report.swaps), ("jump", report.jumps)):
+    for kind, reported in (("swap", report.swaps), ("jump", report.jumps)):
         planted_ones = [fault for fault in known.faults if fault.kind in (kind, "swap")]
-        counts.append(sum(not any(_meets(stretch, known, fault) for fault in planted_ones) for stretch in told))
+        counts.append(sum(not any(_overlaps(stretch, known, fault) for fault in planted_ones) for stretch in reported))
     return ", ".join(str(count) for count in counts)
 
 
-def _meets(stretch, known: Planted, fault) -> bool:
+def _overlaps(stretch, known: SyntheticTrial, fault) -> bool:
     """Return whether a reported stretch overlaps a planted fault."""
     start, stop = stretch.start * known.trial.fps, stretch.end * known.trial.fps
     return start < fault.stop + 3 and stop > fault.start - 3 and bool(set(stretch.labels) & set(fault.labels))
@@ -205,27 +205,27 @@ def _meets(stretch, known: Planted, fault) -> bool:
 
 def speed_table() -> list[str]:
     """Build the rows of the speed of the pose alone, on one core."""
-    from beyond_mocap.markers.pose.pose import solve
+    from beyond_mocap.markers.pose.pose import solve_poses
 
     lines = effort.format_head(["clip", "markers", "joints", "frames", "frames per second (target 200)", "weights off"])
     for name, marker_set in TIMED:
-        known = planted(clip(name), marker_set, seed=3, occlusion=_OCCLUDED)
-        made = again(known, True, settings(marker_set))
-        rates = [_rate(made, solve, weights) for weights in (True, False)]
-        lines.append(effort.format_row([name, f"{marker_set}, {len(made.model.markers)}", str(len(made.model.skeleton)),
-                                        str(len(made.trial)), *(f"{rate:.0f}" for rate in rates)]))
+        known = build_trial(read_clip(name), marker_set, seed=3, occlusion=_OCCLUDED)
+        result = reconstruct_trial(known, True, build_settings(marker_set))
+        rates = [_measure_rate(result, solve_poses, weights) for weights in (True, False)]
+        lines.append(effort.format_row([name, f"{marker_set}, {len(result.model.markers)}", str(len(result.model.skeleton)),
+                                        str(len(result.trial)), *(f"{rate:.0f}" for rate in rates)]))
     return lines
 
 
-def _rate(made: Reconstruction, solve, weights: bool) -> float:
+def _measure_rate(result: Reconstruction, solve, weights: bool) -> float:
     """Measure frames per second of processor time, the best of two."""
     from beyond_mocap.markers.pose.pose import PoseSettings
 
     best = np.inf
     for _ in range(2):
-        begun = time.process_time()
-        solve(made.model, made.trial, PoseSettings(weights=weights))
-        best = min(best, time.process_time() - begun)
-    return len(made.trial) / best
+        started = time.process_time()
+        solve(result.model, result.trial, PoseSettings(weights=weights))
+        best = min(best, time.process_time() - started)
+    return len(result.trial) / best
 
 

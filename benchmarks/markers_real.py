@@ -11,13 +11,13 @@ import numpy as np
 from benchmarks import effort
 from benchmarks.places import DATA
 from beyond_mocap.markers.files.marker_files import read_markers
-from beyond_mocap.markers.files.marker_set_text import chosen_set
+from beyond_mocap.markers.files.marker_set_text import choose_set
 from beyond_mocap.markers.reconstruct import Reconstruction, ReconstructSettings, reconstruct
-from beyond_mocap.markers.release.release import ReleaseSettings, release
+from beyond_mocap.markers.release.release import ReleaseSettings, estimate_release
 from beyond_mocap.motion import quaternion
-from beyond_mocap.synthetic.ground_truth.planted_ball import PlantedBall
-from beyond_mocap.synthetic.ground_truth.planted_markers import Planted, planted
-from beyond_mocap.synthetic.throws import throw
+from beyond_mocap.synthetic.ground_truth.planted_ball import BallRequest
+from beyond_mocap.synthetic.ground_truth.planted_markers import SyntheticTrial, build_trial
+from beyond_mocap.synthetic.throws import build_throw
 
 TRIALS = (("000870_003252_74_195_002_FF_808.c3d", None), ("pitch_biodata.c3d", None),
           ("kinematics_tennis_serve.c3d", None), ("kinematics_tennis_serve_nan.c3d", None),
@@ -34,12 +34,12 @@ PITCHES = ("000870_003252_74_195_002_FF_808.c3d", "pitch_biodata.c3d")
 
 
 @lru_cache(maxsize=None)
-def timed(trial: str, static: str | None) -> tuple[Reconstruction, float]:
+def reconstruct_timed(trial: str, static: str | None) -> tuple[Reconstruction, float]:
     """Reconstruct a trial, and measure its processor seconds."""
     still = None if static is None else read_markers(FOLDER / static)
     seen = read_markers(FOLDER / trial)
-    begun = time.process_time()
-    return reconstruct(seen, still, settings=ReconstructSettings()), time.process_time() - begun
+    started = time.process_time()
+    return reconstruct(seen, still, settings=ReconstructSettings()), time.process_time() - started
 
 
 def trial_table() -> list[str]:
@@ -51,14 +51,14 @@ def trial_table() -> list[str]:
                              "written mm rms", "bones change", "planted feet cm/s, mm", "at a limit",
                              "fastest turn deg/frame", "seconds", "worst markers mm"]),
     ]  # fmt: skip
-    return lines + [_row(trial, static) for trial, static in TRIALS]
+    return lines + [_build_row(trial, static) for trial, static in TRIALS]
 
 
-def _row(trial: str, static: str | None) -> str:
+def _build_row(trial: str, static: str | None) -> str:
     """Build the row of a trial; a failure becomes its text."""
     begin = [Path(trial).stem, "yes" if static else "no"]
     try:
-        out, took = timed(trial, static)
+        out, took = reconstruct_timed(trial, static)
         figures = out.report()
     except Exception as problem:  # noqa: BLE001 the table reports the failure and continues
         return effort.format_row([*begin, f"failed: {problem}"[:160], *[""] * 9])
@@ -70,11 +70,11 @@ def _row(trial: str, static: str | None) -> str:
     return effort.format_row([*begin, f"{figures['marker_set']}, {figures['markers']}, {figures['joints']}",
                               f"{near['rms']:.1f}, {near['p95']:.1f}", f"{near['single_rms']:.1f}",
                               f"{near['output_rms']:.1f}", f"{figures['bones_change_m']:.0e} m", feet,
-                              ", ".join(f"{joint} {100 * share:.0f} %" for share, joint in limits), _fastest(out),
+                              ", ".join(f"{joint} {100 * share:.0f} %" for share, joint in limits), _format_fastest(out),
                               f"{took:.1f}", ", ".join(f"{label} {far:.0f}" for far, label in worst)])
 
 
-def _fastest(out: Reconstruction) -> str:
+def _format_fastest(out: Reconstruction) -> str:
     """Format the joint that turns most from one frame to the next: a flip would show here."""
     turns = out.solved.motion.rotations
     steps = np.linalg.norm(
@@ -89,41 +89,41 @@ def planted_table() -> list[str]:
     lines = effort.format_head(["throw", "ball's marker", "true m/s", "found m/s", "off", "time off ms, frames",
                                 "direction error deg", "reported sigma ms, m/s"])
     for distance, speed, arm, style, fps, turns in THROWS:
-        thrown = throw((distance, 0.0, 1.0), speed, arm, style, fps=fps)
-        ball = PlantedBall(thrown.release, side=arm.title(), turns=turns)
-        known = planted(thrown.motion, "driveline", seed=7, ball=ball)
-        chosen = ReconstructSettings(marker_set=chosen_set("driveline"), release="no")
-        motion = reconstruct(known.trial, known.static, settings=chosen).motion
+        thrown = build_throw((distance, 0.0, 1.0), speed, arm, style, fps=fps)
+        ball = BallRequest(thrown.release, side=arm.title(), spin_rate=turns)
+        known = build_trial(thrown.motion, "driveline", seed=7, ball=ball)
+        settings = ReconstructSettings(marker_set=choose_set("driveline"), release="no")
+        motion = reconstruct(known.trial, known.static, settings=settings).motion
         name = f"{speed:g} m/s {arm} {style}, {fps:g} Hz"
-        for how, trial in _ways(known):
-            lines.append(_release_row(name, how, known, trial, motion))
+        for how, trial in _iter_trials(known):
+            lines.append(_build_release_row(name, how, known, trial, motion))
     return lines
 
 
-def _ways(known: Planted):
+def _iter_trials(known: SyntheticTrial):
     """Generate the trial with all of the ball's marker, with it hidden 40 ms around release, and without it."""
-    label = known.ball.asked.label
-    index = known.trial.index(label)
-    frames = np.abs(np.arange(len(known.trial)) / known.trial.fps - known.ball.asked.release) < 0.04
+    label = known.ball.request.label
+    index = known.trial.index_of(label)
+    frames = np.abs(np.arange(len(known.trial)) / known.trial.fps - known.ball.request.release) < 0.04
     hidden = known.trial.positions.copy()
     hidden[frames, index] = np.nan
     yield "seen", known.trial
     yield "hidden 80 ms around", known.trial.with_positions(hidden)
-    yield "none", known.trial.only([other for other in known.trial.labels if other != label])
+    yield "none", known.trial.select_markers([other for other in known.trial.labels if other != label])
 
 
-def _release_row(name: str, how: str, known: Planted, trial, motion) -> str:
+def _build_release_row(name: str, how: str, known: SyntheticTrial, trial, motion) -> str:
     """Build the row of a release; a failure becomes its text."""
     truth, fps = known.ball, known.trial.fps
     try:
-        found = release(trial, motion, ReleaseSettings(ball_marker="" if how == "none" else None))
+        found = estimate_release(trial, motion, ReleaseSettings(ball_marker="" if how == "none" else None))
     except Exception as problem:  # noqa: BLE001 the table reports the failure and continues
         return effort.format_row([name, how, f"{truth.speed:.1f}", f"failed: {problem}"[:120], *[""] * 4])
-    late = found.time - truth.asked.release
-    way = np.degrees(np.arccos(np.clip(found.direction @ truth.velocity / truth.speed, -1.0, 1.0)))
-    return effort.format_row([name, f"{how} ({found.how})", f"{truth.speed:.1f}", f"{found.speed:.1f}",
+    time_error = found.time - truth.request.release
+    direction_error = np.degrees(np.arccos(np.clip(found.direction @ truth.velocity / truth.speed, -1.0, 1.0)))
+    return effort.format_row([name, f"{how} ({found.method})", f"{truth.speed:.1f}", f"{found.speed:.1f}",
                               f"{100 * (found.speed / truth.speed - 1):+.1f} %",
-                              f"{1e3 * late:+.1f}, {late * fps:+.1f}", f"{way:.1f}",
+                              f"{1e3 * time_error:+.1f}, {time_error * fps:+.1f}", f"{direction_error:.1f}",
                               f"{1e3 * found.time_sigma:.1f}, {found.speed_sigma:.1f}"])
 
 
@@ -131,8 +131,8 @@ def radar_table() -> list[str]:
     """Build the rows of pitches without a marker on the ball."""
     lines = effort.format_head(["pitch", "found m/s", "radar m/s", "off", "reported sigma m/s", "release s"])
     for trial in PITCHES:
-        body, _ = timed(trial, None)
-        found = release(body.raw, body.motion)
+        body, _ = reconstruct_timed(trial, None)
+        found = estimate_release(body.raw, body.motion)
         radar = found.radar
         lines.append(effort.format_row([trial, f"{found.speed:.1f}", "unknown" if radar is None else f"{radar:.1f}",
                                         "" if radar is None else f"{100 * (found.speed / radar - 1):+.1f} %",

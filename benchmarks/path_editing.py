@@ -18,9 +18,9 @@ from benchmarks.places import CMU_UNIT, DATA
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.motion.motion import resample
-from beyond_mocap.path_editing.path_line import through
-from beyond_mocap.path_editing.path_ride import figures
-from beyond_mocap.path_editing.ride import RideSettings, prepare, ride
+from beyond_mocap.path_editing.path_line import fit_line
+from beyond_mocap.path_editing.path_ride import measure_path_edit
+from beyond_mocap.path_editing.ride import PathEditSettings, prepare_source, edit_path
 
 SECONDS, BUDGET_FRAMES, BUDGET_MS = 10.0, 600, 35.0
 CLIPS = {
@@ -52,17 +52,17 @@ COLUMNS = {
 STEP = 0.02  # m between places
 
 
-def straight(length: float = 30.0) -> np.ndarray:
+def build_straight(length: float = 30.0) -> np.ndarray:
     """Build a straight line."""
     return np.column_stack([np.arange(0.0, length, STEP), *np.zeros((2, len(np.arange(0.0, length, STEP))))])
 
 
-def circle(radius: float, rounds: float = 1.0) -> np.ndarray:
+def build_circle(radius: float, rounds: float = 1.0) -> np.ndarray:
     """Build a circle to the left."""
-    return bent(lambda s: np.full_like(s, 1.0 / radius), 2.0 * np.pi * radius * rounds)
+    return build_curve(lambda s: np.full_like(s, 1.0 / radius), 2.0 * np.pi * radius * rounds)
 
 
-def bent(curvature, length: float) -> np.ndarray:
+def build_curve(curvature, length: float) -> np.ndarray:
     """Build the line whose curvature, 1/m to the left, is curvature(s (N,) m)."""
     s = np.arange(0.0, length, STEP)
     bend = curvature(s)
@@ -72,60 +72,60 @@ def bent(curvature, length: float) -> np.ndarray:
     return np.column_stack([np.concatenate([np.zeros((1, 2)), np.cumsum(steps, axis=0)]), np.zeros(len(s))])
 
 
-def winding(radius: float = 2.5, wave: float = 9.0, length: float = 30.0) -> np.ndarray:
+def build_winding(radius: float = 2.5, wave: float = 9.0, length: float = 30.0) -> np.ndarray:
     """Build a row of S curves; `radius` m at the tightest points."""
-    return bent(lambda s: np.sin(2.0 * np.pi * s / wave) / radius, length)
+    return build_curve(lambda s: np.sin(2.0 * np.pi * s / wave) / radius, length)
 
 
-def zigzag(leg: float = 3.0, angle: float = 60.0, legs: int = 10) -> np.ndarray:
+def build_zigzag(leg: float = 3.0, angle: float = 60.0, legs: int = 10) -> np.ndarray:
     """Build straight legs that turn by `angle` degrees to and fro: corners only."""
-    way = np.radians(angle) * (np.arange(legs) % 2)
-    steps = leg * np.column_stack([np.cos(way), np.sin(way), np.zeros(legs)])
+    heading = np.radians(angle) * (np.arange(legs) % 2)
+    steps = leg * np.column_stack([np.cos(heading), np.sin(heading), np.zeros(legs)])
     return np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
 
 
-def eight(size: float = 3.5, rounds: float = 1.5) -> np.ndarray:
+def build_eight(size: float = 3.5, rounds: float = 1.5) -> np.ndarray:
     """Build a figure of eight (Gerono's), 2 `size` m long."""
     t = np.linspace(0.0, 2.0 * np.pi * rounds, 3000)
     line = size * np.column_stack([np.sin(t), np.sin(t) * np.cos(t), np.zeros_like(t)])
-    return line @ _turned(-0.25 * np.pi)
+    return line @ _rotation_matrix(-0.25 * np.pi)
 
 
-def walkabout(length: float = 30.0, seed: int = 3, tightest: float = 2.0) -> np.ndarray:
+def build_walkabout(length: float = 30.0, seed: int = 3, tightest: float = 2.0) -> np.ndarray:
     """Build a walk with bends of all sizes, radius at least `tightest` m."""
     rng = np.random.default_rng(seed)
     waves, phases, size = rng.uniform(5.0, 16.0, 5), rng.uniform(0.0, 2.0 * np.pi, 5), rng.uniform(0.4, 1.0, 5)
     s = np.arange(0.0, length, STEP)
     bend = np.sum(size * np.sin(2.0 * np.pi * s[:, None] / waves + phases), axis=1)
-    return bent(lambda at: np.interp(at, s, bend / np.abs(bend).max() / tightest), length)
+    return build_curve(lambda at: np.interp(at, s, bend / np.abs(bend).max() / tightest), length)
 
 
-def hill(degrees: float, way: float = 4.0, length: float = 30.0) -> np.ndarray:
+def build_hill(degrees: float, distance: float = 4.0, length: float = 30.0) -> np.ndarray:
     """Build hills: up for `distance` m over the ground, over the top and down again, and so on.
 
     Slopes are `degrees` except for 1 m around tops and valleys.
     """
-    line = straight(length)
-    slope = np.tan(np.radians(degrees)) * np.clip(np.sin(np.pi * line[:, 0] / way) * way / np.pi, -1.0, 1.0)
+    line = build_straight(length)
+    slope = np.tan(np.radians(degrees)) * np.clip(np.sin(np.pi * line[:, 0] / distance) * distance / np.pi, -1.0, 1.0)
     line[:, 2] = np.cumsum(slope) * STEP
     return line
 
 
-def _turned(angle: float) -> np.ndarray:
+def _rotation_matrix(angle: float) -> np.ndarray:
     """Return the matrix that rotates rows about the vertical by `angle` rad."""
     c, s = np.cos(angle), np.sin(angle)
     return np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
-FAIR = {"straight": straight(), "circle 8 m": circle(8.0), "circle 3 m": circle(3.0, 2.0),
-        "circle 2 m": circle(2.0, 3.0), "winding": winding(), "walkabout": walkabout()}
-TIGHT = {"eight": eight(), "zigzag": zigzag(), "circle 1 m": circle(1.0, 5.0)}
-HILLS = {f"hill {degrees}": hill(degrees) for degrees in (5, 10, 15)}
+FAIR = {"straight": build_straight(), "circle 8 m": build_circle(8.0), "circle 3 m": build_circle(3.0, 2.0),
+        "circle 2 m": build_circle(2.0, 3.0), "winding": build_winding(), "walkabout": build_walkabout()}
+TIGHT = {"eight": build_eight(), "zigzag": build_zigzag(), "circle 1 m": build_circle(1.0, 5.0)}
+HILLS = {f"hill {degrees}": build_hill(degrees) for degrees in (5, 10, 15)}
 ALL = {**FAIR, **TIGHT, **HILLS}
 
 
 @dataclass(frozen=True)
-class Row:
+class EditRow:
     """One path edit.
 
     Attributes:
@@ -143,7 +143,7 @@ class Row:
     ms: float
 
 
-def rides(kinds: Iterable[str] = tuple(CLIPS), paths: Iterable[str] = tuple(ALL), **settings) -> list[Row]:
+def measure_edits(kinds: Iterable[str] = tuple(CLIPS), paths: Iterable[str] = tuple(ALL), **settings) -> list[EditRow]:
     """Measure each recording of `kinds` on each of `paths`.
 
     Args:
@@ -151,67 +151,67 @@ def rides(kinds: Iterable[str] = tuple(CLIPS), paths: Iterable[str] = tuple(ALL)
         paths: keys of ALL.
         settings: of `PathEditSettings`.
     """
-    chosen, rows = RideSettings(**settings), []
+    edit_settings, rows = PathEditSettings(**settings), []
     for kind in kinds:
         for name in CLIPS[kind]:
-            source = prepare(recording(kind, name), chosen)
-            rows += [_row(kind, name, path, source, chosen) for path in paths]
+            source = prepare_source(read_recording(kind, name), edit_settings)
+            rows += [_build_row(kind, name, path, source, edit_settings) for path in paths]
     return rows
 
 
-def recording(kind: str, name: str):
+def read_recording(kind: str, name: str):
     """Read the first ten seconds of a recording."""
     file = DATA / "mocap" / kind / f"{name}.bvh"
-    motion = bvh.read(file, CMU_UNIT if kind == "cmu10" else None).motion
+    motion = bvh.read_bvh(file, CMU_UNIT if kind == "cmu10" else None).motion
     return motion.frames(0, min(len(motion), int(SECONDS * motion.fps) + 1))
 
 
-def _row(kind: str, name: str, shape: str, source, settings: RideSettings) -> Row:
+def _build_row(kind: str, name: str, shape: str, source, settings: PathEditSettings) -> EditRow:
     """Edit and measure one recording on one path."""
-    path = through(ALL[shape], shape)
-    begun = time.process_time()
-    ridden = ride(source, path, settings)
-    took = 1e3 * (time.process_time() - begun)
-    return Row(kind, name, shape, dotted(figures(source, ridden, path)), took)
+    path = fit_line(ALL[shape], shape)
+    started = time.process_time()
+    edited = edit_path(source, path, settings)
+    took = 1e3 * (time.process_time() - started)
+    return EditRow(kind, name, shape, flatten_figures(measure_path_edit(source, edited, path)), took)
 
 
-def dotted(value, name: str = "") -> dict[str, float]:
+def flatten_figures(value, name: str = "") -> dict[str, float]:
     """Flatten nested figures to dotted names; what is not known is NaN."""
     if isinstance(value, dict):
         return {
-            k: v for key, entry in value.items() for k, v in dotted(entry, f"{name}.{key}" if name else key).items()
+            k: v for key, entry in value.items() for k, v in flatten_figures(entry, f"{name}.{key}" if name else key).items()
         }
     return {name: np.nan if value is None else float(value)}
 
 
-def table(rows: list[Row], by: str) -> list[str]:
+def build_table(rows: list[EditRow], by: str) -> list[str]:
     """Build a table of medians over the edits of each `by` (kind or path)."""
     names = list(dict.fromkeys(getattr(row, by) for row in rows))
     lines = effort.format_head([by, "edits", *COLUMNS])
     for name in names:
         group = [row for row in rows if getattr(row, by) == name]
-        lines.append(effort.format_row([name, str(len(group)), *(_cell(group, of) for of in COLUMNS.values())]))
+        lines.append(effort.format_row([name, str(len(group)), *(_format_cell(group, of) for of in COLUMNS.values())]))
     return lines
 
 
-def _cell(group: list[Row], names: tuple[str, ...]) -> str:
+def _format_cell(group: list[EditRow], names: tuple[str, ...]) -> str:
     """Format the median of one to three figures."""
-    values = [_scale(name) * _median([row.values.get(name, np.nan) for row in group]) for name in names]
-    shown = ["-" if not np.isfinite(value) else f"{value if abs(value) > 1e-6 else 0.0:.3g}" for value in values]
-    if len(shown) == 3:
-        return f"{shown[0]} -> {shown[1]} ({shown[2]})"
-    own = len(shown) == 2 and "source" in names[1]
-    return f"{shown[0]} ({shown[1]})" if own else " / ".join(shown)
+    values = [_figure_scale(name) * _finite_median([row.values.get(name, np.nan) for row in group]) for name in names]
+    texts = ["-" if not np.isfinite(value) else f"{value if abs(value) > 1e-6 else 0.0:.3g}" for value in values]
+    if len(texts) == 3:
+        return f"{texts[0]} -> {texts[1]} ({texts[2]})"
+    own = len(texts) == 2 and "source" in names[1]
+    return f"{texts[0]} ({texts[1]})" if own else " / ".join(texts)
 
 
-def _scale(name: str) -> float:
+def _figure_scale(name: str) -> float:
     """Return the factor to centimetres or percent of a figure."""
     if "_m." in name:
         return 100.0
     return 100.0 if name.startswith("kept_speed") or "share" in name or "over_21" in name else 1.0
 
 
-def _median(values: list[float]) -> float:
+def _finite_median(values: list[float]) -> float:
     """Compute the median of finite values, NaN without any."""
     known = [value for value in values if np.isfinite(value)]
     return float(np.median(known)) if known else np.nan
@@ -232,18 +232,18 @@ WORST = {
 }
 
 
-def worst(rows: list[Row], count: int) -> list[str]:
+def list_worst(rows: list[EditRow], count: int) -> list[str]:
     """List the `count` worst edits for every kind of figure."""
     lines = []
     for title, of in WORST.items():
-        known = [(value, row) for row in rows if np.isfinite(value := _value(of, row))]
+        known = [(value, row) for row in rows if np.isfinite(value := _figure_value(of, row))]
         first = sorted(known, key=lambda pair: -pair[0])[:count]
-        told = "; ".join(f"{row.kind}/{row.clip} on {row.path} {value:.2g}" for value, row in first)
-        lines.append(f"- {title}: {told}")
+        text = "; ".join(f"{row.kind}/{row.clip} on {row.path} {value:.2g}" for value, row in first)
+        lines.append(f"- {title}: {text}")
     return lines
 
 
-def _value(of, row: Row) -> float:
+def _figure_value(of, row: EditRow) -> float:
     """Return a figure of a row, NaN where it lacks one."""
     try:
         return of(row.values)
@@ -251,7 +251,7 @@ def _value(of, row: Row) -> float:
         return np.nan
 
 
-def kept(rows: list[Row]) -> str:
+def describe_fair_paths(rows: list[EditRow]) -> str:
     """Describe how many edits on fair paths skate no more than their recording, and keep the speed."""
     fair = [row for row in rows if row.path in FAIR]
     if not fair:
@@ -268,49 +268,49 @@ def kept(rows: list[Row]) -> str:
     )
 
 
-def timing() -> str:
+def measure_timing() -> str:
     """Measure ms of `prepare_source` and `edit_path` for 600 frames at 60 per second, the best of seven."""
-    motion = recording("lafan1", "walk1_subject1_walk2_filtered")
+    motion = read_recording("lafan1", "walk1_subject1_walk2_filtered")
     motion = resample(motion, 60.0).frames(0, BUDGET_FRAMES)
-    settings, path = RideSettings(), through(winding(), "winding")
+    settings, path = PathEditSettings(), fit_line(build_winding(), "winding")
     took = {"prepare": np.inf, "edit": np.inf, "edit without planting": np.inf}
     for _ in range(7):
-        begun = time.process_time()
-        source = prepare(motion, settings)
+        started = time.process_time()
+        source = prepare_source(motion, settings)
         ready = time.process_time()
-        ride(source, path, settings)
+        edit_path(source, path, settings)
         done = time.process_time()
-        ride(source, path, replace(settings, plant=False))
-        for name, ms in zip(took, (ready - begun, done - ready, time.process_time() - done)):
+        edit_path(source, path, replace(settings, plant=False))
+        for name, ms in zip(took, (ready - started, done - ready, time.process_time() - done)):
             took[name] = min(took[name], 1e3 * ms)
-    told = ", ".join(f"{name} {ms:.0f} ms" for name, ms in took.items())
-    return f"{len(motion)} frames, {len(motion.skeleton)} joints: {told} (target of an edit: {BUDGET_MS:g} ms)."
+    text = ", ".join(f"{name} {ms:.0f} ms" for name, ms in took.items())
+    return f"{len(motion)} frames, {len(motion.skeleton)} joints: {text} (target of an edit: {BUDGET_MS:g} ms)."
 
 
-def cycled(kinds: Iterable[str] = tuple(CLIPS)) -> list[str]:
+def measure_cycles(kinds: Iterable[str] = tuple(CLIPS)) -> list[str]:
     """Measure jerk at the transitions of recordings cycled along 25 m of the winding path, a line per kind."""
     lines = ["Cycled on the winding path, jerk at transitions over the recording's own at that speed (95th "
              "percentile):", ""]
     for kind in kinds:
-        ratios, told = [], []
+        ratios, texts = [], []
         for name in CLIPS[kind]:
-            source = prepare(recording(kind, name), RideSettings())
+            source = prepare_source(read_recording(kind, name), PathEditSettings())
             try:
-                row = _row(kind, name, "winding", source, RideSettings(cycle=True))
+                row = _build_row(kind, name, "winding", source, PathEditSettings(cycle=True))
             except InputError as error:
-                told.append(f"{name}: {error}")
+                texts.append(f"{name}: {error}")
                 continue
             if np.isfinite(row.values["seam_jerk.max"]):
                 ratios.append(row.values["seam_jerk.max"])
-                told.append(f"{name} {ratios[-1]:.2f}")
+                texts.append(f"{name} {ratios[-1]:.2f}")
         most = f"{np.median(ratios):.2f} median, {max(ratios):.2f} largest" if ratios else "no transitions"
-        lines.append(f"- {kind}: {most} ({'; '.join(told)})")
+        lines.append(f"- {kind}: {most} ({'; '.join(texts)})")
     return [*lines, ""]
 
 
 def section(kinds: Iterable[str] = tuple(CLIPS), paths: Iterable[str] = tuple(ALL), count: int = 3) -> list[str]:
     """Build the lines of a report: what is kept, by path, by recordings, the worst `count`, cycling."""
-    rows = rides(kinds, paths)
-    return [kept(rows), "", timing(), "", *table(rows, "path"), "", *table(rows, "kind"), "",
-            "Medians; `before` is without planting, `own` the recording's. The worst:", "", *worst(rows, count), "",
-            *cycled(kinds)]
+    rows = measure_edits(kinds, paths)
+    return [describe_fair_paths(rows), "", measure_timing(), "", *build_table(rows, "path"), "", *build_table(rows, "kind"), "",
+            "Medians; `before` is without planting, `own` the recording's. The worst:", "", *list_worst(rows, count), "",
+            *measure_cycles(kinds)]

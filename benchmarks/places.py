@@ -7,7 +7,7 @@ from pathlib import Path
 
 from beyond_mocap.annotation import Timeline, read_timeline
 from beyond_mocap.files.tracking.tracking import read_track_csv
-from beyond_mocap.motion.track import Track, clean
+from beyond_mocap.motion.track import Track, clean_track
 
 ROOT = Path(__file__).resolve().parent.parent
 DATA = ROOT.parent / "shared" / "data"
@@ -19,18 +19,18 @@ LIBRARIES = {"cmu10": CMU_UNIT, "mixed": None}
 
 def library_folder(name: str, place: Path) -> Path:
     """Return the folder of a library; the mixed one is built below `place`."""
-    return linked(MIXED, place / name) if name == "mixed" else DATA / "mocap" / name
+    return link_recordings(MIXED, place / name) if name == "mixed" else DATA / "mocap" / name
 
 
-def linked(kinds: Sequence[str], folder: Path) -> Path:
+def link_recordings(kinds: Sequence[str], folder: Path) -> Path:
     """Link the folders of several kinds of recordings in `folder`, with one table of labels for all."""
     rows = (DATA / "mocap" / "annotations.csv").read_text().splitlines()
-    kept = [row for row in rows[1:] if row.split(",")[0].startswith(tuple(f"{kind}/" for kind in kinds))]
+    rows_kept = [row for row in rows[1:] if row.split(",")[0].startswith(tuple(f"{kind}/" for kind in kinds))]
     for kind in kinds:
         link = folder / kind
         link.parent.mkdir(parents=True, exist_ok=True)
         link.symlink_to(DATA / "mocap" / kind, target_is_directory=True)
-    (folder / "annotations.csv").write_text("\n".join([rows[0], *kept]) + "\n")
+    (folder / "annotations.csv").write_text("\n".join([rows[0], *rows_kept]) + "\n")
     return folder
 
 
@@ -40,8 +40,8 @@ def scenario_files(number: int) -> tuple[Path, Path]:
     return place / f"scenario{number}_track.csv", place / f"scenario{number}_annotations.txt"
 
 
-def scenario(number: int) -> tuple[Track, Timeline]:
+def read_scenario(number: int) -> tuple[Track, Timeline]:
     """Read the track and timeline of a scenario."""
     track_file, words_file = scenario_files(number)
-    track, _ = clean(read_track_csv(track_file))
+    track, _ = clean_track(read_track_csv(track_file))
     return track, read_timeline(words_file, 30.0, float(track.times[0]))

@@ -9,20 +9,20 @@ import bpy
 import numpy as np
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
 
-from ..beyond_mocap.base.errors import Cancelled, InputError
+from ..beyond_mocap.base.errors import UserCancelledError, InputError
 from ..beyond_mocap.files.bvh import bvh
 from ..beyond_mocap.library.scan import FOREIGN, find_recordings, is_foreign
 from ..beyond_mocap.motion import humanoid
 from ..beyond_mocap.motion.mirror import mirror
-from ..beyond_mocap.motion.motion import Motion, place
-from ..beyond_mocap.motion.quaternion import about_up, rotate
+from ..beyond_mocap.motion.motion import Motion, place_motion
+from ..beyond_mocap.motion.quaternion import from_up_angle, rotate
 from ..scene.core import action, channels, window
 from ..scene.library import assets, clips, foreign, recordings
 from ..scene.rigs import armature, export
-from .verb import BackgroundVerb, ImportVerb, Verb
+from .verb import BackgroundOperator, ImportOperator, BaseOperator
 
 
-class BEYOND_MOCAP_OT_import_clips(ImportVerb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_import_clips(ImportOperator, bpy.types.Operator):
     """Import motion clips (BVH, FBX, glTF, USD) as armatures, from files or from all files below a folder. Only the
 motion is imported, from the hips up and in metres"""
 
@@ -37,48 +37,48 @@ motion is imported, from the hips up and in metres"""
         description="Add the clips' actions to the active armature, if its bones are the same",
     )
 
-    def paths(self) -> list[Path]:
+    def list_paths(self) -> list[Path]:
         """List the chosen files, and all below a chosen folder."""
-        chosen = self.chosen() or ([Path(self.directory)] if self.directory else [])
+        chosen = self.list_chosen_files() or ([Path(self.directory)] if self.directory else [])
         if not chosen:
             raise InputError("import", "no file given", "a .bvh file or a folder", "choose one")
-        return [file for path in chosen for file in (_all_below(path) if path.is_dir() else [path])]
+        return [file for path in chosen for file in (_list_clips_below(path) if path.is_dir() else [path])]
 
     def do(self, context):
         """Read all files, then create armatures."""
-        clips = [clip for path in self.paths() for clip in self.read(path)]
-        own = context.object if self.reuse and context.object and context.object.type == "ARMATURE" else None
-        if own is not None:
-            self.check_bones(own, clips, context.scene)
-        made = []
+        clips = [clip for path in self.list_paths() for clip in self.read_file(path)]
+        armature_to_reuse = context.object if self.reuse and context.object and context.object.type == "ARMATURE" else None
+        if armature_to_reuse is not None:
+            self.check_bones(armature_to_reuse, clips, context.scene)
+        bodies = []
         for name, clip in clips:
-            body = own or armature.create(context, clip.motion.skeleton, name, context.collection)
-            action.write(body, clip.motion, context.scene, name=name)
-            made.append(body)
+            body = armature_to_reuse or armature.create_armature(context, clip.motion.skeleton, name, context.collection)
+            action.write_motion(body, clip.motion, context.scene, name=name)
+            bodies.append(body)
             for note in clip.notes:
                 self.report({"INFO"}, f"{name}: {note}")
-        window.select_only(context, made[-1], *made)
-        self.report({"INFO"}, f"Clips imported at the scene's frame rate: {len(made)}")
+        window.select_only(context, bodies[-1], *bodies)
+        self.report({"INFO"}, f"Clips imported at the scene's frame rate: {len(bodies)}")
 
-    def read(self, path: Path) -> list[tuple[str, bvh.BvhClip]]:
+    def read_file(self, path: Path) -> list[tuple[str, bvh.BvhClip]]:
         """Read the clips of one file with their names."""
         if not is_foreign(path):
-            return [(path.stem, bvh.read(path, self.unit or None))]
-        takes = foreign.read(path)
+            return [(path.stem, bvh.read_bvh(path, self.unit or None))]
+        takes = foreign.read_takes(path)
         alone = len(takes) == 1
-        return [(path.stem if alone else f"{path.stem} {one.name}", foreign.as_clip(one.motion)) for one in takes]
+        return [(path.stem if alone else f"{path.stem} {one.name}", foreign.to_bvh_clip(one.motion)) for one in takes]
 
     @staticmethod
     def check_bones(body, clips, scene):
         """Check that all clips have the armature's bones (InputError)."""
-        skeleton = armature.skeleton_of(body, scene)
+        skeleton = armature.build_skeleton(body, scene)
         for name, clip in clips:
-            if not clip.motion.skeleton.same_bones(skeleton, 5e-3):
+            if not clip.motion.skeleton.has_same_bones(skeleton, 5e-3):
                 found = f"different bones than {body.name}"
                 raise InputError(name, found, "the same skeleton", "import it as a new armature")
 
 
-def _all_below(folder: Path) -> list[Path]:
+def _list_clips_below(folder: Path) -> list[Path]:
     found = find_recordings(folder)
     if not found:
         raise InputError(folder, "no motion clip in the folder", "BVH, FBX, glTF or USD files", "choose another folder")
@@ -111,7 +111,7 @@ class BEYOND_MOCAP_FH_foreign_clips(bpy.types.FileHandler):
         return BEYOND_MOCAP_FH_clips.poll_drop(context)
 
 
-class BEYOND_MOCAP_OT_mirror(Verb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_mirror(BaseOperator, bpy.types.Operator):
     """Exchange left and right in the active armature's motion: it starts at the same place and facing, but turns and
 kicks to the other side. The previous motion stays as an action"""
 
@@ -119,31 +119,31 @@ kicks to the other side. The previous motion stays as an action"""
     bl_label = "Mirror Motion"
     needs = ("Select an armature first",
              lambda context: context.object is not None and context.object.type == "ARMATURE",
-             "The active armature plays no action", lambda context: channels.playing(context.object)[0] is not None)
+             "The active armature plays no action", lambda context: channels.find_playing_action(context.object)[0] is not None)
 
     def do(self, context):
         body = context.object
-        motion = action.read(body, context.scene)
-        start, name = action.first_frame(body), channels.playing(body)[0].name
-        action.write(body, mirrored_in_place(motion), context.scene, start, f"{name} mirrored")
+        motion = action.read_motion(body, context.scene)
+        start, name = action.find_first_frame(body), channels.find_playing_action(body)[0].name
+        action.write_motion(body, mirror_in_place(motion), context.scene, start, f"{name} mirrored")
 
 
-def mirrored_in_place(motion: Motion) -> Motion:
+def mirror_in_place(motion: Motion) -> Motion:
     """Mirror a motion and place it where the original started, with the same heading."""
-    twin = mirror(motion)
-    turn = humanoid.heading(motion)[0] - humanoid.heading(twin)[0]
-    begun = rotate(about_up(turn), twin.root_positions[0])
-    offset = np.append((motion.root_positions[0] - begun)[:2], 0.0)
-    return place(twin, turn, offset)
+    mirrored = mirror(motion)
+    angle = humanoid.compute_heading(motion)[0] - humanoid.compute_heading(mirrored)[0]
+    start = rotate(from_up_angle(angle), mirrored.root_positions[0])
+    offset = np.append((motion.root_positions[0] - start)[:2], 0.0)
+    return place_motion(mirrored, angle, offset)
 
 
-WHICH = (("CHOSEN", "Chosen Clip", "The clip chosen in the library's list"),
+CLIP_CHOICES = (("CHOSEN", "Chosen Clip", "The clip chosen in the library's list"),
          ("SHOWN", "Listed Clips", "All clips that the library's list currently shows"),
          ("SELECTED", "Selected Armatures", "The actions that the selected armatures play"))
 
 
 @dataclass(frozen=True, eq=False)
-class Order:
+class AssetOrder:
     """The input of making assets.
 
     Attributes:
@@ -157,14 +157,14 @@ class Order:
     drafts: tuple
 
 
-class BEYOND_MOCAP_OT_make_assets(BackgroundVerb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_make_assets(BackgroundOperator, bpy.types.Operator):
     """Make assets of clips: each an action with a picture of its key pose, its labels as tags, in a catalog of its
 kind, in this file or as a .blend for a folder of asset libraries"""
 
     bl_idname = "beyond_mocap.make_assets"
     bl_label = "Clips as Assets"
     kind = "assets"
-    which: EnumProperty(name="Clips", items=WHICH, default="CHOSEN", description="Which clips become assets")
+    which: EnumProperty(name="Clips", items=CLIP_CHOICES, default="CHOSEN", description="Which clips become assets")
     apart: BoolProperty(name="As a File", description="Write the assets to a .blend file and leave this file unchanged",
                         options={"SKIP_SAVE"})
     overwrite: BoolProperty(name="Overwrite", description="Replace an existing file", options={"SKIP_SAVE"})
@@ -186,21 +186,21 @@ kind, in this file or as a .blend for a folder of asset libraries"""
         self.check_target()
         settings = context.scene.beyond_mocap
         if self.which == "SELECTED":
-            drafts = {one.action: one for one in (_draft_of(rig, context) for rig in _playing(context))}
-            return Order(Path(), (), tuple(drafts.values()))
+            drafts = {one.action: one for one in (_build_draft(rig, context) for rig in _list_playing(context))}
+            return AssetOrder(Path(), (), tuple(drafts.values()))
         rows = context.window_manager.beyond_mocap_clips.shown
-        chosen = clips.active(context.window_manager)
-        wanted = list(rows) if self.which == "SHOWN" else [chosen] if chosen else []
-        if not wanted:
+        chosen = clips.find_active_clip(context.window_manager)
+        chosen_rows = list(rows) if self.which == "SHOWN" else [chosen] if chosen else []
+        if not chosen_rows:
             raise InputError("assets", "no clip in the list", "clips of the library",
                              "press Build Library or List Clips")
-        folder = recordings.folder_of(settings)
-        files = tuple((row.path, *recordings.file_of(settings, row.path), row.figures) for row in wanted)
-        return Order(folder, files, ())
+        folder = recordings.find_library_folder(settings)
+        files = tuple((row.path, *recordings.find_clip_file(settings, row.path), row.figures) for row in chosen_rows)
+        return AssetOrder(folder, files, ())
 
-    def target(self) -> Path:
+    def find_target(self) -> Path:
         """Return the .blend to write."""
-        return export.with_ending(Path(bpy.path.abspath(self.filepath)), ".blend")
+        return export.replace_ending(Path(bpy.path.abspath(self.filepath)), ".blend")
 
     def check_target(self):
         """Check that the file may be written (InputError)."""
@@ -208,7 +208,7 @@ kind, in this file or as a .blend for a folder of asset libraries"""
             return
         if not self.filepath:
             raise InputError("assets", "no file given", "a .blend to write", "choose where")
-        target = self.target()
+        target = self.find_target()
         if target.exists() and not self.overwrite:
             raise InputError(target, "already exists", "a new file", "choose another name or switch Overwrite on")
         if bpy.data.filepath and target.resolve() == Path(bpy.data.filepath).resolve():
@@ -218,29 +218,29 @@ kind, in this file or as a .blend for a folder of asset libraries"""
     def work(order, progress, cancelled, _hurry):
         """Read the motions and render the pictures."""
         from ..beyond_mocap.files.bvh import bvh
-        from ..beyond_mocap.library.keep_words import read_words
+        from ..beyond_mocap.library.keep_words import read_labels
 
         drafts, pictures, total = [], [], len(order.files) + len(order.drafts)
-        for number, (path, file, unit, told) in enumerate(order.files):
+        for number, (path, file, unit, figures) in enumerate(order.files):
             if cancelled():
-                raise Cancelled("assets: cancelled")
+                raise UserCancelledError("assets: cancelled")
             progress(number / total, f"Drawing {Path(path).stem}")
-            motion = bvh.read(file, unit).motion
-            rows = read_words(order.folder / path, order.folder, motion.fps)
-            drafts.append(assets.draft(Path(path).stem, motion, rows, told))
-            pictures.append(assets.picture(drafts[-1]))
+            motion = bvh.read_bvh(file, unit).motion
+            rows = read_labels(order.folder / path, order.folder, motion.fps)
+            drafts.append(assets.build_draft(Path(path).stem, motion, rows, figures))
+            pictures.append(assets.render_picture(drafts[-1]))
         for one in order.drafts:
             drafts.append(one)
-            pictures.append(assets.picture(one))
+            pictures.append(assets.render_picture(one))
         return drafts, pictures
 
     def apply(self, scene, result):
         """Create the actions; write them to their own file, or leave them here."""
         drafts, pictures = result
-        catalogs = {assets.catalog_of(one.words) for one in drafts}
+        catalogs = {assets.choose_catalog(one.words) for one in drafts}
         if self.apart:
-            target = self.target()
-            write_apart(target, assets.make(bpy.context, drafts, pictures, apart=True), drafts)
+            target = self.find_target()
+            write_asset_file(target, assets.create_assets(bpy.context, drafts, pictures, copy_actions=True), drafts)
             assets.define_catalogs(target.parent, catalogs)
             self.report({"INFO"}, f"{len(drafts)} assets written to {target}")
             return
@@ -248,32 +248,32 @@ kind, in this file or as a .blend for a folder of asset libraries"""
             assets.define_catalogs(Path(bpy.data.filepath).parent, catalogs)
         else:
             self.report({"INFO"}, "To name the catalogs, save this file and make the assets again")
-        self.report({"INFO"}, f"Assets in this file: {len(assets.make(bpy.context, drafts, pictures))}")
+        self.report({"INFO"}, f"Assets in this file: {len(assets.create_assets(bpy.context, drafts, pictures))}")
 
 
-def write_apart(target: Path, made, drafts) -> None:
+def write_asset_file(target: Path, actions, drafts) -> None:
     """Write the actions to a .blend, under the names of the drafts, and remove them from this file."""
-    taken = {}
-    for item, one in zip(made, drafts):
+    originals = {}
+    for item, one in zip(actions, drafts):
         if one.action:
-            taken[one.action] = own = bpy.data.actions[one.action]
+            originals[one.action] = own = bpy.data.actions[one.action]
             own.name = f"{one.action} (original)"
             item.name = one.action
     try:
-        assets.write_library(target, made)
+        assets.write_library(target, actions)
     finally:
-        bpy.data.batch_remove(made)
-        for name, own in taken.items():
+        bpy.data.batch_remove(actions)
+        for name, own in originals.items():
             own.name = name
 
 
-def _playing(context) -> list[bpy.types.Object]:
+def _list_playing(context) -> list[bpy.types.Object]:
     """List the selected armatures that play an action of this file; InputError where there are none."""
-    rigs = [thing for thing in context.selected_objects if thing.type == "ARMATURE" and channels.playing(thing)[0]]
+    rigs = [thing for thing in context.selected_objects if thing.type == "ARMATURE" and channels.find_playing_action(thing)[0]]
     if not rigs:
         raise InputError("assets", "no selected armature plays an action", "armatures with motions", "select some")
     for rig in rigs:
-        if channels.playing(rig)[0].library is not None:
+        if channels.find_playing_action(rig)[0].library is not None:
             raise InputError(rig.name, "its action belongs to another file", "actions of this file")
         if rig.beyond_mocap_ride.on:
             raise InputError(rig.name, "its path edit is not applied", "an applied motion",
@@ -281,11 +281,11 @@ def _playing(context) -> list[bpy.types.Object]:
     return rigs
 
 
-def _draft_of(rig, context) -> assets.Draft:
+def _build_draft(rig, context) -> assets.AssetDraft:
     """Build a draft of what an armature plays, with the labels of its strips where it has any."""
-    motion, item = action.read(rig, context.scene), channels.playing(rig)[0]
+    motion, item = action.read_motion(rig, context.scene), channels.find_playing_action(rig)[0]
     try:
-        rows = recordings.read_words_at(rig, motion.fps, len(motion))
+        rows = recordings.read_labels_at(rig, motion.fps, len(motion))
     except InputError:
         rows = ()
-    return assets.draft(item.name, motion, rows, f"{motion.duration:.1f} s", item.name)
+    return assets.build_draft(item.name, motion, rows, f"{motion.duration:.1f} s", item.name)

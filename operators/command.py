@@ -21,7 +21,7 @@ def run(arguments: list[str]) -> int:
     from ..scene.match import child
     from ..scene.rigs.deliver import WRITERS
 
-    return main(arguments, WRITERS, f"blender --command {NAME}", child.run)
+    return main(arguments, WRITERS, f"blender --command {NAME}", child.run_command)
 
 
 def register():

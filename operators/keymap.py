@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import bpy
 
-OURS = "beyond_mocap."
+OPERATOR_PREFIX = "beyond_mocap."
 NUDGES = {"LEFT_ARROW": "LEFT", "RIGHT_ARROW": "RIGHT", "UP_ARROW": "FORTH", "DOWN_ARROW": "BACK", "PAGE_UP": "UP",
           "PAGE_DOWN": "DOWN"}
 
@@ -63,8 +63,8 @@ def register():
         return
     for entry in ENTRIES:
         keymap = configuration.keymaps.new(name=entry.keymap, space_type=entry.space)
-        held = {modifier: True for modifier in entry.modifiers}
-        item = keymap.keymap_items.new(entry.operator, entry.key, "PRESS", repeat=entry.repeat, **held)
+        modifiers = {modifier: True for modifier in entry.modifiers}
+        item = keymap.keymap_items.new(entry.operator, entry.key, "PRESS", repeat=entry.repeat, **modifiers)
         for name, value in entry.properties.items():
             setattr(item.properties, name, value)
 
@@ -75,5 +75,5 @@ def unregister():
     if configuration is None:
         return
     for keymap in configuration.keymaps:
-        for item in [item for item in keymap.keymap_items if item.idname.startswith(OURS)]:
+        for item in [item for item in keymap.keymap_items if item.idname.startswith(OPERATOR_PREFIX)]:
             keymap.keymap_items.remove(item)

@@ -13,32 +13,32 @@ from bpy.props import BoolProperty, StringProperty
 from ..beyond_mocap.annotation.labels import find_label
 from ..beyond_mocap.base.errors import InputError
 from ..scene.core import preferences, session, window
-from ..scene.core.settings import absolute, as_setting
+from ..scene.core.settings import to_absolute_path, to_setting_path
 from ..scene.library import clips, foreign, recordings
-from .verb import BackgroundVerb, Verb
+from .verb import BackgroundOperator, BaseOperator
 
 if TYPE_CHECKING:
     from ..beyond_mocap.library.library import Library
 
 
-class FolderVerb(BackgroundVerb):
+class FolderOperator(BackgroundOperator):
     """Base of operators about the library's folder."""
 
     needs = "Choose the library's folder first", lambda context: bool(context.scene.beyond_mocap.library_folder)
 
 
-class ClipVerb(Verb):
+class ClipOperator(BaseOperator):
     """Base of operators about one clip of the list: the named one, else the active one."""
 
     path: StringProperty(name="Clip", options={"SKIP_SAVE"},
                          description="Clip file below the library folder; empty uses the one chosen in the list")
     dressed: BoolProperty(name="Body", default=True, description="Add a low-poly body to the bones")
     needs = ("No clips listed; press Build Library or List Clips first",
-             lambda context: clips.active(context.window_manager) is not None)
+             lambda context: clips.find_active_clip(context.window_manager) is not None)
 
-    def clip(self, context) -> str:
+    def find_clip(self, context) -> str:
         """Return the clip, below the library's folder."""
-        chosen = clips.active(context.window_manager)
+        chosen = clips.find_active_clip(context.window_manager)
         path = self.path or (chosen.path if chosen else "")
         if not path:
             raise InputError(self.bl_label, "no clip chosen", "a clip in the library's list")
@@ -46,7 +46,7 @@ class ClipVerb(Verb):
 
 
 @dataclass(frozen=True)
-class Order:
+class BuildOrder:
     """The input of a build."""
 
     setting: str
@@ -57,7 +57,7 @@ class Order:
 
 
 @dataclass(frozen=True, eq=False)
-class Built:
+class BuildResult:
     """The result of a build.
 
     Attributes:
@@ -70,12 +70,12 @@ class Built:
 
     setting: str
     library: "Library | None"
-    trouble: InputError | None
+    error: InputError | None
     listing: tuple
     files: dict
 
 
-class BEYOND_MOCAP_OT_build_library(FolderVerb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_build_library(FolderOperator, bpy.types.Operator):
     """Read all clips of the library folder with their labels and foot contacts, and index them for the search. The
 result is cached, so the next build is quick unless files have changed. FBX, glTF and USD clips are converted first"""
 
@@ -92,24 +92,24 @@ result is cached, so the next build is quick unless files have changed. FBX, glT
         settings = context.scene.beyond_mocap
         if not settings.library_folder:
             raise InputError("library", "no folder chosen", "a folder of BVH clips", "choose one in step 1")
-        folder = absolute(settings.library_folder)
+        folder = to_absolute_path(settings.library_folder)
         unit = settings.library_unit or None
-        queue = self.queue or self.waiting(context)
-        while queue.todo:  # called from a script; in a window `modal` has converted them one by one
-            queue.step()
+        queue = self.queue or self.create_queue(context)
+        while queue.remaining:  # called from a script; in a window `modal` has converted them one by one
+            queue.convert_next()
         self.notes = queue.notes
-        return Order(settings.library_folder, folder, unit, self.rebuild, preferences.for_build(folder))
+        return BuildOrder(settings.library_folder, folder, unit, self.rebuild, preferences.build_library_options(folder))
 
-    def waiting(self, context):
+    def create_queue(self, context):
         """Create the queue of clips that need a conversion."""
-        folder = absolute(context.scene.beyond_mocap.library_folder)
-        return foreign.Queue(folder, preferences.cache_folder(folder))
+        folder = to_absolute_path(context.scene.beyond_mocap.library_folder)
+        return foreign.ConversionQueue(folder, preferences.find_cache_folder(folder))
 
     def start(self, context):
         """Start with the conversions, if there are any, else with the build in a thread."""
-        self.queue = self.waiting(context)
+        self.queue = self.create_queue(context)
         self.scene = context.scene.session_uid
-        if not self.queue.todo:
+        if not self.queue.remaining:
             super().start(context)
 
     def modal(self, context, event):
@@ -118,22 +118,22 @@ result is cached, so the next build is quick unless files have changed. FBX, glT
         if self.job is not None:
             return super().modal(context, event)
         if event.type == "ESC" and event.value == "PRESS":
-            self.ended(context)
+            self.stop_polling(context)
             self.report({"WARNING"}, f"{self.bl_label}: cancelled; finished conversions are kept")
             return {"CANCELLED"}
         if event.type != "TIMER":
             return {"PASS_THROUGH"}
         outcome = self.attempt(lambda: self.convert_next(context))
         if outcome == {"CANCELLED"}:
-            self.ended(context)
+            self.stop_polling(context)
             return outcome
         self.show(context)
         return {"RUNNING_MODAL"}
 
     def convert_next(self, context):
         """Convert the next clip, or start the build where there is none."""
-        if self.queue.todo:
-            self.queue.step()
+        if self.queue.remaining:
+            self.queue.convert_next()
         else:
             super().start(context)
 
@@ -142,56 +142,56 @@ result is cached, so the next build is quick unless files have changed. FBX, glT
         if self.job is not None:
             return super().show(context)
         running, queue = context.window_manager.beyond_mocap_work, self.queue
-        done = queue.total - len(queue.todo)
-        text = f"Converting {queue.todo[0].name}" if queue.todo else "Converted"
+        done = queue.total - len(queue.remaining)
+        text = f"Converting {queue.remaining[0].name}" if queue.remaining else "Converted"
         running.kind, running.fraction, running.text = self.kind, done / max(queue.total, 1), text
         context.workspace.status_text_set(f"{text}   {done} of {queue.total}   ESC: cancel")
-        window.redraw()
+        window.redraw_editors()
 
     def cancel(self, context):
         """Stop when Blender ends the operator."""
         if self.job is not None:
             self.job.cancel()
-        self.ended(context)
+        self.stop_polling(context)
 
     @staticmethod
     def work(order, progress, cancelled, _hurry):
         """Build the library and list its clips; a library that cannot be built is listed too, so that it can be
         labelled.
         """
-        from ..beyond_mocap.library.build import build
-        from ..beyond_mocap.library.listing import listed, scanned
+        from ..beyond_mocap.library.build import build_library
+        from ..beyond_mocap.library.listing import list_clips, scan_clips
 
         files = clips.list_files(order.folder) or {}
-        asked = {"rebuild": order.rebuild, "unit": order.unit, **order.preferences}
+        options = {"rebuild": order.rebuild, "unit": order.unit, **order.preferences}
         try:
-            built = build(order.folder, **asked, progress=progress, cancelled=cancelled)
+            library = build_library(order.folder, **options, progress=progress, cancelled=cancelled)
         except InputError as error:
-            return Built(order.setting, None, error, scanned(order.folder, asked["cache_dir"]), files)
-        return Built(order.setting, built, None, listed(built), files)
+            return BuildResult(order.setting, None, error, scan_clips(order.folder, options["cache_dir"]), files)
+        return BuildResult(order.setting, library, None, list_clips(library), files)
 
-    def apply(self, scene, built):
+    def apply(self, scene, result):
         """Store the library and report its content."""
-        clips.keep(bpy.context.window_manager, built.setting, built.listing, built.files)
+        clips.store_clips(bpy.context.window_manager, result.setting, result.listing, result.files)
         for note in self.notes:
             self.report({"WARNING"}, note)
-        if built.trouble is not None:
-            raise built.trouble
-        session.keep_library(built.library, scene.beyond_mocap.library_unit or None)
-        scene.beyond_mocap.library_holds = summary(built.library)
-        for note in built.library.notes:
+        if result.trouble is not None:
+            raise result.trouble
+        session.store_library(result.library, scene.beyond_mocap.library_unit or None)
+        scene.beyond_mocap.library_holds = describe_library(result.library)
+        for note in result.library.notes:
             self.report({"INFO"}, note)
         self.report({"INFO"}, scene.beyond_mocap.library_holds.splitlines()[0])
 
 
-def summary(built: "Library") -> str:
+def describe_library(library: "Library") -> str:
     """Describe a library for the panel: clips and minutes, then each gait with its speed, then key moments with their
     number.
     """
-    originals = [clip for clip in built.clips if not clip.mirrored]
+    originals = [clip for clip in library.clips if not clip.mirrored]
     keys = Counter(row.words[0] for clip in originals for row in clip.annotations if row.key is not None and row.words)
-    lines = [f"{len(originals)} clips, {built.minutes:.1f} minutes, {len(built.skeleton)} joints"]
-    lines += [f"{gait.word}: {gait.speed:.1f} m/s" for gait in built.gaits]
+    lines = [f"{len(originals)} clips, {library.minutes:.1f} minutes, {len(library.skeleton)} joints"]
+    lines += [f"{gait.label}: {gait.speed:.1f} m/s" for gait in library.gaits]
     for word, count in keys.most_common():
         lines.append(f"{find_label(word).title}: {count} {'moment' if count == 1 else 'moments'}")
     return "\n".join(lines)
@@ -204,10 +204,10 @@ class ListOrder:
     setting: str
     folder: str
     cache_dir: str | None
-    built: "Library | None"
+    library: "Library | None"
 
 
-class BEYOND_MOCAP_OT_list_clips(FolderVerb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_list_clips(FolderOperator, bpy.types.Operator):
     """List the clips of the folder with their labels, without reading their motion; Build Library adds speeds and
 quality"""
 
@@ -218,30 +218,30 @@ quality"""
 
     def order(self, context):
         settings = context.scene.beyond_mocap
-        folder = absolute(settings.library_folder)
+        folder = to_absolute_path(settings.library_folder)
         clips.check_folder(context.scene)
-        built = session.library(folder, settings.library_unit or None)
-        return ListOrder(settings.library_folder, folder, preferences.cache_folder(folder), built)
+        built = session.find_library(folder, settings.library_unit or None)
+        return ListOrder(settings.library_folder, folder, preferences.find_cache_folder(folder), built)
 
     @staticmethod
     def work(order, progress, _cancelled, _hurry):
         """List from the built library where there is one, else from the folder."""
-        from ..beyond_mocap.library.listing import listed, scanned
+        from ..beyond_mocap.library.listing import list_clips, scan_clips
 
         progress(0.0, "Listing clips")
         files = clips.list_files(order.folder)
         if files is None:
             raise InputError(order.folder, "no such folder", "the library's folder", "press Relink Library")
-        found = listed(order.built) if order.built is not None else scanned(order.folder, order.cache_dir)
+        found = list_clips(order.built) if order.built is not None else scan_clips(order.folder, order.cache_dir)
         return order.setting, found, files
 
     def apply(self, _scene, result):
         setting, found, files = result
-        clips.keep(bpy.context.window_manager, setting, found, files)
+        clips.store_clips(bpy.context.window_manager, setting, found, files)
         self.report({"INFO"}, f"Clips listed: {len(found)}")
 
 
-class BEYOND_MOCAP_OT_relink_library(Verb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_relink_library(BaseOperator, bpy.types.Operator):
     """Choose the new place of a library folder that was moved; a folder beside this file is found automatically"""
 
     bl_idname = "beyond_mocap.relink_library"
@@ -264,15 +264,15 @@ class BEYOND_MOCAP_OT_relink_library(Verb, bpy.types.Operator):
         if chosen and not clips.holds_recordings(chosen):
             raise InputError(chosen, "no recordings in the folder", "the library's folder", "choose another one")
         if chosen:
-            settings.library_folder = as_setting(chosen)
-        elif not os.path.isdir(absolute(settings.library_folder)) and not clips.relink_library(context.scene):
-            raise InputError(absolute(settings.library_folder), "no such folder, and no similar one beside this file",
+            settings.library_folder = to_setting_path(chosen)
+        elif not os.path.isdir(to_absolute_path(settings.library_folder)) and not clips.relink_library(context.scene):
+            raise InputError(to_absolute_path(settings.library_folder), "no such folder, and no similar one beside this file",
                              "the library's folder", "choose it in Relink Library")
         clips.check_folder(context.scene)
-        self.report({"INFO"}, f"Library: {absolute(settings.library_folder)}")
+        self.report({"INFO"}, f"Library: {to_absolute_path(settings.library_folder)}")
 
 
-class BEYOND_MOCAP_OT_import_clip(ClipVerb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_import_clip(ClipOperator, bpy.types.Operator):
     """Import this clip of the library as it was recorded: an armature with a body and the clip's action"""
 
     bl_idname = "beyond_mocap.import_clip"
@@ -280,7 +280,7 @@ class BEYOND_MOCAP_OT_import_clip(ClipVerb, bpy.types.Operator):
 
     def do(self, context):
         """Read the file, then create the armature."""
-        path = self.clip(context)
+        path = self.find_clip(context)
         clip, notes = recordings.read_recording(context.scene.beyond_mocap, path)
         body = recordings.show_recording(context, clip, path, self.dressed)
         for note in notes:
@@ -288,14 +288,14 @@ class BEYOND_MOCAP_OT_import_clip(ClipVerb, bpy.types.Operator):
         self.report({"INFO"}, f"{body.name}: {clip.duration:.1f} s, {len(clip)} frames at {clip.fps:g} per second")
 
 
-class BEYOND_MOCAP_OT_remove_clip(Verb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_remove_clip(BaseOperator, bpy.types.Operator):
     """Remove the active clip from this file: armature, body, strips and actions. The library keeps the clip; unsaved
 labels are lost"""
 
     bl_idname = "beyond_mocap.remove_clip"
     bl_label = "Remove Clip"
     needs = ("Select the armature of a clip from the library's list",
-             lambda context: bool(recordings.shown_clip(context.object)))
+             lambda context: bool(recordings.find_shown_clip(context.object)))
 
     def do(self, context):
         rig = context.object

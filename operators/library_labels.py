@@ -10,23 +10,23 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, St
 
 from ..beyond_mocap.base.errors import BeyondMocapError, InputError
 from ..scene.core import preferences, session
-from ..scene.core.settings import absolute
+from ..scene.core.settings import to_absolute_path
 from ..scene.core.window import clear_status
 from ..scene.library import clips, recordings
 from ..scene.timeline import lanes, proposals
 from .annotate import SPACES
-from .library import ClipVerb, FolderVerb
-from .verb import Verb
+from .library import ClipOperator, FolderOperator
+from .verb import BaseOperator
 
 
-class OpenClipVerb(Verb):
+class OpenClipOperator(BaseOperator):
     """Base of operators about the library clip that the active armature shows."""
 
     needs = ("Open a clip with Annotate Clip first, and keep its armature active",
-             lambda context: bool(recordings.shown_clip(context.object)))
+             lambda context: bool(recordings.find_shown_clip(context.object)))
 
 
-class BEYOND_MOCAP_OT_annotate_clip(ClipVerb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_annotate_clip(ClipOperator, bpy.types.Operator):
     """Open this clip of the library for annotation: an armature that plays it, with its labels as strips and markers in
 the NLA editor. Edit them there or propose labels, then press Save Labels"""
 
@@ -35,22 +35,22 @@ the NLA editor. Edit them there or propose labels, then press Save Labels"""
 
     def do(self, context):
         """Read clip and labels, then create armature and strips."""
-        from ..beyond_mocap.library.keep_words import as_timeline, read_sources, read_words
+        from ..beyond_mocap.library.keep_words import to_timeline, read_sources, read_labels
 
-        settings, path = context.scene.beyond_mocap, self.clip(context)
+        settings, path = context.scene.beyond_mocap, self.find_clip(context)
         motion, _ = recordings.read_recording(settings, path)
-        folder = recordings.folder_of(settings)
-        rows = read_words(folder / path, folder, motion.fps)
-        timeline = as_timeline(rows, motion.fps)
-        said = read_sources(folder / path, folder, rows, motion.fps)
+        folder = recordings.find_library_folder(settings)
+        rows = read_labels(folder / path, folder, motion.fps)
+        timeline = to_timeline(rows, motion.fps)
+        sources = read_sources(folder / path, folder, rows, motion.fps)
         rig = recordings.show_recording(context, motion, path, self.dressed)
-        recordings.lay_words(rig, context.scene, motion, timeline)
-        for row, (source, confidence) in said.items():
-            proposals.add(rig, row, source, confidence, "ACCEPTED")
+        recordings.write_labels(rig, context.scene, motion, timeline)
+        for row, (source, confidence) in sources.items():
+            proposals.add_proposal(rig, row, source, confidence, "ACCEPTED")
         self.report({"INFO"}, f"{rig.name}: {len(rows)} {'row' if len(rows) == 1 else 'rows'} of labels")
 
 
-class BEYOND_MOCAP_OT_propose_words(OpenClipVerb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_propose_words(OpenClipOperator, bpy.types.Operator):
     """Propose labels for the active clip from its motion: gaits and directions, kicks with foot and key moment, jumps,
 headers, turns, getting up, and acts learned from annotated clips. Review them and add what is missing"""
 
@@ -70,27 +70,27 @@ headers, turns, getting up, and acts learned from annotated clips. Review them a
         """Read the recording, then write the strips."""
         from ..beyond_mocap.annotation import Timeline
         from ..beyond_mocap.library.classify import classifier
-        from ..beyond_mocap.library.keep_words import as_timeline
-        from ..beyond_mocap.library.proposals import GAITS, gaits_of, propose
+        from ..beyond_mocap.library.keep_words import to_timeline
+        from ..beyond_mocap.library.proposals import GAITS, list_gaits, propose_labels
 
         settings, rig = context.scene.beyond_mocap, context.object
-        motion, _ = recordings.read_recording(settings, recordings.shown_clip(rig), rig[recordings.FOLDER])
-        built = session.library(absolute(settings.library_folder), settings.library_unit or None)
+        motion, _ = recordings.read_recording(settings, recordings.find_shown_clip(rig), rig[recordings.FOLDER])
+        library = session.find_library(to_absolute_path(settings.library_folder), settings.library_unit or None)
         try:
-            gaits = gaits_of(built) if built is not None else GAITS
+            gaits = list_gaits(library) if library is not None else GAITS
         except InputError:  # a library without locomotion has no gaits
             gaits = GAITS
-        known = classifier.read_classifier(absolute(settings.words_model)) if settings.words_model else None
-        found = [one for one in propose(motion, gaits, known) if one.confidence >= self.least]
+        known = classifier.read_classifier(to_absolute_path(settings.words_model)) if settings.words_model else None
+        found = [one for one in propose_labels(motion, gaits, known) if one.confidence >= self.least]
         if self.review:
-            self.list_them(rig, context.scene, motion, found)
+            self.list_new_proposals(rig, context.scene, motion, found)
             return
-        before = None if self.replace else lanes.read(rig)
-        told = as_timeline([one.annotation for one in found], motion.fps)
+        before = None if self.replace else lanes.read_timeline(rig)
+        timeline = to_timeline([one.annotation for one in found], motion.fps)
         if before is not None:
-            told = Timeline((*before.spans, *told.spans), (*before.keys, *told.keys))
-        recordings.lay_words(rig, context.scene, motion, told)
-        proposals.keep(rig, found, "ACCEPTED", beside=not self.replace)
+            timeline = Timeline((*before.spans, *timeline.spans), (*before.keys, *timeline.keys))
+        recordings.write_labels(rig, context.scene, motion, timeline)
+        proposals.store_proposals(rig, found, "ACCEPTED", keep_accepted=not self.replace)
         for one in found:
             row = one.annotation
             if row.key is not None or one.confidence < 0.6:
@@ -101,19 +101,19 @@ headers, turns, getting up, and acts learned from annotated clips. Review them a
         counted = f"{rest} stretch{'es' * (rest != 1)} and {keys} key moment{'s' * (keys != 1)}"
         self.report({"INFO"}, f"{rig.name}: {counted} proposed")
 
-    def list_them(self, rig, scene, motion, found):
+    def list_new_proposals(self, rig, scene, motion, found):
         """List the proposals that are not among the clip's labels already."""
         from ..beyond_mocap.annotation import Timeline
 
-        if not lanes.has(rig):
-            recordings.lay_words(rig, scene, motion, Timeline())
-        said = lanes.read(rig)
-        new = [one for one in found if not proposals.said_already(said, one.annotation, motion.fps)]
-        proposals.keep(rig, new)
+        if not lanes.has_label_tracks(rig):
+            recordings.write_labels(rig, scene, motion, Timeline())
+        timeline = lanes.read_timeline(rig)
+        new = [one for one in found if not proposals.has_labels(timeline, one.annotation, motion.fps)]
+        proposals.store_proposals(rig, new)
         self.report({"INFO"}, f"{rig.name}: {len(new)} proposal{'s' * (len(new) != 1)} to review")
 
 
-WHAT = (("ACCEPT", "Accept", "Add this proposal to the clip's labels and go to the next one"),
+REVIEW_ACTIONS = (("ACCEPT", "Accept", "Add this proposal to the clip's labels and go to the next one"),
         ("REFUSE", "Reject", "Reject this proposal and go to the next one"),
         ("NEXT", "Next", "Go to the next proposal"),
         ("PREVIOUS", "Previous", "Go to the previous proposal"),
@@ -121,35 +121,35 @@ WHAT = (("ACCEPT", "Accept", "Add this proposal to the clip's labels and go to t
         ("REFUSE_ALL", "Reject All", "Reject all open proposals"))
 KEYS = {"A": "ACCEPT", "RET": "ACCEPT", "NUMPAD_ENTER": "ACCEPT", "X": "REFUSE", "DEL": "REFUSE", "DOWN_ARROW": "NEXT",
         "RIGHT_ARROW": "NEXT", "UP_ARROW": "PREVIOUS", "LEFT_ARROW": "PREVIOUS"}
-STATUS = "A, Enter: accept   X: reject   Up, Down: previous, next   Space: play   Esc: finish"
+STATUS_TEXT = "A, Enter: accept   X: reject   Up, Down: previous, next   Space: play   Esc: finish"
 
 
-class ProposalVerb(Verb):
+class ProposalOperator(BaseOperator):
     """Base of operators about the proposals for the active clip."""
 
     needs = ("Open a clip with Annotate Clip first, then press Review",
              lambda context: context.object is not None and len(context.object.beyond_mocap_proposals.listed) > 0)
 
 
-class BEYOND_MOCAP_OT_judge_proposal(ProposalVerb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_judge_proposal(ProposalOperator, bpy.types.Operator):
     """Accept or reject a proposal of the list, or go to another one"""
 
     bl_idname = "beyond_mocap.judge_proposal"
     bl_label = "Review Proposal"
-    what: EnumProperty(name="What", items=WHAT, default="ACCEPT", description="Action on the proposal")
+    what: EnumProperty(name="What", items=REVIEW_ACTIONS, default="ACCEPT", description="Action on the proposal")
     index: IntProperty(name="Proposal", default=-1, min=-1, options={"SKIP_SAVE"},
                        description="Number in the list; -1 uses the chosen one")
 
     @classmethod
     def description(cls, _context, properties):
-        return next(text for name, _, text in WHAT if name == properties.what)
+        return next(text for name, _, text in REVIEW_ACTIONS if name == properties.what)
 
     def do(self, context):
         """Carry out the action and report it."""
-        self.report({"INFO"}, judged(context.object, self.what, self.index))
+        self.report({"INFO"}, review_proposal(context.object, self.what, self.index))
 
 
-class BEYOND_MOCAP_OT_review_proposals(ProposalVerb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_review_proposals(ProposalOperator, bpy.types.Operator):
     """Review the proposals with keys while the clip plays: A or Enter accepts, X rejects and goes to the next one, Up
 and Down step, Esc finishes"""
 
@@ -164,9 +164,9 @@ and Down step, Esc finishes"""
         if bpy.app.background or context.window is None:
             return self.execute(context)
         self.target = context.object.name
-        _show_open(context.object)
+        _show_open_proposal(context.object)
         context.window_manager.modal_handler_add(self)
-        self.tell(context, "")
+        self.show_status(context, "")
         return {"RUNNING_MODAL"}
 
     def modal(self, context, event):
@@ -174,37 +174,37 @@ and Down step, Esc finishes"""
         target = context.object
         listed = target is not None and target.name == self.target and len(target.beyond_mocap_proposals.listed) > 0
         if not listed:
-            return self.left(context)
+            return self.finish(context)
         held = event.ctrl or event.alt or event.oskey or event.shift
-        if event.value != "PRESS" or held or not _over_editor(context, event):
+        if event.value != "PRESS" or held or not _is_over_editor(context, event):
             return {"PASS_THROUGH"}
         if event.type == "ESC":
-            return self.left(context)
+            return self.finish(context)
         if event.type not in KEYS:
             return {"PASS_THROUGH"}
-        self.press(context, target, KEYS[event.type])
-        return {"RUNNING_MODAL"} if proposals.left(target) else self.left(context)
+        self.handle_key(context, target, KEYS[event.type])
+        return {"RUNNING_MODAL"} if proposals.count_open(target) else self.finish(context)
 
-    def press(self, context, target, what: str):
+    def handle_key(self, context, target, what: str):
         """Handle one key, with an undo step where labels change."""
         try:
-            told = judged(target, what)
+            message = review_proposal(target, what)
         except BeyondMocapError as error:
             self.report({"WARNING"}, str(error))
             return
-        self.tell(context, told)
+        self.show_status(context, message)
         if what in ("ACCEPT", "REFUSE"):
-            bpy.ops.ed.undo_push(message=told[:60])
+            bpy.ops.ed.undo_push(message=message[:60])
 
-    def tell(self, context, told: str):
+    def show_status(self, context, message: str):
         """Show the last result, the current proposal and the keys in the status bar."""
-        one = proposals.chosen(context.object)
+        one = proposals.find_active(context.object)
         now = f"{one.name}, confidence {one.confidence:.0%}" if one is not None else ""
-        context.workspace.status_text_set("   |   ".join(part for part in (told, now, STATUS) if part))
+        context.workspace.status_text_set("   |   ".join(part for part in (message, now, STATUS_TEXT) if part))
         for area in context.window.screen.areas:
             area.tag_redraw()
 
-    def left(self, context):
+    def finish(self, context):
         """Finish the operator."""
         self.cancel(context)
         return {"FINISHED"}
@@ -214,42 +214,42 @@ and Down step, Esc finishes"""
         clear_status()
 
 
-def judged(target: bpy.types.Object, what: str, index: int = -1) -> str:
+def review_proposal(target: bpy.types.Object, what: str, index: int = -1) -> str:
     """Carry out one of REVIEW_ACTIONS; returns a line for the user. InputError for a number that is not in the list."""
     group = target.beyond_mocap_proposals
     if what in ("NEXT", "PREVIOUS"):
         group.active = min(group.active, len(group.listed) - 1)
-        proposals.go_on(target, 1 if what == "NEXT" else -1)
-        return proposals.chosen(target).name
-    how = proposals.accept if what.startswith("ACCEPT") else proposals.refuse
+        proposals.go_to_next(target, 1 if what == "NEXT" else -1)
+        return proposals.find_active(target).name
+    action = proposals.accept_proposal if what.startswith("ACCEPT") else proposals.refuse_proposal
     if what.endswith("_ALL"):
         judged_now = [number for number, one in enumerate(group.listed) if one.state == "OPEN"]
         for number in judged_now:
-            how(target, number)
+            action(target, number)
         return f"{len(judged_now)} {'accepted' if what == 'ACCEPT_ALL' else 'rejected'}"
-    told = how(target, group.active if index < 0 else index)
-    proposals.go_on(target, 1, only_open=True)
-    count = proposals.left(target)
-    return f"{told}; {count} left"
+    message = action(target, group.active if index < 0 else index)
+    proposals.go_to_next(target, 1, open_only=True)
+    count = proposals.count_open(target)
+    return f"{message}; {count} left"
 
 
-def _show_open(target: bpy.types.Object) -> None:
+def _show_open_proposal(target: bpy.types.Object) -> None:
     """Show the chosen proposal if it is open, else the next open one; the playhead goes there."""
     group = target.beyond_mocap_proposals
-    one = proposals.chosen(target)
+    one = proposals.find_active(target)
     if one is None or one.state != "OPEN":
-        proposals.go_on(target, 1, only_open=True)
+        proposals.go_to_next(target, 1, open_only=True)
     group.active = group.active
 
 
-def _over_editor(context, event) -> bool:
+def _is_over_editor(context, event) -> bool:
     """Whether the pointer is over an editor for annotation."""
     inside = (area for area in context.window.screen.areas
               if 0 <= event.mouse_x - area.x < area.width and 0 <= event.mouse_y - area.y < area.height)
     return any(area.type in SPACES for area in inside)
 
 
-class BEYOND_MOCAP_OT_save_words(OpenClipVerb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_save_words(OpenClipOperator, bpy.types.Operator):
     """Write the labels of the active clip's strips to a text file beside the clip, or to the library's annotation
 table. Existing labels are replaced only after you confirm"""
 
@@ -262,16 +262,16 @@ table. Existing labels are replaced only after you confirm"""
     def invoke(self, context, event):
         """Ask before existing labels are replaced."""
         from ..beyond_mocap.base.errors import InputError
-        from ..beyond_mocap.library.keep_words import has_words, place
+        from ..beyond_mocap.library.keep_words import has_labels, find_label_file
 
         rig = context.object
-        clip, folder = recordings.clip_file(rig)
+        clip, folder = recordings.find_source_file(rig)
         try:
-            there = has_words(clip, folder, rig.get(recordings.RATE, 30.0))
-            form, target = place(clip, folder)
+            has_labels_already = has_labels(clip, folder, rig.get(recordings.RATE, 30.0))
+            form, target = find_label_file(clip, folder)
         except (InputError, OSError):
             return self.execute(context)
-        if not there:
+        if not has_labels_already:
             return self.execute(context)
         self.overwrite = True
         what = (
@@ -281,19 +281,19 @@ table. Existing labels are replaced only after you confirm"""
 
     def do(self, context):
         """Read the strips, write the file, and update the list."""
-        from ..beyond_mocap.library.keep_words import keep
+        from ..beyond_mocap.library.keep_words import write_labels
 
         rig = context.object
-        rows = recordings.read_words(rig)
-        clip, folder = recordings.clip_file(rig)
-        target = keep(clip, folder, rows, fps=rig[recordings.RATE], overwrite=self.overwrite,
-                      sources=proposals.sources(rig))
-        clips.say(context.window_manager, recordings.shown_clip(rig), rows)
+        rows = recordings.read_labels(rig)
+        clip, folder = recordings.find_source_file(rig)
+        target = write_labels(clip, folder, rows, fps=rig[recordings.RATE], overwrite=self.overwrite,
+                      sources=proposals.collect_sources(rig))
+        clips.update_labels(context.window_manager, recordings.find_shown_clip(rig), rows)
         self.report({"INFO"}, f"{len(rows)} rows of labels written to {target}; press Build Library to use them")
 
 
 @dataclass(frozen=True)
-class Order:
+class LearnOrder:
     """The input of learning.
 
     Attributes:
@@ -309,7 +309,7 @@ class Order:
     out: str
 
 
-class BEYOND_MOCAP_OT_learn_words(FolderVerb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_learn_words(FolderOperator, bpy.types.Operator):
     """Learn from the library's labelled clips, about ten are enough, so that Propose Labels finds the same acts in
 others; the result is a file that works with any library"""
 
@@ -324,31 +324,31 @@ others; the result is a file that works with any library"""
         settings = context.scene.beyond_mocap
         if not settings.library_folder:
             raise InputError("library", "no folder chosen", "a folder of BVH clips", "choose one in step 1")
-        folder = absolute(settings.library_folder)
-        return Order(folder, settings.library_unit or None, preferences.cache_folder(folder), absolute(self.out))
+        folder = to_absolute_path(settings.library_folder)
+        return LearnOrder(folder, settings.library_unit or None, preferences.find_cache_folder(folder), to_absolute_path(self.out))
 
     @staticmethod
     def work(order, progress, cancelled, _hurry):
         """Read the clips, train and write the classifier; returns the file and lines about what was learned."""
         from ..beyond_mocap.library import cache
         from ..beyond_mocap.library.classify import classifier
-        from ..beyond_mocap.library.classify.examples import examples_of
-        from ..beyond_mocap.library.classify.train import trained
+        from ..beyond_mocap.library.classify.examples import read_examples
+        from ..beyond_mocap.library.classify.train import train_classifier
 
-        out = Path(order.out) if order.out else cache.place(Path(order.folder), order.cache)[0] / classifier.FILE_NAME
-        looked = lambda done, text: progress(0.7 * done, text)  # noqa: E731
+        out = Path(order.out) if order.out else cache.find_cache_folder(Path(order.folder), order.cache)[0] / classifier.FILE_NAME
+        on_progress = lambda done, text: progress(0.7 * done, text)  # noqa: E731
         notes = []
-        examples = examples_of(order.folder, order.unit, looked, cache_dir=order.cache, cancelled=cancelled,
-                               note=notes.append)
-        known = trained(examples, lambda done, text: progress(0.7 + 0.3 * done, text), cancelled)
+        examples = read_examples(order.folder, order.unit, on_progress, cache_dir=order.cache, cancelled=cancelled,
+                               on_note=notes.append)
+        known = train_classifier(examples, lambda done, text: progress(0.7 + 0.3 * done, text), cancelled)
         if not order.out:
             out.parent.mkdir(parents=True, exist_ok=True)
         classifier.write_classifier(out, known)
-        return str(out), (*known.told(), *notes)
+        return str(out), (*known.describe(), *notes)
 
     def apply(self, scene, result):
         """Set the file that Propose Labels uses."""
-        scene.beyond_mocap.words_model, told = result
-        for line in told[1:]:
+        scene.beyond_mocap.words_model, lines = result
+        for line in lines[1:]:
             self.report({"INFO"}, line)
-        self.report({"INFO"}, f"{told[0]}: {', '.join(told[1:])}")
+        self.report({"INFO"}, f"{lines[0]}: {', '.join(lines[1:])}")

@@ -10,36 +10,36 @@ from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatPrope
 from ..beyond_mocap.base.errors import InputError
 from ..scene.core import channels, session, window
 from ..scene.core.measure import frames_per_second
-from ..scene.core.settings import as_setting
+from ..scene.core.settings import to_setting_path
 from ..scene.match import cameras, child, load, order, ours, show
-from ..scene.match.settings import active_of, typed
+from ..scene.match.settings import find_active_player, format_float
 from ..scene.rigs import export, rig
-from .verb import NEEDS_LIBRARY, BackgroundVerb, DroppedIntoView, ExportVerb, Verb
+from .verb import NEEDS_LIBRARY, BackgroundOperator, ViewDropHandler, ExportOperator, BaseOperator
 
-MAKING = 0.85
+SYNTHESIS_SHARE = 0.85
 """Share of the progress bar for the synthesis, before a match is shown."""
 
 
-class MatchVerb(BackgroundVerb):
+class MatchVerb(BackgroundOperator):
     """An operator that ends with a stretch of a match in the scene."""
 
     bl_options = {"REGISTER", "UNDO"}
 
-    def known_library(self, wanted: load.Wanted):
+    def find_library(self, wanted: load.DisplayRequest):
         """Find the library if this session has it."""
-        return session.library(wanted.library, wanted.unit)
+        return session.find_library(wanted.library, wanted.unit)
 
     def apply(self, scene, result):
         """Show pitch, characters, ball and cameras, and report messages."""
         wanted, (library, scenery, lines), notes = result
         match = scene.beyond_mocap_match
-        match.made = "" if match.folder else as_setting(wanted.folder)
+        match.made = "" if match.folder else to_setting_path(wanted.folder)
         if scene != bpy.context.scene:
             raise InputError("match", f"scene {scene.name} is not the window's scene", "the scene it was started in",
                              "switch to it and press Show Match")
-        session.keep_library(library, wanted.unit)
+        session.store_library(library, wanted.unit)
         first = match.first_frame
-        took = show.show(bpy.context, scenery, first)
+        took = show.show_match(bpy.context, scenery, first)
         match.shown, match.shown_start, match.shown_first = wanted.folder, scenery.start, first
         match.shown_rate = frames_per_second(scene)
         known = match.report.splitlines()
@@ -47,10 +47,10 @@ class MatchVerb(BackgroundVerb):
         for line in lines:
             self.report({"WARNING"}, line)
         seconds = scenery.end - scenery.start
-        self.report({"INFO"}, f"{len(scenery.people)} players, {seconds:.1f} s, shown in {sum(took.values()):.1f} s")
+        self.report({"INFO"}, f"{len(scenery.characters)} players, {seconds:.1f} s, shown in {sum(took.values()):.1f} s")
 
 
-class BEYOND_MOCAP_OT_read_match(BackgroundVerb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_read_match(BackgroundOperator, bpy.types.Operator):
     """Read a provider's tracking of a match, fill the list of players, the teams' colours and the data report, and
 select the first minute"""
 
@@ -69,7 +69,7 @@ select the first minute"""
         dropped = [Path(self.directory, name) for name in sorted(file.name for file in self.files) if name]
         sizes = {path: path.stat().st_size if path.is_file() else 0 for path in dropped}
         chosen = str(max(dropped, key=sizes.get)) if self.directory and dropped else self.filepath
-        return order.reading_order(context.scene.beyond_mocap_match, bpy.path.abspath(chosen) if chosen else "")
+        return order.build_read_request(context.scene.beyond_mocap_match, bpy.path.abspath(chosen) if chosen else "")
 
     @staticmethod
     def work(asked, progress, cancelled, hurry):
@@ -78,13 +78,13 @@ select the first minute"""
     def apply(self, scene, result):
         asked, read = result
         match = scene.beyond_mocap_match
-        order.fill_match(match, asked, read)
+        order.update_match(match, asked, read)
         for line in match.report.splitlines()[:6]:
             self.report({"INFO"}, line)
         self.report({"INFO"}, f"{len(read.players)} players, {match.length_s / 60.0:.1f} minutes, {read.provider}")
 
 
-class BEYOND_MOCAP_FH_match(DroppedIntoView, bpy.types.FileHandler):
+class BEYOND_MOCAP_FH_match(ViewDropHandler, bpy.types.FileHandler):
     """Read a provider's tracking file dropped into the 3D view"""
 
     bl_idname = "BEYOND_MOCAP_FH_match"
@@ -93,25 +93,25 @@ class BEYOND_MOCAP_FH_match(DroppedIntoView, bpy.types.FileHandler):
     bl_file_extensions = ".csv;.json;.jsonl;.xml;.dat"  # dropped texts are labels; tracking as text is chosen by name
 
 
-WHOM = (("ALL", "All", "Select all"), ("NONE", "None", "Select none"), ("home", "Home", "Select the home team only"),
+SELECTION_ITEMS = (("ALL", "All", "Select all"), ("NONE", "None", "Select none"), ("home", "Home", "Select the home team only"),
         ("away", "Away", "Select the away team only"), ("ONE", "Active", "Select the active player only"))
 
 
-class BEYOND_MOCAP_OT_tick_match(Verb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_tick_match(BaseOperator, bpy.types.Operator):
     """Select the players of the match"""
 
     bl_idname = "beyond_mocap.tick_match"
     bl_label = "Select Players"
-    whom: EnumProperty(name="Players", items=WHOM, default="ALL", description="Players to select")
+    whom: EnumProperty(name="Players", items=SELECTION_ITEMS, default="ALL", description="Players to select")
     needs = "Press Read Match first", lambda context: len(context.scene.beyond_mocap_match.players) > 0
 
     @classmethod
     def description(cls, _context, properties):
-        return next(item[2] for item in WHOM if item[0] == properties.whom)
+        return next(item[2] for item in SELECTION_ITEMS if item[0] == properties.whom)
 
     def do(self, context):
         match = context.scene.beyond_mocap_match
-        chosen = active_of(match)
+        chosen = find_active_player(match)
         for player in match.players:
             alone = player == chosen if self.whom == "ONE" else player.team == self.whom
             player.use = self.whom == "ALL" or (self.whom != "NONE" and alone)
@@ -130,15 +130,15 @@ and pressing the button again resumes with the finished work"""
 
     def order(self, context):
         """Build the command line, and the request to display its result."""
-        wanted = order.wanted(context.scene, order.folder_to_make(context.scene))
-        return order.command(context.scene), wanted, self.known_library(wanted)
+        wanted = order.build_display_request(context.scene, order.choose_output_folder(context.scene))
+        return order.build_command(context.scene), wanted, self.find_library(wanted)
 
     @staticmethod
     def work(asked, progress, cancelled, hurry):
         """Run the command in its own process, then load the result."""
         arguments, wanted, library = asked
-        notes = child.run(arguments, lambda done, text: progress(MAKING * done, text), cancelled)
-        shown = load.scenery(wanted, library, lambda done, text: progress(MAKING + (1.0 - MAKING) * done, text),
+        notes = child.run_command(arguments, lambda done, text: progress(SYNTHESIS_SHARE * done, text), cancelled)
+        shown = load.load_section(wanted, library, lambda done, text: progress(SYNTHESIS_SHARE + (1.0 - SYNTHESIS_SHARE) * done, text),
                              cancelled)
         return wanted, shown, notes
 
@@ -154,19 +154,19 @@ that is displayed"""
              lambda context: bool((match := context.scene.beyond_mocap_match).folder or match.made))
 
     def order(self, context):
-        wanted = order.wanted(context.scene, order.folder_to_show(context.scene))
-        return wanted, self.known_library(wanted)
+        wanted = order.build_display_request(context.scene, order.choose_display_folder(context.scene))
+        return wanted, self.find_library(wanted)
 
     @staticmethod
     def work(asked, progress, cancelled, hurry):
         wanted, library = asked
-        return wanted, load.scenery(wanted, library, progress, cancelled), ()
+        return wanted, load.load_section(wanted, library, progress, cancelled), ()
 
 
-class ShownMatchVerb(Verb):
+class ShownMatchVerb(BaseOperator):
     """An operator on the displayed match."""
 
-    needs = "Press Make Match or Show Match first", lambda context: bool(ours.bodies(context.scene))
+    needs = "Press Make Match or Show Match first", lambda context: bool(ours.find_armatures(context.scene))
 
 
 class BEYOND_MOCAP_OT_match_second(ShownMatchVerb, bpy.types.Operator):
@@ -186,34 +186,34 @@ page"""
         scene, shown = context.scene, context.scene.beyond_mocap_match
         rate = shown.shown_rate or frames_per_second(scene)  # keys keep their frames if the scene's rate changes
         frame = round(shown.shown_first + (self.seconds - shown.shown_start) * rate)
-        last = _last(scene)
+        last = _find_last_frame(scene)
         if not shown.shown_first <= frame <= last:
             end = shown.shown_start + (last - shown.shown_first) / rate
-            expected = f"{typed(shown.shown_start)} to {typed(end)} s"
-            raise InputError("match", f"{typed(self.seconds)} s is not shown", expected,
+            expected = f"{format_float(shown.shown_start)} to {format_float(end)} s"
+            raise InputError("match", f"{format_float(self.seconds)} s is not shown", expected,
                              "choose From and To around it and press Show Match")
-        body = _body_of(scene, self.player) if self.player else None
+        body = _find_body(scene, self.player) if self.player else None
         scene.frame_set(frame)
         if body is not None and body.name in context.view_layer.objects and context.mode == "OBJECT":
             window.select_only(context, body)
 
 
-def _body_of(scene: bpy.types.Scene, player: str) -> bpy.types.Object:
+def _find_body(scene: bpy.types.Scene, player: str) -> bpy.types.Object:
     """Find a player's armature; InputError if the player is not displayed."""
-    known = {thing.get(ours.PLAYER): thing for thing in ours.bodies(scene)}
+    known = {thing.get(ours.PLAYER_PROPERTY): thing for thing in ours.find_armatures(scene)}
     if player not in known:
         raise InputError("match", f"{player} is not shown", f"one of {', '.join(map(str, known))}",
                          "select the player and press Show Match")
     return known[player]
 
 
-def _last(scene: bpy.types.Scene) -> int:
+def _find_last_frame(scene: bpy.types.Scene) -> int:
     """Find the last frame with a motion; the scene's last frame if there is none."""
-    actions = [channels.playing(body)[0] for body in ours.bodies(scene)]
+    actions = [channels.find_playing_action(body)[0] for body in ours.find_armatures(scene)]
     return round(max((action.frame_range[1] for action in actions if action is not None), default=scene.frame_end))
 
 
-WHICH = (("STAND", "Broadcast", "Look from the stand, following the ball"),
+CAMERA_ITEMS = (("STAND", "Broadcast", "Look from the stand, following the ball"),
          ("EYES", "Eyes", "Look through the eyes of the selected player, or of the active one in the list"))
 
 
@@ -222,50 +222,50 @@ class BEYOND_MOCAP_OT_match_camera(ShownMatchVerb, bpy.types.Operator):
 
     bl_idname = "beyond_mocap.match_camera"
     bl_label = "Match Camera"
-    which: EnumProperty(name="Which", items=WHICH, default="STAND", description="Camera to look through")
+    which: EnumProperty(name="Which", items=CAMERA_ITEMS, default="STAND", description="Camera to look through")
     player: StringProperty(name="Player", options={"SKIP_SAVE"}, description="ID of the player; empty: the active one")
 
     @classmethod
     def description(cls, _context, properties):
-        return next(item[2] for item in WHICH if item[0] == properties.which)
+        return next(item[2] for item in CAMERA_ITEMS if item[0] == properties.which)
 
     def do(self, context):
         """Make it the scene's camera, and look through it in the 3D view."""
         scene = context.scene
         if self.which == "EYES":
-            camera = cameras.eyes(scene, self.who(context), show.ball_shown(scene))
+            camera = cameras.create_eyes_camera(scene, self.find_body(context), show.find_ball(scene))
         else:
-            camera = cameras.stand_of(scene)
+            camera = cameras.find_broadcast_camera(scene)
         if camera is None:
             raise InputError("match", "no camera in the stand", "the match's camera", "press Show Match again")
         scene.camera = camera
-        area = None if bpy.app.background else window.largest_editor(context.window.screen, "VIEW_3D")
+        area = None if bpy.app.background else window.find_largest_editor(context.window.screen, "VIEW_3D")
         if area is not None:
             _look_through(context, area)
 
-    def who(self, context) -> bpy.types.Object:
+    def find_body(self, context) -> bpy.types.Object:
         """Find the armature that is named, selected, or active in the list."""
-        shown, active = ours.bodies(context.scene), context.active_object
+        shown, active = ours.find_armatures(context.scene), context.active_object
         if not self.player and active is not None:
             active = active.parent if active.type == "MESH" else active
             if active in shown and active.select_get():
                 return active
-        chosen = active_of(context.scene.beyond_mocap_match)
-        return _body_of(context.scene, self.player or (chosen.feed_id if chosen else shown[0].get(ours.PLAYER)))
+        chosen = find_active_player(context.scene.beyond_mocap_match)
+        return _find_body(context.scene, self.player or (chosen.feed_id if chosen else shown[0].get(ours.PLAYER_PROPERTY)))
 
 
 def _look_through(context, area: bpy.types.Area) -> None:
     """Show the scene's camera in the 3D view, with its whole frame."""
     area.spaces.active.region_3d.view_perspective = "CAMERA"
     region = next(region for region in area.regions if region.type == "WINDOW")
-    with context.temp_override(area=area, region=region):
+    with context.temp_override(find_area=area, region=region):
         bpy.ops.view3d.view_center_camera()
 
 
 FORMATS = [one for one in rig.FORMATS if one[0] != "BVH"]
 
 
-class BEYOND_MOCAP_OT_match_export(ExportVerb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_match_export(ExportOperator, bpy.types.Operator):
     """Write the displayed match to one file, with a skeleton and meshes for every player, the ball and the pitch; the
 scene is not changed"""
 
@@ -276,17 +276,17 @@ scene is not changed"""
     engine: EnumProperty(name="For", items=rig.ENGINES, default="BLENDER", description="Target program")
     root: EnumProperty(name="Root Motion", items=rig.ROOTS, default="KEEP", description="Motion of the root bone")
     pitch: BoolProperty(name="Pitch", default=True, description="Include grass, lines and goals")
-    needs = "Show a match first", lambda context: bool(ours.bodies(context.scene))
+    needs = "Show a match first", lambda context: bool(ours.find_armatures(context.scene))
 
     def do(self, context):
-        path = self.out()
+        path = self.output_path()
         scene = context.scene
-        everybody = ours.bodies(scene)
+        everybody = ours.find_armatures(scene)
         bodies = [body for body in everybody if body.name in context.view_layer.objects]
         if len(bodies) < len(everybody):
             self.report({"WARNING"}, f"{len(everybody) - len(bodies)} players left out: their collection is excluded")
-        wanted = export.Wanted(path, self.format, self.engine, None, self.root)
-        things = ours.meshes(scene, "ball") + (ours.meshes(scene, "pitch") if self.pitch else [])
-        for line in export.write(context, bodies, wanted, things):
+        wanted = export.ExportOptions(path, self.format, self.engine, None, self.root)
+        things = ours.find_meshes(scene, "ball") + (ours.find_meshes(scene, "pitch") if self.pitch else [])
+        for line in export.export_motion(context, bodies, wanted, things):
             self.report({"INFO"}, line)
         self.report({"INFO"}, f"Written: {path}")

@@ -15,7 +15,7 @@ from ..beyond_mocap.passes.scene_json import SAMPLES as SCENES
 from ..scene.core.measure import units_per_metre
 from ..scene.passes import hits_shown, make, order, shown
 from ..scene.passes.settings import SAMPLES
-from .verb import BackgroundVerb, ImportVerb, Verb
+from .verb import BackgroundOperator, ImportOperator, BaseOperator
 
 ROWS = (("players", "Players", "Players of the scene"), ("passes", "Passes", "Passes in their order"))
 WHAT = (("ADD", "Add", "Add a row at the end"), ("REMOVE", "Remove", "Remove the active row"),
@@ -24,7 +24,7 @@ ACTIVE = {"players": "active_player", "passes": "active_pass"}
 RING = 3.0  # metres from the 3D cursor at which players are added
 
 
-class BEYOND_MOCAP_OT_passes_list(Verb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_passes_list(BaseOperator, bpy.types.Operator):
     """Add, remove or move a player or a pass"""
 
     bl_idname = "beyond_mocap.passes_list"
@@ -49,20 +49,20 @@ class BEYOND_MOCAP_OT_passes_list(Verb, bpy.types.Operator):
         """Change the list."""
         settings = context.scene.beyond_mocap_passes
         if self.what == "ADD":
-            return add_player(context) if self.rows == "players" else add_pass(settings)
+            return add_player_at_cursor(context) if self.rows == "players" else add_pass(settings)
         rows, number = getattr(settings, self.rows), getattr(settings, ACTIVE[self.rows])
         if not 0 <= number < len(rows):
             raise InputError(self.rows, "no active row", "a row of the list", "add one first")
         if self.what == "REMOVE":
-            self.remove(settings, rows, number)
+            self.remove_row(settings, rows, number)
         else:
-            self.move(settings, rows, number, number + (1 if self.what == "DOWN" else -1))
+            self.move_row(settings, rows, number, number + (1 if self.what == "DOWN" else -1))
 
-    def remove(self, settings, rows, number):
+    def remove_row(self, settings, rows, number):
         """Remove a row; for a player also their passes, their Empty and what the scene has created for them."""
         if self.rows == "players":
-            shown.check(rows[number])
-            shown.let_go(rows[number])
+            shown.check_characters(rows[number])
+            shown.release_character(rows[number])
             name = rows[number].name
             for other in reversed(range(len(settings.passes))):
                 if name in (settings.passes[other].who, settings.passes[other].to):
@@ -74,7 +74,7 @@ class BEYOND_MOCAP_OT_passes_list(Verb, bpy.types.Operator):
         rows.remove(number)
         setattr(settings, ACTIVE[self.rows], max(0, min(number, len(rows) - 1)))
 
-    def move(self, settings, rows, number, goal):
+    def move_row(self, settings, rows, number, goal):
         """Exchange a row with its neighbour."""
         if not 0 <= goal < len(rows):
             raise InputError(self.rows, "it is at the end of the list", "a row that can move in that direction")
@@ -82,36 +82,36 @@ class BEYOND_MOCAP_OT_passes_list(Verb, bpy.types.Operator):
         setattr(settings, ACTIVE[self.rows], goal)
 
 
-def add_player(context) -> None:
+def add_player_at_cursor(context) -> None:
     """Add a player at the selected armature or near the 3D cursor."""
     settings, scene = context.scene.beyond_mocap_passes, context.scene
     count, units = len(settings.players), units_per_metre(scene)
     body = context.view_layer.objects.active
-    free = body is not None and body.type == "ARMATURE" and body.library is None and body.select_get()
-    if free and not any(row.body == body for row in settings.players):
-        place, facing = standing(scene, body)
-        taken = any(row.name == body.name for row in settings.players)
-        row = order.add_player(context, order.free_name(settings) if taken else body.name, place, facing)
+    is_free = body is not None and body.type == "ARMATURE" and body.library is None and body.select_get()
+    if is_free and not any(row.body == body for row in settings.players):
+        place, facing = measure_stance(scene, body)
+        is_taken = any(row.name == body.name for row in settings.players)
+        row = order.add_player(context, order.find_free_name(settings) if is_taken else body.name, place, facing)
         row.body = body
         return
     # the first three players on a triangle, more on a ring twice as wide
     angle = math.radians(90.0 + 120.0 * count) if count < 3 else math.radians(30.0 + 60.0 * (count - 3))
     ring = RING * (1.0 if count < 3 else 2.0)
     x, y = scene.cursor.location.x / units, scene.cursor.location.y / units
-    order.add_player(context, order.free_name(settings), (x + ring * math.cos(angle), y + ring * math.sin(angle)),
+    order.add_player(context, order.find_free_name(settings), (x + ring * math.cos(angle), y + ring * math.sin(angle)),
                      angle + math.pi)
 
 
-def standing(scene, body) -> tuple[tuple[float, float], float]:
+def measure_stance(scene, body) -> tuple[tuple[float, float], float]:
     """Measure where an armature stands on the current frame, and its heading in rad."""
-    from ..beyond_mocap.motion.humanoid import heading
+    from ..beyond_mocap.motion.humanoid import compute_heading
 
     try:
-        motion, first = hits_shown.motion_of(scene, body)
+        motion, first = hits_shown.read_motion(scene, body)
     except InputError:
-        return order.stands(scene, body)
+        return order.measure_place(scene, body)
     row = min(max(scene.frame_current - first, 0), len(motion) - 1)
-    return tuple(float(value) for value in motion.root_positions[row, :2]), float(heading(motion)[row])
+    return tuple(float(value) for value in motion.root_positions[row, :2]), float(compute_heading(motion)[row])
 
 
 def add_pass(settings) -> None:
@@ -128,7 +128,7 @@ def add_pass(settings) -> None:
     settings.active_pass = len(settings.passes) - 1
 
 
-class BEYOND_MOCAP_OT_passes_make(BackgroundVerb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_passes_make(BackgroundOperator, bpy.types.Operator):
     """Generate the passing scene: characters and ball are created where there are none, and each flight of the ball
 leads from one player's strike to the next"""
 
@@ -144,10 +144,10 @@ leads from one player's strike to the next"""
     def order(self, context):
         """Build the order for the scene."""
         if not self.live:
-            order.forget_examples()
-        return make.order_of(context.scene)
+            order.clear_examples()
+        return make.build_order(context.scene)
 
-    work = staticmethod(make.work)
+    work = staticmethod(make.run_order)
 
     def apply(self, scene, result):
         """Apply the result to characters and ball."""
@@ -155,13 +155,13 @@ leads from one player's strike to the next"""
         if missing := [one.name for one in result.passes.players if one.name not in rows]:
             raise InputError("players", f"{missing[0]} is no longer in the list", "the same players",
                              "press Make Scene again")
-        make.show(scene, result)
+        make.apply_result(scene, result)
         self.report({"INFO"}, ", ".join(scene.beyond_mocap_passes.figures.splitlines()[:3]))
 
     def modal(self, context, event):
         """Let an update that an edit started end silently when the next edit starts another one."""
-        if self.live and self.job.stale:
-            self.ended(context)
+        if self.live and self.job.is_stale:
+            self.stop_polling(context)
             return {"CANCELLED"}
         return super().modal(context, event)
 
@@ -173,7 +173,7 @@ leads from one player's strike to the next"""
         return {"CANCELLED"}
 
 
-class BEYOND_MOCAP_OT_passes_clear(Verb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_passes_clear(BaseOperator, bpy.types.Operator):
     """Remove the characters, ball and net that Make Scene has created; your own characters play their own motion
 again, and the lists stay"""
 
@@ -182,10 +182,10 @@ again, and the lists stay"""
     needs = "There is no scene to clear", lambda context: bool(context.scene.beyond_mocap_passes.made_of)
 
     def do(self, context):
-        make.clear(context.scene)
+        make.clear_scene(context.scene)
 
 
-class BEYOND_MOCAP_OT_passes_sample(Verb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_passes_sample(BaseOperator, bpy.types.Operator):
     """Replace the lists with a sample scene; players with the same name keep their characters"""
 
     bl_idname = "beyond_mocap.passes_sample"
@@ -194,11 +194,11 @@ class BEYOND_MOCAP_OT_passes_sample(Verb, bpy.types.Operator):
 
     def do(self, context):
         """Parse the sample and set the lists."""
-        order.fill(context, scene_json.parse_scene(SCENES[self.sample], self.sample))
+        order.fill_lists(context, scene_json.parse_scene(SCENES[self.sample], self.sample))
         self.report({"INFO"}, "Move the players' Empties, edit the passes, then press Make Scene")
 
 
-class BEYOND_MOCAP_OT_passes_from_json(ImportVerb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_passes_from_json(ImportOperator, bpy.types.Operator):
     """Replace the lists with a scene from a SCENE.json file"""
 
     bl_idname = "beyond_mocap.passes_from_json"
@@ -208,11 +208,11 @@ class BEYOND_MOCAP_OT_passes_from_json(ImportVerb, bpy.types.Operator):
 
     def do(self, context):
         """Read the file and set the lists."""
-        path = self.chosen_one("one SCENE.json")
-        order.fill(context, scene_json.read_scene(path))
+        path = self.find_chosen_file("one SCENE.json")
+        order.fill_lists(context, scene_json.read_scene(path))
 
 
-class BEYOND_MOCAP_OT_passes_to_json(Verb, bpy.types.Operator, ExportHelper):
+class BEYOND_MOCAP_OT_passes_to_json(BaseOperator, bpy.types.Operator, ExportHelper):
     """Write the scene to a SCENE.json file, for the command line or another blend file"""
 
     bl_idname = "beyond_mocap.passes_to_json"
@@ -223,7 +223,7 @@ class BEYOND_MOCAP_OT_passes_to_json(Verb, bpy.types.Operator, ExportHelper):
 
     def do(self, context):
         """Build the scene and write it."""
-        text = scene_json.scene_text(order.scene_of(context.scene))
+        text = scene_json.format_scene(order.build_scene(context.scene))
         atomic_write(bpy.path.abspath(self.filepath), text)
         missing = order.list_lost_examples(context.scene.beyond_mocap_passes)
         self.report({"WARNING" if missing else "INFO"},

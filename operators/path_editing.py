@@ -11,15 +11,15 @@ from ..beyond_mocap.base.errors import BeyondMocapError, InputError
 from ..scene.core import channels
 from ..scene.core.measure import units_per_metre
 from ..scene.path_editing import curve, keep_apart, live, riders
-from ..scene.path_editing.settings import choose, meant
-from ..scene.path_editing.settings import riders as riders_in
-from .verb import NEEDS_NO_EDITING, Verb
+from ..scene.path_editing.settings import select_object, list_target_bodies
+from ..scene.path_editing.settings import list_edited_bodies as riders_in
+from .verb import NEEDS_NO_EDITING, BaseOperator
 
 
-class RiderVerb(Verb):
+class EditedBodyVerb(BaseOperator):
     """A verb about edited bodies; disabled, with the reason, without any."""
 
-    needs = "Select an armature that follows a path, or its curve", lambda context: bool(meant(context))
+    needs = "Select an armature that follows a path, or its curve", lambda context: bool(list_target_bodies(context))
 
 
 COUNT = {"name": "Points", "default": 0, "min": 0, "max": 200,
@@ -28,7 +28,7 @@ DEGREE = {"name": "Degree", "default": 3, "min": 2, "max": 5,
           "description": "Degree of a NURBS curve: how smooth it is, and how far each control point reaches"}
 
 
-class BEYOND_MOCAP_OT_edit_path(Verb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_edit_path(BaseOperator, bpy.types.Operator):
     """Let the motion of the selected armature follow a curve that can be edited (Tab): a new one along its own path, or
 a selected curve"""
 
@@ -39,49 +39,49 @@ a selected curve"""
     degree: IntProperty(**DEGREE)
     straight: BoolProperty(name="Straight", description="A straight line as long as the original path")
     needs = (*NEEDS_NO_EDITING, "Select an armature with a motion, and optionally a curve as its new path",
-             lambda context: bool(bodies(context)))
+             lambda context: bool(list_armatures(context)))
 
     def do(self, context):
         """Create the curve, start the path edits and select the curve."""
         channels.check_local(context.scene)
-        chosen = bodies(context)
+        chosen = list_armatures(context)
         drawn = next((thing for thing in context.selected_objects if thing.type == "CURVE"), None)
-        riding = [(body, body.beyond_mocap_ride.curve) for body in chosen if body.beyond_mocap_ride.on]
-        if drawn is None and len(riding) == len(chosen):
+        already_edited = [(body, body.beyond_mocap_ride.curve) for body in chosen if body.beyond_mocap_ride.on]
+        if drawn is None and len(already_edited) == len(chosen):
             raise InputError(f"armature {chosen[0].name}", "already follows a path", "an armature without a path edit",
                              "edit its curve, or press Revert")
-        begun, used = [], drawn
+        started, used = [], drawn
         try:
-            for body, _ in riding if drawn is not None else ():
-                riders.change(context.scene, body, drawn)
+            for body, _ in already_edited if drawn is not None else ():
+                riders.change_curve(context.scene, body, drawn)
             for body in [body for body in chosen if not body.beyond_mocap_ride.on]:
                 before = body.beyond_mocap_ride.curve
-                made = riders.begin(context, body, drawn, count=self.count, kind=self.kind, degree=self.degree,
+                created = riders.start_path_edit(context, body, drawn, count=self.count, kind=self.kind, degree=self.degree,
                                     straight=self.straight)
-                begun.append((body, before, made if made not in (drawn, before) else None))
-                used = used or made
+                started.append((body, before, created if created not in (drawn, before) else None))
+                used = used or created
         except BeyondMocapError:
-            for body, before, made in begun:
-                riders.revert(body, before, made)
-            for body, before in riding:
+            for body, before, created in started:
+                riders.undo_start(body, before, created)
+            for body, before in already_edited:
                 with suppress(BeyondMocapError):  # a body that could not follow its curve before still cannot
-                    riders.change(context.scene, body, before)
+                    riders.change_curve(context.scene, body, before)
             raise
         if context.mode == "POSE":
             bpy.ops.object.mode_set(mode="OBJECT")
-        choose(context, used)
+        select_object(context, used)
         names = ", ".join(body.name for body in chosen)
         self.report({"INFO"}, f"{names}: edit the points of {used.name} (Tab); the motion follows")
 
 
-def bodies(context) -> list[bpy.types.Object]:
+def list_armatures(context) -> list[bpy.types.Object]:
     """List the armatures to edit: the active one first, then the other selected ones."""
     active = context.view_layer.objects.active
     return sorted((thing for thing in context.selected_objects if thing.type == "ARMATURE"),
                   key=lambda thing: thing != active)
 
 
-class BEYOND_MOCAP_OT_path_curve(Verb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_path_curve(BaseOperator, bpy.types.Operator):
     """Create another curve for the armature: along the original path, straight, or along the current path with other
 points"""
 
@@ -92,30 +92,30 @@ points"""
     kind: EnumProperty(name="Curve", items=curve.KINDS, default="BEZIER", description="Kind of the new curve")
     degree: IntProperty(**DEGREE)
     needs = (*NEEDS_NO_EDITING, "Select an armature that follows a path, or its curve",
-             lambda context: bool(meant(context)))
+             lambda context: bool(list_target_bodies(context)))
 
     def do(self, context):
         """Create the curve and make it active."""
-        body = meant(context)[0]
-        made = riders.new_curve(context, body, self.shape, count=self.count, kind=self.kind, degree=self.degree)
+        body = list_target_bodies(context)[0]
+        created = riders.create_new_curve(context, body, self.shape, count=self.count, kind=self.kind, degree=self.degree)
         if context.mode == "POSE":
             bpy.ops.object.mode_set(mode="OBJECT")
-        choose(context, made)
+        select_object(context, created)
 
 
-class BEYOND_MOCAP_OT_update_path(RiderVerb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_update_path(EditedBodyVerb, bpy.types.Operator):
     """Update the motion on its path: after edits of the original action, while Live is off, or in a script"""
 
     bl_idname = "beyond_mocap.update_path"
     bl_label = "Update Path"
 
     def do(self, context):
-        for body in meant(context):
-            riders.renew(context.scene, body, anew=True)
-            live.measure(context.scene, body)
+        for body in list_target_bodies(context):
+            riders.update_motion(context.scene, body, force=True)
+            live.measure_body(context.scene, body)
 
 
-class BEYOND_MOCAP_OT_path_apart(Verb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_path_apart(BaseOperator, bpy.types.Operator):
     """Find collisions of bodies on paths, with each other and with other bodies, and resolve them by small waits and
 detours of all or of two or more selected bodies"""
 
@@ -132,28 +132,28 @@ detours of all or of two or more selected bodies"""
 
     def do(self, context):
         from ..beyond_mocap.path_editing.apart import Limits
-        from ..beyond_mocap.path_editing.detour import Change
+        from ..beyond_mocap.path_editing.detour import PathChange
 
-        bodies = meant(context)
+        bodies = list_target_bodies(context)
         bodies = bodies if len(bodies) > 1 else riders_in(context.scene)
         if self.clear:
-            keep_apart.lay(context.scene, bodies, [Change()] * len(bodies))
+            keep_apart.apply_changes(context.scene, bodies, [PathChange()] * len(bodies))
             return
-        kept = keep_apart.worked_out(context, bodies, Limits(self.distance, delay=self.delay, detour=self.detour))
-        keep_apart.lay(context.scene, bodies, kept.changes)
-        self.tell(kept)
+        result = keep_apart.compute_changes(context, bodies, Limits(self.distance, delay=self.delay, detour=self.detour))
+        keep_apart.apply_changes(context.scene, bodies, result.changes)
+        self.report_result(result)
 
-    def tell(self, kept):
+    def report_result(self, result):
         """Report the collisions and the changes."""
-        if not kept.before and not kept.left:
+        if not result.before and not result.unresolved:
             self.report({"INFO"}, f"No bodies come within {self.distance:.2f} m of each other")
             return
-        found = "1 collision" if kept.before == 1 else f"{kept.before} collisions"
-        lines = "; ".join([found, *keep_apart.lines_of(kept)])
-        self.report({"WARNING"} if kept.left else {"INFO"}, lines)
+        found = "1 collision" if result.before == 1 else f"{result.before} collisions"
+        lines = "; ".join([found, *keep_apart.describe_result(result)])
+        self.report({"WARNING"} if result.unresolved else {"INFO"}, lines)
 
 
-class BEYOND_MOCAP_OT_bake_path(RiderVerb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_bake_path(EditedBodyVerb, bpy.types.Operator):
     """Turn the motion on its new path into an ordinary action with a key on every frame; the original action and the
 curve stay in the file"""
 
@@ -162,26 +162,26 @@ curve stay in the file"""
 
     def do(self, context):
         """Apply all target bodies; where a motion cannot be updated, its last state."""
-        chosen = meant(context)
+        chosen = list_target_bodies(context)
         for body in chosen:
-            riders.may_keep(body)
-        kept = [riders.keep(context.scene, body) for body in chosen]
-        riders.back_to(context, chosen)
-        self.report({"INFO"}, f"applied as {', '.join(action.name for action, _ in kept)}")
-        for line in (told for _, told in kept if told):
+            riders.check_can_apply(body)
+        applied = [riders.apply_path_edit(context.scene, body) for body in chosen]
+        riders.select_again(context, chosen)
+        self.report({"INFO"}, f"applied as {', '.join(action.name for action, _ in applied)}")
+        for line in (reason for _, reason in applied if reason):
             self.report({"WARNING"}, f"the motion cannot be updated, so its last state is applied: {line}")
 
 
-class BEYOND_MOCAP_OT_leave_path(RiderVerb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_leave_path(EditedBodyVerb, bpy.types.Operator):
     """Restore the armature's original motion exactly; the curve stays in the scene for the next Edit Path"""
 
     bl_idname = "beyond_mocap.leave_path"
     bl_label = "Revert"
 
     def do(self, context):
-        chosen = meant(context)
-        riders.leave(*chosen)
-        riders.back_to(context, chosen)
+        chosen = list_target_bodies(context)
+        riders.revert_path_edits(*chosen)
+        riders.select_again(context, chosen)
 
 
 DIRECTIONS = (("LEFT", "Left", "Along -X", "TRIA_LEFT", 0), ("RIGHT", "Right", "Along X", "TRIA_RIGHT", 1),
@@ -191,7 +191,7 @@ AXES = {"LEFT": (-1.0, 0.0, 0.0), "RIGHT": (1.0, 0.0, 0.0), "BACK": (0.0, -1.0, 
         "UP": (0.0, 0.0, 1.0), "DOWN": (0.0, 0.0, -1.0)}
 
 
-class BEYOND_MOCAP_OT_nudge_points(Verb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_nudge_points(BaseOperator, bpy.types.Operator):
     """Move the selected control points or handles by one step along a world axis"""
 
     bl_idname = "beyond_mocap.nudge_points"
@@ -204,9 +204,9 @@ class BEYOND_MOCAP_OT_nudge_points(Verb, bpy.types.Operator):
     @classmethod
     def description(cls, _context, properties):
         """Return the tooltip with the shortcut."""
-        way = next(item[2].lower() for item in DIRECTIONS if item[0] == properties.direction)
+        axis_text = next(item[2].lower() for item in DIRECTIONS if item[0] == properties.direction)
         key = {"FORTH": "Up Arrow", "BACK": "Down Arrow", "UP": "Page Up", "DOWN": "Page Down"}
-        return (f"Move the selected control points or handles by one step, {way} of the world\n"
+        return (f"Move the selected control points or handles by one step, {axis_text} of the world\n"
                 f"Alt + {key.get(properties.direction) or properties.direction.capitalize() + ' Arrow'}")
 
     def do(self, context):

@@ -9,18 +9,18 @@ from bpy.props import EnumProperty, StringProperty
 
 from ..beyond_mocap.base.errors import InputError
 from ..beyond_mocap.files.tracking.providers import PROVIDERS
-from ..scene.core.settings import active_player, as_setting
+from ..scene.core.settings import find_active_player, to_setting_path
 from ..scene.player import dots, pins, tracks
 from ..scene.result import bake, preview
 from ..scene.timeline import strip_events, strips, word_checks
 from ..scene.timeline.strips import show_player
-from .verb import DroppedIntoView, ImportVerb, Verb
+from .verb import ViewDropHandler, ImportOperator, BaseOperator
 
 SHIRTS = {"home": ((0.75, 0.05, 0.06), (0.80, 0.30, 0.04)), "away": ((0.04, 0.14, 0.70), (0.02, 0.45, 0.60))}
-SECTION = 60.0  # seconds of a whole match that are selected at first
+SECTION_SECONDS = 60.0  # seconds of a whole match that are selected at first
 
 
-class BEYOND_MOCAP_OT_import_tracking(ImportVerb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_import_tracking(ImportOperator, bpy.types.Operator):
     """Import players' positions: CSV files with time_s, x_m, y_m, or a provider's tracking file (TRACAB, Metrica,
 SkillCorner, Sportec, Second Spectrum, Stats Perform). A text file with the name of a CSV is read as its labels"""
 
@@ -37,9 +37,9 @@ SkillCorner, Sportec, Second Spectrum, Stats Perform). A text file with the name
                            + [(one.name, one.title, one.files.replace("`", "")) for one in PROVIDERS.values()],
                            description="Provider whose format the file has")
 
-    def paths(self) -> list[str]:
+    def list_paths(self) -> list[str]:
         """List the chosen files, without label files beside a chosen CSV, which are imported with it."""
-        chosen = self.chosen()
+        chosen = self.list_chosen_files()
         if not chosen:
             raise InputError("import", "no file given", "a tracking file", "choose one")
         words = {path.with_suffix(".txt") for path in chosen if path.suffix.lower() == ".csv"}
@@ -49,18 +49,18 @@ SkillCorner, Sportec, Second Spectrum, Stats Perform). A text file with the name
         """Read all files, then add the players."""
         settings = context.scene.beyond_mocap
         provider = "" if self.provider == "AUTO" else self.provider
-        read = [(path, *tracks.players_in(path, self.metadata, provider)) for path in self.paths()]
+        read = [(path, *tracks.list_players(path, self.metadata, provider)) for path in self.list_paths()]
         if not settings.players:
             self.set_clock(settings, [player for _, found, _ in read for player in found])
         for path, found, notes in read:
             for player in found:
-                self.add(settings, path, player, provider)
+                self.add_player(settings, path, player, provider)
             for note in notes:
                 self.report({"INFO"}, note)
         settings.active_player = len(settings.players) - sum(len(found) for _, found, _ in read)
         for player in list(settings.players)[settings.active_player :]:
-            self.place(context, player)
-        self.lengthen(context.scene, list(settings.players)[settings.active_player :])
+            self.create_dot(context, player)
+        self.extend_scene(context.scene, list(settings.players)[settings.active_player :])
         self.report({"INFO"}, f"Players in the list: {len(settings.players)}")
 
     @staticmethod
@@ -69,47 +69,47 @@ SkillCorner, Sportec, Second Spectrum, Stats Perform). A text file with the name
         settings.start_time = min(player.start for player in found)
         if any(player.feed_id for player in found):
             settings.section_start = settings.start_time
-            settings.section_end = min(settings.start_time + SECTION, max(player.end for player in found))
+            settings.section_end = min(settings.start_time + SECTION_SECONDS, max(player.end for player in found))
 
-    def place(self, context, player):
+    def create_dot(self, context, player):
         """Create the player's dot, with the player's labels as strips.
 
         A player without a track in the section or with labels that cannot be read stays in the list, with a warning.
         """
         try:
-            dots.ensure(context, player)
+            dots.ensure_dot(context, player)
             if player.annotation_file:
                 track = tracks.read_track(context.scene.beyond_mocap, player)
-                words = strips.written_words(player, context.scene.beyond_mocap.rate, track)
-                strips.write(context, player, words)
-                self.tell_words(context.scene, player, words)
+                words = strips.read_written_labels(player, context.scene.beyond_mocap.rate, track)
+                strips.write_player_timeline(context, player, words)
+                self.report_labels(context.scene, player, words)
             elif not player.feed_id:
                 self.report({"INFO"}, f"{player.name}: no label file beside the track; gaits follow its speed")
         except InputError as error:
             self.report({"WARNING"}, str(error))
 
-    def tell_words(self, scene, player, words):
+    def report_labels(self, scene, player, words):
         """Report the labels of the timeline and their problems."""
         found = f"{len(words.keys)} key moments, {len(words.spans)} stretches"
         self.report({"INFO"}, f"{player.name}: labels from {Path(player.annotation_file).name}: {found}")
-        for frame, line in word_checks.lines_of(scene, player.dot):
+        for frame, line in word_checks.list_problems(scene, player.dot):
             self.report({"WARNING"}, f"{player.name}, frame {frame}: {line}")
 
-    def lengthen(self, scene, players):
+    def extend_scene(self, scene, players):
         """Extend the scene to the end of the imported tracks, so that all of them play during annotation."""
         before = scene.frame_end
         for player in players:
-            frames = dots.keyed_frames(player.dot) if player.use and player.dot is not None else None
+            frames = dots.find_key_range(player.dot) if player.use and player.dot is not None else None
             if frames is not None:
-                bake.lengthen(scene, frames[1])
+                bake.extend_scene(scene, frames[1])
         if scene.frame_end != before:
             self.report({"INFO"}, f"Scene end set to frame {scene.frame_end}, the end of the tracks")
 
-    def add(self, settings, path: str, found: tracks.Found, provider: str):
+    def add_player(self, settings, path: str, found: tracks.PlayerInFile, provider: str):
         """Add one player to the list; of a whole match only the first is selected."""
         entry = settings.players.add()
-        entry.name = free_name(found.name, {player.name for player in settings.players})
-        entry.tracking_file, entry.metadata_file = as_setting(path), as_setting(self.metadata) if self.metadata else ""
+        entry.name = find_free_name(found.name, {player.name for player in settings.players})
+        entry.tracking_file, entry.metadata_file = to_setting_path(path), to_setting_path(self.metadata) if self.metadata else ""
         entry.feed_id, entry.provider = found.feed_id, provider
         same_file = [player for player in settings.players if player.tracking_file == entry.tracking_file]
         entry.use = not found.feed_id or len(same_file) == 1
@@ -117,24 +117,24 @@ SkillCorner, Sportec, Second Spectrum, Stats Perform). A text file with the name
         entry.shirt = SHIRTS.get(team, SHIRTS["home"])[0 if found.feed_id else (len(settings.players) - 1) // 2 % 2]
         words = Path(path).with_suffix(".txt")
         if not found.feed_id and words.is_file() and words != Path(path):
-            entry.annotation_file = as_setting(str(words))
+            entry.annotation_file = to_setting_path(str(words))
 
 
-def shirt_for(number: int) -> tuple[float, float, float]:
+def choose_shirt(number: int) -> tuple[float, float, float]:
     """Choose the colour of the player with that number in a list whose players belong to no team."""
     return SHIRTS[("home", "away")[number % 2]][number // 2 % 2]
 
 
-def free_name(wanted: str, taken: set[str]) -> str:
+def find_free_name(name_base: str, taken: set[str]) -> str:
     """Return `name_base`, or the first of "wanted 2", "wanted 3" ... that is not taken."""
-    number, name = 1, wanted
+    number, name = 1, name_base
     while name in taken:
         number += 1
-        name = f"{wanted} {number}"
+        name = f"{name_base} {number}"
     return name
 
 
-class BEYOND_MOCAP_FH_tracking(DroppedIntoView, bpy.types.FileHandler):
+class BEYOND_MOCAP_FH_tracking(ViewDropHandler, bpy.types.FileHandler):
     """Tracking files dropped into the 3D view"""
 
     bl_idname = "BEYOND_MOCAP_FH_tracking"
@@ -143,7 +143,7 @@ class BEYOND_MOCAP_FH_tracking(DroppedIntoView, bpy.types.FileHandler):
     bl_file_extensions = ".csv;.json;.jsonl;.xml;.dat"
 
 
-class BEYOND_MOCAP_OT_choose_player(Verb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_choose_player(BaseOperator, bpy.types.Operator):
     """Make this player active and select the player's dot; in the NLA editor, show only the selected strips"""
 
     bl_idname = "beyond_mocap.choose_player"
@@ -164,74 +164,74 @@ class BEYOND_MOCAP_OT_choose_player(Verb, bpy.types.Operator):
             context.space_data.dopesheet.show_only_selected = True
 
 
-class BEYOND_MOCAP_OT_place_players(Verb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_place_players(BaseOperator, bpy.types.Operator):
     """Add a dot that follows the track for every player without one, and their labels as strips on it; files of earlier
 versions need this once"""
 
     bl_idname = "beyond_mocap.place_players"
     bl_label = "Add to Timeline"
     needs = ("All players have strips already",
-             lambda context: any(strips.dot_of(player, context.scene) is None
+             lambda context: any(strips.find_dot(player, context.scene) is None
                                  for player in context.scene.beyond_mocap.players))
 
     def do(self, context):
         """Read all tracks and labels, then place the players that could be read, and report the others."""
         settings, read = context.scene.beyond_mocap, []
-        troubles = []
+        errors = []
         for player in settings.players:
-            if strips.dot_of(player, context.scene) is not None:
+            if strips.find_dot(player, context.scene) is not None:
                 continue
             try:
-                read.append((player, strips.written_words(player, settings.rate, tracks.read_track(settings, player))))
+                read.append((player, strips.read_written_labels(player, settings.rate, tracks.read_track(settings, player))))
             except InputError as error:
-                troubles.append(f"{player.name}: {error}")
+                errors.append(f"{player.name}: {error}")
         if not read:
-            raise InputError("no player could be added to the timeline", troubles[0])
+            raise InputError("no player could be added to the timeline", errors[0])
         for player, timeline in read:
-            strips.write(context, player, timeline)
-        for trouble in troubles:
+            strips.write_player_timeline(context, player, timeline)
+        for trouble in errors:
             self.report({"WARNING"}, trouble)
         self.report({"INFO"}, f"Players added to the timeline: {len(read)}")
 
 
-class BEYOND_MOCAP_OT_player_from_dot(Verb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_player_from_dot(BaseOperator, bpy.types.Operator):
     """Add players for the selected dots that belong to none, such as dots appended from another file, with their
 strips"""
 
     bl_idname = "beyond_mocap.player_from_dot"
     bl_label = "Add Player from Dot"
-    needs = "Select a dot that was appended from another file first", lambda context: bool(dots.orphans(context))
+    needs = "Select a dot that was appended from another file first", lambda context: bool(dots.list_orphan_dots(context))
 
     def do(self, context):
         """Add a player for each; the strips follow this scene's clock."""
         settings = context.scene.beyond_mocap
-        found = dots.orphans(context)
+        found = dots.list_orphan_dots(context)
         if not settings.players:
-            settings.start_time = min(dots.first_second(dot) for dot in found)
+            settings.start_time = min(dots.find_first_second(dot) for dot in found)
         for dot in found:
-            name = free_name(dot.beyond_mocap_dot.player, {player.name for player in settings.players})
-            dots.adopt(settings, dot, name)
-        strip_events.put_in_order(context.scene)
+            name = find_free_name(dot.beyond_mocap_dot.player, {player.name for player in settings.players})
+            dots.add_player_for_dot(settings, dot, name)
+        strip_events.normalize_strips(context.scene)
         self.report({"INFO"}, f"Players in the list: {len(settings.players)}")
 
 
-class BEYOND_MOCAP_OT_remove_player(Verb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_remove_player(BaseOperator, bpy.types.Operator):
     """Remove the active player with dot, pins and label strips; armature, action and drawn curve stay in the scene, and
 a preview is applied"""
 
     bl_idname = "beyond_mocap.remove_player"
     bl_label = "Remove Player"
-    needs = "No players in the list", lambda context: active_player(context.scene.beyond_mocap) is not None
+    needs = "No players in the list", lambda context: find_active_player(context.scene.beyond_mocap) is not None
 
     def do(self, context):
         """Remove the player and choose the next one."""
         settings = context.scene.beyond_mocap
         player = settings.players[settings.active_player]
-        if player.result.state == "PREVIEW" and preview.shown(context.scene, player):
-            preview.keep(context, player, "ACTION")  # otherwise the data set aside for the preview would be lost
+        if player.result.state == "PREVIEW" and preview.is_shown(context.scene, player):
+            preview.apply_preview(context, player, "ACTION")  # otherwise the data set aside for the preview would be lost
         elif player.result.state == "PREVIEW":
-            preview.forget(player)
-        pins.remove_all(player)
-        dots.remove(context.scene, player)
+            preview.drop_preview(player)
+        pins.remove_all_pins(player)
+        dots.remove_dot(context.scene, player)
         settings.players.remove(settings.active_player)
         settings.active_player = max(0, min(settings.active_player, len(settings.players) - 1))

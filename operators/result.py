@@ -8,19 +8,19 @@ from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
 from ..beyond_mocap.base.errors import InputError
 from ..beyond_mocap.base.settings.synthesis import FORMS
 from ..scene.core import session
-from ..scene.core.settings import active_player
+from ..scene.core.settings import find_active_player
 from ..scene.result import preview, quality
-from .turns import show_automatic
-from .verb import Verb
+from .turns import update_automatic_strips
+from .verb import BaseOperator
 
 
-class ResultVerb(Verb):
+class ResultVerb(BaseOperator):
     """A verb about the results of one player, or of all selected players."""
 
     player: StringProperty(name="Player", options={"SKIP_SAVE"},
                            description="Player of the result; empty: all selected players")
 
-    def chosen(self, context) -> list:
+    def list_players(self, context) -> list:
         """List the target players."""
         players = context.scene.beyond_mocap.players
         if self.player:
@@ -42,19 +42,19 @@ applied result to the other form"""
 
     def do(self, context):
         """Show takes that are not shown yet, then apply all."""
-        players = [player for player in self.chosen(context) if player.take or player.result.state != "NONE"]
+        players = [player for player in self.list_players(context) if player.take or player.result.state != "NONE"]
         for player in players:
-            preview.check(player)
-        unseen = [player for player in players if not preview.shown(context.scene, player)]
-        lost = [player.name for player in unseen if session.made(player.take) is None]
+            preview.check_body(player)
+        not_shown = [player for player in players if not preview.is_shown(context.scene, player)]
+        lost = [player.name for player in not_shown if session.find_take(player.take) is None]
         if lost or not players:
             found = f"no take of {', '.join(lost) or 'any player'} in this session"
             raise InputError("apply", found, "a take", "synthesize again")
-        for line in (line for player in players for line in preview.off_path(player)):
+        for line in (line for player in players for line in preview.revert_path_edit(player)):
             self.report({"INFO"}, line)
-        for player in unseen:
-            preview.show(context, player, player.take, {})
-        bodies = [preview.keep(context, player, self.form) for player in players]
+        for player in not_shown:
+            preview.show_preview(context, player, player.take, {})
+        bodies = [preview.apply_preview(context, player, self.form) for player in players]
         if bodies[-1].name in context.view_layer.objects:  # else its collection is excluded
             context.view_layer.objects.active = bodies[-1]
         kind = "one action each" if self.form == "ACTION" else "NLA strips"
@@ -72,14 +72,14 @@ removed"""
                                  for player in context.scene.beyond_mocap.players))
 
     def do(self, context):
-        players = [player for player in self.chosen(context) if player.result.state == "PREVIEW"]
+        players = [player for player in self.list_players(context) if player.result.state == "PREVIEW"]
         if not players:
             raise InputError("revert", "no preview is shown", "a preview", "synthesize first")
         for player in players:
-            for line in preview.off_path(player):
+            for line in preview.revert_path_edit(player):
                 self.report({"INFO"}, line)
-            preview.discard(context, player)
-            show_automatic(context, player)
+            preview.revert_preview(context, player)
+            update_automatic_strips(context, player)
         self.report({"INFO"}, f"reverted: {', '.join(player.name for player in players)}")
 
 
@@ -94,14 +94,14 @@ class BEYOND_MOCAP_OT_preview(ResultVerb, bpy.types.Operator):
 
     def do(self, context):
         """Show the variant on the named player, or the active one."""
-        player = self.chosen(context)[0] if self.player else active_player(context.scene.beyond_mocap)
+        player = self.list_players(context)[0] if self.player else find_active_player(context.scene.beyond_mocap)
         if player is None:
             raise InputError("preview", "no player is active", "a player with variants", "click one in step 2")
         preview.show_variant(context, player, self.number - 1)
-        show_automatic(context, player)
+        update_automatic_strips(context, player)
 
 
-class BEYOND_MOCAP_OT_error_curves(Verb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_error_curves(BaseOperator, bpy.types.Operator):
     """Show the active player's errors over time as curves in the Graph Editor: root error, foot slide, foot
 corrections, jerk, speed, cuts"""
 
@@ -112,20 +112,20 @@ corrections, jerk, speed, cuts"""
     @classmethod
     def poll(cls, context):
         cls.poll_message_set("Synthesize first: the active player has no body with a take")
-        player = active_player(context.scene.beyond_mocap)
+        player = find_active_player(context.scene.beyond_mocap)
         if player is None or player.body is None:
             return False
         return bool(player.take) or quality.has_error_curves(player.body)
 
     def do(self, context):
-        player = active_player(context.scene.beyond_mocap)
+        player = find_active_player(context.scene.beyond_mocap)
         if player is None or player.body is None:
             raise InputError("error curves", "the active player has no body", "a body", "synthesize first")
         if player.body.library is not None or player.body.data.library is not None:
             raise InputError(f"body {player.body.name}", "is linked from another file", "an armature of this file")
         if self.remove:
             quality.remove_error_curves(player.body)
-        elif session.made(player.take) is None:
+        elif session.find_take(player.take) is None:
             raise InputError(f"player {player.name}", "has no take in this session", "a take", "synthesize again")
         else:
             quality.write_error_curves(context.scene, player)

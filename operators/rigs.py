@@ -13,22 +13,22 @@ from ..beyond_mocap.base.errors import InputError
 from ..beyond_mocap.files.bvh import bvh
 from ..scene.core import action, channels, session
 from ..scene.core.measure import frames_per_second
-from ..scene.core.settings import active_player
+from ..scene.core.settings import find_active_player
 from ..scene.path_editing import riders
 from ..scene.result import bake
 from ..scene.rigs import armature, bone_maps, export, rig, rig_bake
-from ..scene.rigs.driven import Driven, check
-from ..scene.rigs.fit import BakeOptions, source_of
-from .verb import ExportVerb, Verb
+from ..scene.rigs.driven import DrivenRig, check_rig
+from ..scene.rigs.fit import BakeOptions, read_source
+from .verb import ExportOperator, BaseOperator
 
 
-class MapVerb(Verb):
+class BoneMapOperator(BaseOperator):
     """Base of operators about the chosen rig's bone map."""
 
     needs = "Choose a rig first", lambda context: context.scene.beyond_mocap.rig.target is not None
 
 
-class BEYOND_MOCAP_OT_map_bones(MapVerb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_map_bones(BoneMapOperator, bpy.types.Operator):
     """Find the rig's bones by their names, or by their structure where names do not help"""
 
     bl_idname = "beyond_mocap.map_bones"
@@ -36,10 +36,10 @@ class BEYOND_MOCAP_OT_map_bones(MapVerb, bpy.types.Operator):
 
     def do(self, context):
         settings = context.scene.beyond_mocap.rig
-        settings.told = f"Bones mapped {rig.fill(settings, again=True)}"
+        settings.told = f"Bones mapped {rig.fill_bone_map(settings, ignores_stored=True)}"
 
 
-class BEYOND_MOCAP_OT_keep_bone_map(MapVerb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_keep_bone_map(BoneMapOperator, bpy.types.Operator):
     """Store this map for all armatures with the same bones; it is used whenever one of them is chosen"""
 
     bl_idname = "beyond_mocap.keep_bone_map"
@@ -49,15 +49,15 @@ class BEYOND_MOCAP_OT_keep_bone_map(MapVerb, bpy.types.Operator):
     def do(self, context):
         """Check the map and write it to the user's folder."""
         settings = context.scene.beyond_mocap.rig
-        table = rig.table_of(settings)
-        bone_maps.check(settings.target, table)
-        if bone_maps.keep(settings.target, table) is None:
+        table = rig.read_bone_list(settings)
+        bone_maps.check_bone_map(settings.target, table)
+        if bone_maps.store_bone_map(settings.target, table) is None:
             raise InputError("bone map", "this Blender has no folder for the extension", "an installed extension",
                              "save it as a file")
         self.report({"INFO"}, f"Map stored for skeletons like {settings.target.name}")
 
 
-class BEYOND_MOCAP_OT_save_bone_map(MapVerb, bpy.types.Operator, ExportHelper):
+class BEYOND_MOCAP_OT_save_bone_map(BoneMapOperator, bpy.types.Operator, ExportHelper):
     """Write the bone map to a JSON file"""
 
     bl_idname = "beyond_mocap.save_bone_map"
@@ -70,10 +70,10 @@ class BEYOND_MOCAP_OT_save_bone_map(MapVerb, bpy.types.Operator, ExportHelper):
         if not self.filepath:
             raise InputError("bone map", "no file given", "a .json file", "choose where to write it")
         settings = context.scene.beyond_mocap.rig
-        bone_maps.save(Path(bpy.path.abspath(self.filepath)), settings.target, rig.table_of(settings))
+        bone_maps.write_bone_map(Path(bpy.path.abspath(self.filepath)), settings.target, rig.read_bone_list(settings))
 
 
-class BEYOND_MOCAP_OT_load_bone_map(MapVerb, bpy.types.Operator, ImportHelper):
+class BEYOND_MOCAP_OT_load_bone_map(BoneMapOperator, bpy.types.Operator, ImportHelper):
     """Read the bone map from a JSON file"""
 
     bl_idname = "beyond_mocap.load_bone_map"
@@ -85,12 +85,12 @@ class BEYOND_MOCAP_OT_load_bone_map(MapVerb, bpy.types.Operator, ImportHelper):
         if not self.filepath:
             raise InputError("bone map", "no file given", "a .json file", "choose one")
         settings = context.scene.beyond_mocap.rig
-        table = bone_maps.load(Path(bpy.path.abspath(self.filepath)))
-        bone_maps.check(settings.target, table)
-        rig.show(settings, table)
+        table = bone_maps.read_bone_map(Path(bpy.path.abspath(self.filepath)))
+        bone_maps.check_bone_map(settings.target, table)
+        rig.show_bone_map(settings, table)
 
 
-class BEYOND_MOCAP_OT_use_selected_rig(Verb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_use_selected_rig(BaseOperator, bpy.types.Operator):
     """Use the active armature as the rig"""
 
     bl_idname = "beyond_mocap.use_selected_rig"
@@ -99,7 +99,7 @@ class BEYOND_MOCAP_OT_use_selected_rig(Verb, bpy.types.Operator):
 
     def do(self, context):
         """Choose the rig; its bones are mapped at once."""
-        check(context.object)
+        check_rig(context.object)
         context.scene.beyond_mocap.rig.target = context.object
 
 
@@ -109,7 +109,7 @@ TARGETS = (("CHOSEN", "The Chosen Rig", "The rig that the panel shows"),
             "Bake each selected player's motion onto their own rig, or a copy of the chosen one"))
 
 
-class BEYOND_MOCAP_OT_bake_to_rig(Verb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_bake_to_rig(BaseOperator, bpy.types.Operator):
     """Bake the active player's motion, or the source armature's, onto the rig as keys on its controls, with feet
 planted; the rig's previous action is kept"""
 
@@ -126,80 +126,80 @@ planted; the rig's previous action is kept"""
             cls.poll_message_set("Choose the rig to bake to")
             return False
         cls.poll_message_set("Synthesize and press Apply first, or choose a source armature that moves")
-        return source_body(settings) is not None
+        return find_source_body(settings) is not None
 
     def do(self, context):
         """Prepare all bakes before the first rig is changed."""
         scene, settings = context.scene, context.scene.beyond_mocap
-        wishes, work = wishes_of(settings.rig), []
-        for body, player, target, table in self.pairs(context):
-            source = source_of(body, scene, standing_of(scene, player))
-            work.append((rig_bake.fitted(target, table, source, scene, wishes), target, table))
+        options, work = build_bake_options(settings.rig), []
+        for body, player, target, table in self.list_bakes(context):
+            source = read_source(body, scene, build_contact_lookup(scene, player))
+            work.append((rig_bake.prepare_bake(target, table, source, scene, options), target, table))
         lines = []
-        for fitted, target, table in work:
-            baked = rig_bake.lay(fitted)
+        for prepared, target, table in work:
+            baked = rig_bake.apply_bake(prepared)
             if settings.rig.reduces:
-                baked.told.append(reduced(target, table, settings.rig))
-            lines += [f"{fitted.name} on {target.name}: {len(baked.frames)} frames", *baked.told]
-        settings.rig.told = "\n".join(lines)
+                baked.messages.append(reduce_rig_keys(target, table, settings.rig))
+            lines += [f"{prepared.name} on {target.name}: {len(baked.frames)} frames", *baked.messages]
+        settings.rig.messages = "\n".join(lines)
         for line in lines[:1] if len(work) == 1 else lines:
             self.report({"INFO"}, line)
 
-    def pairs(self, context) -> list:
+    def list_bakes(self, context) -> list:
         """List (source body, its player or None, rig, map) of all bakes."""
         settings = context.scene.beyond_mocap
         chosen = settings.rig
         if self.targets == "PLAYERS":
-            return self.pairs_of_players(context)
-        body, player = source_body(settings), active_player(settings) if chosen.source is None else None
+            return self.list_player_bakes(context)
+        body, player = find_source_body(settings), find_active_player(settings) if chosen.source is None else None
         if self.targets == "CHOSEN":
-            check(chosen.target, body)
+            check_rig(chosen.target, body)
             if not chosen.bones:
-                rig.fill(chosen)
-            return [(body, player, chosen.target, rig.table_of(chosen))]
+                rig.fill_bone_map(chosen)
+            return [(body, player, chosen.target, rig.read_bone_list(chosen))]
         rigs = [one for one in context.selected_objects if one.type == "ARMATURE" and one != body]
         if not rigs:
             raise InputError("bake to rig", "no armature besides the source is selected", "rigs", "select them")
         for one in rigs:
-            check(one, body)
-        return [(body, player, one, table_for(chosen, one)) for one in rigs]
+            check_rig(one, body)
+        return [(body, player, one, find_bone_map(chosen, one)) for one in rigs]
 
-    def pairs_of_players(self, context) -> list:
+    def list_player_bakes(self, context) -> list:
         """List the bakes of all selected players; missing rigs are copied."""
         settings = context.scene.beyond_mocap
         players = [player for player in settings.players if player.use and player.body is not None]
         if not players:
             raise InputError("bake to rig", "no selected player has a body", "a result", "synthesize first")
-        lacking = [player for player in players if player.rig is None]
-        if lacking:
-            check(settings.rig.target)
+        players_without_rig = [player for player in players if player.rig is None]
+        if players_without_rig:
+            check_rig(settings.rig.target)
         for player in players:
-            check(player.rig or settings.rig.target, player.body)
-            source_of(player.body, context.scene)
-        for target in {player.rig or settings.rig.target for player in players} if lacking else ():
-            Driven(target, table_for(settings.rig, target), context.scene)  # before anything is copied
+            check_rig(player.rig or settings.rig.target, player.body)
+            read_source(player.body, context.scene)
+        for target in {player.rig or settings.rig.target for player in players} if players_without_rig else ():
+            DrivenRig(target, find_bone_map(settings.rig, target), context.scene)  # before anything is copied
         free = settings.rig.target if all(player.rig != settings.rig.target for player in players) else None
-        for player in lacking:
+        for player in players_without_rig:
             player.rig = free or armature.copy_rig(settings.rig.target, f"{player.name} rig")
             free = None
         context.view_layer.update()
-        return [(player.body, player, player.rig, table_for(settings.rig, player.rig)) for player in players]
+        return [(player.body, player, player.rig, find_bone_map(settings.rig, player.rig)) for player in players]
 
 
-class BEYOND_MOCAP_OT_unbake(Verb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_unbake(BaseOperator, bpy.types.Operator):
     """Remove the baked action from the rig and the file, and restore the rig's previous state"""
 
     bl_idname = "beyond_mocap.unbake"
     bl_label = "Remove Bake"
     needs = ("The chosen rig has no baked motion",
              lambda context: (target := context.scene.beyond_mocap.rig.target) is not None
-             and bool((channels.playing(target)[0] or {}).get(rig_bake.MARK)))
+             and bool((channels.find_playing_action(target)[0] or {}).get(rig_bake.MARK)))
 
     def do(self, context):
         rig_bake.remove_bake(context.scene.beyond_mocap.rig.target)
 
 
-class BEYOND_MOCAP_OT_reduce_keys(Verb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_reduce_keys(BaseOperator, bpy.types.Operator):
     """Remove keys of the rig's action that its curves do not need: hands, feet, head and bones stay within the
 tolerances"""
 
@@ -210,57 +210,57 @@ tolerances"""
     def do(self, context):
         """Reduce the keys and report the numbers."""
         chosen = context.scene.beyond_mocap.rig
-        chosen.told = reduced(chosen.target, table_for(chosen, chosen.target), chosen)
+        chosen.told = reduce_rig_keys(chosen.target, find_bone_map(chosen, chosen.target), chosen)
         self.report({"INFO"}, chosen.told)
 
 
-def source_body(settings) -> bpy.types.Object | None:
+def find_source_body(settings) -> bpy.types.Object | None:
     """Find the armature whose motion is baked; None where there is none."""
-    player = active_player(settings)
+    player = find_active_player(settings)
     return settings.rig.source or (player.body if player is not None else None)
 
 
-def standing_of(scene: bpy.types.Scene, player):
+def build_contact_lookup(scene: bpy.types.Scene, player):
     """Build a function from scene frames (F,) to foot contacts (F, 2) of the player's take or path edit; None without.
     """
     if player is not None and player.body is not None and player.body.beyond_mocap_ride.on:
-        return riders.standing(player.body)
-    made = session.made(player.take) if player is not None and player.take else None
-    if made is None:
+        return riders.build_contact_lookup(player.body)
+    stored = session.find_take(player.take) if player is not None and player.take else None
+    if stored is None:
         return None
-    take, fps = made.take, frames_per_second(scene)
+    take, fps = stored.take, frames_per_second(scene)
 
-    def standing(frames: np.ndarray) -> np.ndarray:
-        at = np.round((frames - bake.frame_at(scene, take.start_time)) * take.motion.fps / fps).astype(int)
+    def find_contacts(frames: np.ndarray) -> np.ndarray:
+        at = np.round((frames - bake.compute_frame(scene, take.start_time)) * take.motion.fps / fps).astype(int)
         inside = (at >= 0) & (at < len(take.contacts))
         return take.contacts[np.clip(at, 0, len(take.contacts) - 1)] & inside[:, None]
 
-    return standing
+    return find_contacts
 
 
-def wishes_of(settings) -> BakeOptions:
+def build_bake_options(settings) -> BakeOptions:
     """Build the bake options from the panel's settings."""
     keeps = {"AUTO": None, "KEEP": True, "SCALE": False}[settings.steps]
     return BakeOptions(settings.root, keeps, settings.ik == "BAKE", settings.plants)
 
 
-def table_for(settings, target: bpy.types.Object) -> dict[str, str]:
+def find_bone_map(settings, target: bpy.types.Object) -> dict[str, str]:
     """Find the map for a rig: the panel's where its bones are the same, else a stored or newly found one."""
     if settings.target is not None and settings.bones \
-            and bone_maps.fingerprint(settings.target) == bone_maps.fingerprint(target):
-        return rig.table_of(settings)
-    return bone_maps.kept(target) or bone_maps.suggest(target)
+            and bone_maps.compute_rig_fingerprint(settings.target) == bone_maps.compute_rig_fingerprint(target):
+        return rig.read_bone_list(settings)
+    return bone_maps.load_stored_map(target) or bone_maps.find_bone_map(target)
 
 
-def reduced(target: bpy.types.Object, table: dict[str, str], settings) -> str:
+def reduce_rig_keys(target: bpy.types.Object, table: dict[str, str], settings) -> str:
     """Reduce the keys; returns a message."""
     from ..scene.rigs import key_reduction
 
-    before, after = key_reduction.reduce(target, table, bpy.context.scene, settings.tolerance, settings.turn_tolerance)
+    before, after = key_reduction.reduce_keys(target, table, bpy.context.scene, settings.tolerance, settings.turn_tolerance)
     return f"Keys: {after} of {before} remain"
 
 
-class BEYOND_MOCAP_OT_export_motion(ExportVerb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_export_motion(ExportOperator, bpy.types.Operator):
     """Export the displayed motion of a rig, with its meshes, to a file; it is baked to one action first and the scene
 stays unchanged"""
 
@@ -269,7 +269,7 @@ stays unchanged"""
     filter_glob: StringProperty(default="*.fbx;*.glb;*.usdc;*.bvh", options={"HIDDEN"})
     format: EnumProperty(name="Format", items=rig.FORMATS, default="FBX", description="Format of the file")
     engine: EnumProperty(name="For", items=rig.ENGINES, default="BLENDER", description="Program to export for")
-    who: EnumProperty(name="Export", items=rig.WHO, default="ACTIVE", description="Armatures to export")
+    who: EnumProperty(name="Export", items=rig.EXPORT_CHOICES, default="ACTIVE", description="Armatures to export")
     root: EnumProperty(name="Root Motion", items=rig.ROOTS, default="KEEP", description="Motion of the root bone")
     own_rate: BoolProperty(name="Take Rate", default=False, description="Export at the frame rate of the take")
     deform_only: BoolProperty(name="Deform Bones Only", default=True, description="Leave out control bones")
@@ -286,15 +286,15 @@ stays unchanged"""
         return super().invoke(context, event)
 
     def do(self, context):
-        path = self.out()
-        rigs = self.rigs(context)
-        wanted = export.Wanted(path, self.format, self.engine, rate=self.rate(context), root=self.root,
+        path = self.output_path()
+        rigs = self.list_rigs(context)
+        options = export.ExportOptions(path, self.format, self.engine, rate=self.find_rate(context), root=self.root,
                                deform_only=self.deform_only, meshes=self.meshes)
-        for line in export.write(context, rigs, wanted):
+        for line in export.export_motion(context, rigs, options):
             self.report({"INFO"}, line)
         self.report({"INFO"}, f"Written: {path}")
 
-    def rigs(self, context) -> list[bpy.types.Object]:
+    def list_rigs(self, context) -> list[bpy.types.Object]:
         """List the armatures to export."""
         settings = context.scene.beyond_mocap
         if self.who == "SELECTED":
@@ -302,7 +302,7 @@ stays unchanged"""
         if self.who == "PLAYERS":
             chosen = [player.rig or player.body for player in settings.players if player.use]
             return [one for one in chosen if one is not None]
-        player = active_player(settings)
+        player = find_active_player(settings)
         if settings.rig.target is not None and (settings.rig.source or player is None or player.rig is None):
             return [settings.rig.target]
         if player is not None and (player.rig or player.body) is not None:
@@ -310,16 +310,16 @@ stays unchanged"""
         active = context.object
         return [active] if active is not None and active.type == "ARMATURE" else []
 
-    def rate(self, context) -> float | None:
+    def find_rate(self, context) -> float | None:
         """Find the frame rate of the active player's take; None for the scene's."""
         if not self.own_rate:
             return None
-        player = active_player(context.scene.beyond_mocap)
-        made = session.made(player.take) if player is not None and player.take else None
-        return made.take.motion.fps if made is not None else None
+        player = find_active_player(context.scene.beyond_mocap)
+        stored = session.find_take(player.take) if player is not None and player.take else None
+        return stored.take.motion.fps if stored is not None else None
 
 
-class BEYOND_MOCAP_OT_export_bvh(Verb, bpy.types.Operator, ExportHelper):
+class BEYOND_MOCAP_OT_export_bvh(BaseOperator, bpy.types.Operator, ExportHelper):
     """Write the active armature's motion as BVH: centimetres, Y up, at the scene's frame rate"""
 
     bl_idname = "beyond_mocap.export_bvh"
@@ -333,7 +333,7 @@ class BEYOND_MOCAP_OT_export_bvh(Verb, bpy.types.Operator, ExportHelper):
         """Read the action, write the file."""
         if not self.filepath:
             raise InputError("export", "no file given", "a .bvh file", "choose where to write it")
-        motion = action.read(context.object, context.scene)
-        for note in bvh.write(bpy.path.abspath(self.filepath), motion):
+        motion = action.read_motion(context.object, context.scene)
+        for note in bvh.write_bvh(bpy.path.abspath(self.filepath), motion):
             self.report({"INFO"}, note)
         self.report({"INFO"}, f"{len(motion)} frames written to {self.filepath}")

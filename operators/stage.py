@@ -7,12 +7,12 @@ from bpy.props import BoolProperty, EnumProperty
 
 from ..beyond_mocap.base.errors import InputError
 from ..scene.core import window
-from ..scene.path_editing.settings import meant, riders
+from ..scene.path_editing.settings import list_target_bodies, list_edited_bodies
 from ..scene.stage import path_cameras, stage
-from .verb import NEEDS_NO_EDITING, Verb
+from .verb import NEEDS_NO_EDITING, BaseOperator
 
 
-class BEYOND_MOCAP_OT_add_stage(Verb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_add_stage(BaseOperator, bpy.types.Operator):
     """Add a pitch with its lines, a sun and a camera that follows the players"""
 
     bl_idname = "beyond_mocap.add_stage"
@@ -21,81 +21,81 @@ class BEYOND_MOCAP_OT_add_stage(Verb, bpy.types.Operator):
 
     def do(self, context):
         """Create the stage."""
-        stage.create(context, self.camera)
+        stage.create_stage(context, self.camera)
 
 
-class BEYOND_MOCAP_OT_path_cameras(Verb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_path_cameras(BaseOperator, bpy.types.Operator):
     """Add four cameras on all edited paths, or update those that you have not changed"""
 
     bl_idname = "beyond_mocap.path_cameras"
     bl_label = "Path Cameras"
     needs = (*NEEDS_NO_EDITING,  # Edit Mode has its own undo, which does not include cameras
-             "Select an armature and press Edit Path first", lambda context: bool(riders(context.scene)))
+             "Select an armature and press Edit Path first", lambda context: bool(list_edited_bodies(context.scene)))
 
     def do(self, context):
         """Collect all paths and place the cameras."""
-        first = next(iter(meant(context)), None)
-        kept = path_cameras.set_up(context.scene, path_cameras.route(context.scene, first))
-        if kept:
-            self.report({"INFO"}, f"kept with your changes: {', '.join(kept)}")
+        first = next(iter(list_target_bodies(context)), None)
+        changed = path_cameras.place_cameras(context.scene, path_cameras.collect_targets(context.scene, first))
+        if changed:
+            self.report({"INFO"}, f"kept with your changes: {', '.join(changed)}")
 
 
-WHICH = (("NEXT", "Next", "Next camera; after the last one the free view, then the first"),
+CAMERA_CHOICES = (("NEXT", "Next", "Next camera; after the last one the free view, then the first"),
          ("ABOVE", "Above", "From above, like a map: X to the right, Y up"),
          ("SIDE", "Side", "From the side, with the path across the picture"),
          ("QUARTER", "Quarter", "From three quarters, slightly above"),
          ("BEHIND", "Behind", "From behind the body, following it"),
          ("FREE", "Free View", "Previous view and the scene's own camera"))
-VIEW = ("view_perspective", "view_location", "view_rotation", "view_distance")  # looking through a camera changes these
-_free: dict[int, tuple] = {}  # area pointer -> its VIEW before the first of these cameras
+VIEW_PROPERTIES = ("view_perspective", "view_location", "view_rotation", "view_distance")  # looking through a camera changes these
+_earlier_views: dict[int, tuple] = {}  # area pointer -> its VIEW before the first of these cameras
 
 
-class BEYOND_MOCAP_OT_path_camera(Verb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_path_camera(BaseOperator, bpy.types.Operator):
     """Look through the next path camera, or return to the free view after the last one"""
 
     bl_idname = "beyond_mocap.path_camera"
     bl_label = "Path Camera"
-    which: EnumProperty(name="Which", items=WHICH, default="NEXT", description="The camera to look through")
-    needs = "Press Path Cameras in the panel Path Editing first", lambda context: path_cameras.any_in(context.scene)
+    which: EnumProperty(name="Which", items=CAMERA_CHOICES, default="NEXT", description="The camera to look through")
+    needs = "Press Path Cameras in the panel Path Editing first", lambda context: path_cameras.has_cameras(context.scene)
 
     @classmethod
     def description(cls, _context, properties):
         """Return what this button shows, with the key for the next camera."""
-        told = next(item[2] for item in WHICH if item[0] == properties.which)
-        return f"{told}.\nShift + J or Shift + Numpad 0: the next one"
+        text = next(item[2] for item in CAMERA_CHOICES if item[0] == properties.which)
+        return f"{text}.\nShift + J or Shift + Numpad 0: the next one"
 
     def do(self, context):
         """Make it the scene's camera, and look through it in the 3D view."""
-        scene, area = context.scene, _view(context)
-        kind = self.which if self.which != "NEXT" else _after(scene, area)
+        scene, area = context.scene, _find_view(context)
+        kind = self.which if self.which != "NEXT" else _find_next_kind(scene, area)
         if kind == "FREE":
             if area is not None and scene.camera is not None and scene.camera.get(path_cameras.MARK):
-                _look_freely(area)
-            path_cameras.give_back(scene)
+                _restore_view(area)
+            path_cameras.restore_camera(scene)
             return
-        camera = path_cameras.found(scene, kind)
+        camera = path_cameras.find_camera(scene, kind)
         if camera is None:
             raise InputError("path cameras", f"no camera {path_cameras.NAMES[kind]}", "all four cameras",
                              "press Path Cameras in the panel Path Editing")
-        if kind == "BEHIND" and riders(scene):
-            path_cameras.follow(scene, path_cameras.route(scene, next(iter(meant(context)), None)))
+        if kind == "BEHIND" and list_edited_bodies(scene):
+            path_cameras.animate_focus(scene, path_cameras.collect_targets(scene, next(iter(list_target_bodies(context)), None)))
         if area is not None:
             _look_through(area, scene.camera, camera)
-        path_cameras.take(scene, camera)
+        path_cameras.activate_camera(scene, camera)
 
 
-def _view(context) -> bpy.types.Area | None:
+def _find_view(context) -> bpy.types.Area | None:
     """Return the 3D view in which the key or button was pressed, or the largest; None without a window."""
     if bpy.app.background or context.window is None:
         return None
     if context.area is not None and context.area.type == "VIEW_3D":
         return context.area
-    return window.largest_editor(context.window.screen, "VIEW_3D")
+    return window.find_largest_editor(context.window.screen, "VIEW_3D")
 
 
-def _after(scene: bpy.types.Scene, area: bpy.types.Area | None) -> str:
+def _find_next_kind(scene: bpy.types.Scene, area: bpy.types.Area | None) -> str:
     """Return the next camera kind; the free view is included where there is a view."""
-    row = [kind for kind in path_cameras.KINDS if path_cameras.found(scene, kind)]
+    row = [kind for kind in path_cameras.KINDS if path_cameras.find_camera(scene, kind)]
     looked = area is None or area.spaces.active.region_3d.view_perspective == "CAMERA"
     seen = scene.camera.get(path_cameras.MARK, "") if looked and scene.camera is not None else ""
     if area is not None:
@@ -109,16 +109,16 @@ def _look_through(area: bpy.types.Area, before: bpy.types.Object | None, camera:
     view = space.region_3d
     if view.view_perspective != "CAMERA" or before is None or not before.get(path_cameras.MARK):
         place, turn = view.view_location.copy(), view.view_rotation.copy()
-        _free[area.as_pointer()] = view.view_perspective, place, turn, view.view_distance
+        _earlier_views[area.as_pointer()] = view.view_perspective, place, turn, view.view_distance
     if space.use_local_camera:
         space.camera = camera
     view.view_perspective = "CAMERA"
 
 
-def _look_freely(area: bpy.types.Area) -> None:
+def _restore_view(area: bpy.types.Area) -> None:
     """Restore the earlier view; where it is unknown, keep the camera's place."""
     view = area.spaces.active.region_3d
     if view.view_perspective != "CAMERA":
         return
-    for name, value in zip(VIEW, _free.get(area.as_pointer(), ("PERSP",))):
+    for name, value in zip(VIEW_PROPERTIES, _earlier_views.get(area.as_pointer(), ("PERSP",))):
         setattr(view, name, value)

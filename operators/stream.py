@@ -6,14 +6,14 @@ import bpy
 from bpy.props import FloatProperty, IntProperty, StringProperty
 
 from ..beyond_mocap.base.errors import InputError
-from ..beyond_mocap.passes.stream.live_hits import recorded
+from ..beyond_mocap.passes.stream.live_hits import build_recording
 from ..scene.passes import make
-from ..scene.passes.settings import subject
+from ..scene.passes.settings import find_armature
 from ..scene.stream import follow, play
-from .verb import BackgroundVerb, Verb
+from .verb import BackgroundOperator, BaseOperator
 
 
-class BEYOND_MOCAP_OT_stream_start(Verb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_stream_start(BaseOperator, bpy.types.Operator):
     """Receive live motion from a suit's program on this machine, as BVH frames over UDP or TCP, and show it on a
 character; nothing is received from other machines, and nothing is sent"""
 
@@ -26,10 +26,10 @@ character; nothing is received from other machines, and nothing is sent"""
     def do(self, context):
         """Bind the port and start to listen."""
         follow.start_listening(context.scene.beyond_mocap_stream)
-        follow.began()
+        follow.reset_status()
 
 
-class ListeningVerb(Verb):
+class ListeningVerb(BaseOperator):
     """An operator for the stream that is received."""
 
     needs = ("No stream is received: press Start Stream first",
@@ -45,13 +45,13 @@ class BEYOND_MOCAP_OT_stream_stop(ListeningVerb, bpy.types.Operator):
 
     def do(self, context):
         follow.stop_listening()
-        follow.tell()
+        follow.write_status()
 
 
-class PlayingVerb(Verb):
+class PlayingVerb(BaseOperator):
     """An operator for the rally that is played live."""
 
-    needs = "No rally is being played: press Play Live first", lambda context: play.rally() is not None
+    needs = "No rally is being played: press Play Live first", lambda context: play.current_rally() is not None
 
 
 class BEYOND_MOCAP_OT_stream_end(PlayingVerb, bpy.types.Operator):
@@ -62,9 +62,9 @@ class BEYOND_MOCAP_OT_stream_end(PlayingVerb, bpy.types.Operator):
     bl_options = {"REGISTER"}
 
     def do(self, context):
-        play.stop()
-        told = context.window_manager.beyond_mocap_streaming
-        told.playing, told.played = False, ""
+        play.stop_rally()
+        status = context.window_manager.beyond_mocap_streaming
+        status.playing, status.played = False, ""
 
 
 class BEYOND_MOCAP_OT_stream_keep(ListeningVerb, bpy.types.Operator):
@@ -77,13 +77,13 @@ class BEYOND_MOCAP_OT_stream_keep(ListeningVerb, bpy.types.Operator):
 
     def do(self, context):
         """Build a motion from the ring buffer and write it to an action."""
-        motion = recorded(follow.current_listener(), self.seconds)
+        motion = build_recording(follow.current_listener(), self.seconds)
         if motion is None:
             raise InputError("stream", "nothing has arrived yet", "frames", "start the sender")
         follow.keep_recording(context, motion)
 
 
-class BEYOND_MOCAP_OT_stream_play(BackgroundVerb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_stream_play(BackgroundOperator, bpy.types.Operator):
     """Turn each strike of the streamed character into a pass of the player who has the ball, with the most similar
 motion of the library, to the player chosen with keys 1 to 9 or a click"""
 
@@ -98,15 +98,15 @@ motion of the library, to the player chosen with keys 1 to 9 or a click"""
     def order(self, context):
         """Collect the order of the scene, the holder of the ball and the rally's time."""
         settings = context.scene.beyond_mocap_passes
-        return make.order_of(context.scene), self.holder or settings.players[0].name, play.seconds(context.scene)
+        return make.build_order(context.scene), self.holder or settings.players[0].name, play.rally_seconds(context.scene)
 
     @staticmethod
     def work(order, progress, cancelled, _hurry):
-        return play.begin(*order, progress, cancelled)
+        return play.start_rally(*order, progress, cancelled)
 
     def apply(self, scene, result):
         """Apply the rally to characters and ball, and answer strikes from now on."""
-        play.show(scene, result)
+        play.apply_rally(scene, result)
 
 
 class BEYOND_MOCAP_OT_stream_target(PlayingVerb, bpy.types.Operator):
@@ -120,23 +120,23 @@ class BEYOND_MOCAP_OT_stream_target(PlayingVerb, bpy.types.Operator):
         names = [row.name for row in context.scene.beyond_mocap_passes.players]
         if self.number > len(names):
             raise InputError("player", f"number {self.number}", f"1 to {len(names)}")
-        if names[self.number - 1] == play.rally().holder:
+        if names[self.number - 1] == play.current_rally().holder:
             raise InputError("player", f"{names[self.number - 1]} has the ball", "another player")
         context.scene.beyond_mocap_stream.target = names[self.number - 1]
 
 
-class BEYOND_MOCAP_OT_stream_act(Verb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_stream_act(BaseOperator, bpy.types.Operator):
     """Let the player who has the ball repeat the selected armature's strike that is nearest to the current frame"""
 
     bl_idname = "beyond_mocap.stream_act"
     bl_label = "Do as Selected"
     needs = ("Press Play Live, and select an armature whose motion has a strike",
-             lambda context: play.rally() is not None and subject(context) is not None)
+             lambda context: play.current_rally() is not None and find_armature(context) is not None)
 
     def do(self, context):
         """Find the strike; in a window the answer appears as soon as it is ready."""
-        hit = play.shown_by(context.scene, subject(context))
+        hit = play.find_shown_strike(context.scene, find_armature(context))
         if bpy.app.background:
             play.answer_now(context.scene, hit)
         else:
-            play.struck(context.scene, hit, 0.0)
+            play.store_strike(context.scene, hit, 0.0)

@@ -11,16 +11,16 @@ from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
 from ..beyond_mocap.base.errors import InputError
 from ..beyond_mocap.files.bvh import bvh
 from ..beyond_mocap.files.tables import read_ball
-from ..beyond_mocap.files.whole import beside
-from ..beyond_mocap.study.form import MOVIES, clip_source
+from ..beyond_mocap.files.whole import atomic_path
+from ..beyond_mocap.study.form import MOVIES, find_movie
 from ..beyond_mocap.study.order import read_study
 from ..scene import study as filming
-from .verb import Verb
+from .verb import BaseOperator
 
 CLIPS = "clips"
 
 
-class BEYOND_MOCAP_OT_study_render(Verb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_study_render(BaseOperator, bpy.types.Operator):
     """Render every clip of a naturalness study with the same body, floor, light and camera, under its neutral name"""
 
     bl_idname = "beyond_mocap.study_render"
@@ -51,10 +51,10 @@ class BEYOND_MOCAP_OT_study_render(Verb, bpy.types.Operator):
         folder = Path(bpy.path.abspath(self.directory))
         study = read_study(folder)
         out = folder / CLIPS
-        wanted = [clip for clip in study.clips if self.again or not _there(out, clip.name)]
-        sources = [(clip, _read(folder, clip)) for clip in wanted]
+        missing = [clip for clip in study.clips if self.again or not _is_rendered(out, clip.name)]
+        sources = [(clip, _read_clip(folder, clip)) for clip in missing]
         size = self.width // 2 * 2, self.height // 2 * 2  # H.264 needs even sizes
-        look = filming.Look(filming.engine_here(self.engine), size, self.fps, self.samples, not self.pictures)
+        look = filming.RenderLook(filming.find_engine(self.engine), size, self.fps, self.samples, not self.pictures)
         if self.engine == "CYCLES" != look.engine:
             self.report({"WARNING"}, "The Cycles add-on is disabled: EEVEE renders instead")
         out.mkdir(exist_ok=True)
@@ -63,34 +63,34 @@ class BEYOND_MOCAP_OT_study_render(Verb, bpy.types.Operator):
         try:
             for done, (clip, source) in enumerate(sources):
                 windows.progress_update(done)
-                self.one(out, clip, source, look)
+                self.render_clip(out, clip, source, look)
         finally:
             windows.progress_end()
         self.report({"INFO"}, f"{out}: {len(sources)} clips rendered, {len(study.clips) - len(sources)} existed")
 
-    def one(self, out: Path, clip, source, look) -> None:
+    def render_clip(self, out: Path, clip, source, look) -> None:
         """Render or copy one clip."""
         if isinstance(source, Path):
-            with beside(out / f"{clip.name}{source.suffix.lower()}") as part:
-                shutil.copyfile(source, part)
+            with atomic_path(out / f"{clip.name}{source.suffix.lower()}") as temporary:
+                shutil.copyfile(source, temporary)
             return
         target = out / (f"{clip.name}.mp4" if look.movie else clip.name)
         if look.movie or not target.is_dir():
-            filming.film(target, *source, look)
+            filming.render_motion(target, *source, look)
             return
-        anew = target.with_name(f".{target.name}.anew")
-        shutil.rmtree(anew, ignore_errors=True)  # left by an interrupted run
-        filming.film(anew, *source, look)
+        replacement = target.with_name(f".{target.name}.anew")
+        shutil.rmtree(replacement, ignore_errors=True)  # left by an interrupted run
+        filming.render_motion(replacement, *source, look)
         shutil.rmtree(target)
-        anew.rename(target)
+        replacement.rename(target)
 
 
-def _there(out: Path, name: str) -> bool:
+def _is_rendered(out: Path, name: str) -> bool:
     """Return whether a clip is rendered, as a movie or as pictures."""
-    return clip_source(out, name) is not None or any((out / name).glob("*.png"))
+    return find_movie(out, name) is not None or any((out / name).glob("*.png"))
 
 
-def _read(folder: Path, clip):
+def _read_clip(folder: Path, clip):
     """Read a clip: a movie's path, or motion and ball; InputError for other files."""
     path = folder / clip.file
     if path.suffix.lower() in MOVIES:
@@ -100,5 +100,5 @@ def _read(folder: Path, clip):
     if path.suffix.lower() != ".bvh":
         raise InputError(path, f"file type {path.suffix}", f"a .bvh file or a movie ({', '.join(MOVIES)})",
                          "convert it, or render it yourself")  # fmt: skip
-    beside_it = path.with_suffix(".ball.csv")
-    return bvh.read(path).motion, read_ball(beside_it) if beside_it.is_file() else None
+    ball_file = path.with_suffix(".ball.csv")
+    return bvh.read_bvh(path).motion, read_ball(ball_file) if ball_file.is_file() else None

@@ -7,15 +7,15 @@ from bl_operators.presets import AddPresetBase
 from bpy.props import BoolProperty, FloatProperty, IntProperty, StringProperty
 
 from ..beyond_mocap.base.errors import InputError
-from ..beyond_mocap.base.settings import rows_of
+from ..beyond_mocap.base.settings import list_settings
 from ..scene.core import background, session
-from ..scene.core.settings import active_player
+from ..scene.core.settings import find_active_player
 from ..scene.result import freshness, orders, plans, queue
-from .turns import TurnsVerb
+from .turns import TakeOperator
 from .verb import NEEDS_LIBRARY
 
 
-class BEYOND_MOCAP_OT_synthesize(TurnsVerb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_synthesize(TakeOperator, bpy.types.Operator):
     """Find clips for the track and labels of every selected player and join them into one motion, shown as a preview
 until it is applied or reverted"""
 
@@ -23,29 +23,29 @@ until it is applied or reverted"""
     bl_label = "Synthesize"
 
 
-class BEYOND_MOCAP_OT_update(TurnsVerb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_update(TakeOperator, bpy.types.Operator):
     """Regenerate only what changed in labels or track since the last synthesis; everything else stays bit for bit"""
 
     bl_idname = "beyond_mocap.update"
     bl_label = "Update"
     kind = "update"
-    needs = (*TurnsVerb.needs, "Synthesize first",
+    needs = (*TakeOperator.needs, "Synthesize first",
              lambda context: any(player.use and player.take for player in context.scene.beyond_mocap.players))
 
-    def wanted(self, context):
+    def list_requests(self, context):
         """List the players that are out of date; without any, all selected ones.
 
         Drawn tracks are read again in any case, since `look` does not play what has to be played.
         """
-        found = super().wanted(context)
+        found = super().list_requests(context)
         if len(found) == 1:
             return found
         changed = [(player, how) for player, how in found
-                   if player.drawn_track is not None or freshness.look(context.scene, player)[0]]
+                   if player.drawn_track is not None or freshness.check_player(context.scene, player)[0]]
         return changed or found
 
 
-class BEYOND_MOCAP_OT_update_live(TurnsVerb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_update_live(TakeOperator, bpy.types.Operator):
     """Update one player, quickly or completely; Live runs this automatically"""
 
     bl_idname = "beyond_mocap.update_live"
@@ -56,15 +56,15 @@ class BEYOND_MOCAP_OT_update_live(TurnsVerb, bpy.types.Operator):
                                                      ("whole", "Full", "In full quality, with figures")),
                                  description="Quality of the update")
 
-    def wanted(self, context):
+    def list_requests(self, context):
         """Return the one player, from its take."""
         found = context.scene.beyond_mocap.players.get(self.player)
         if found is None:
             raise InputError("Live Update", f"no player {self.player!r}", "a player of the list")
         if self.kind == "whole":  # a quick take that the narrow search did not affect only lacks its figures
-            made = session.made(found.take)
-            return [(found, orders.How("whole" if made is None or made.take.cut_short else "update"))]
-        return [(found, orders.How(self.kind))]
+            made = session.find_take(found.take)
+            return [(found, orders.SynthesisMode("whole" if made is None or made.take.is_cut_short else "update"))]
+        return [(found, orders.SynthesisMode(self.kind))]
 
 
 class BEYOND_MOCAP_OT_cancel(bpy.types.Operator):
@@ -90,17 +90,17 @@ class BEYOND_MOCAP_OT_cancel(bpy.types.Operator):
     def execute(self, context):
         """Ask every job to end, or remove one player from the queue."""
         if self.player:
-            queue.remove(self.player)
-            context.window_manager.beyond_mocap_work.waiting = "\n".join(queue.names())
+            queue.remove_player(self.player)
+            context.window_manager.beyond_mocap_work.waiting = "\n".join(queue.list_players())
         elif self.keep:
-            background.end()
+            background.end_jobs()
         else:
-            queue.clear()
-            background.stop()
+            queue.clear_queue()
+            background.cancel_jobs()
         return {"FINISHED"}
 
 
-class BEYOND_MOCAP_OT_resynthesize_stretch(TurnsVerb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_resynthesize_stretch(TakeOperator, bpy.types.Operator):
     """Search the seconds of the selected strip, of a selected label span or of the preview range again with other clips
 where possible; everything else stays bit for bit"""
 
@@ -112,19 +112,19 @@ where possible; everything else stays bit for bit"""
                        description="Last second on the track's clock; 0 for the selection")
     needs = "Synthesize first", lambda context: any(player.take for player in context.scene.beyond_mocap.players)
 
-    def wanted(self, context):
+    def list_requests(self, context):
         """Return the seconds that are set, or those of the selection."""
         settings = context.scene.beyond_mocap
         if self.end > self.start:
-            player = settings.players.get(self.player) if self.player else plans.player_shown(context.scene)
+            player = settings.players.get(self.player) if self.player else plans.find_shown_player(context.scene)
             if player is None:
                 raise InputError("resynthesize stretch", f"no player {self.player!r}", "a player with a take")
-            return [(player, orders.How("stretch", self.start, self.end))]
-        player, start, end = plans.selected_stretch(context.scene)
-        return [(player, orders.How("stretch", start, end))]
+            return [(player, orders.SynthesisMode("stretch", self.start, self.end))]
+        player, start, end = plans.find_selected_range(context.scene)
+        return [(player, orders.SynthesisMode("stretch", start, end))]
 
 
-class BEYOND_MOCAP_OT_variants(TurnsVerb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_variants(TakeOperator, bpy.types.Operator):
     """Create several takes of the active player, each with other clips where possible; a row of numbers switches
 between them, and Apply keeps the one shown"""
 
@@ -132,14 +132,14 @@ between them, and Apply keeps the one shown"""
     bl_label = "Variants"
     count: IntProperty(name="How Many", default=3, min=2, max=9, description="How many takes to choose from")
     needs = (*NEEDS_LIBRARY, "Import tracking and select a player in step 2 first",
-             lambda context: active_player(context.scene.beyond_mocap) is not None)
+             lambda context: find_active_player(context.scene.beyond_mocap) is not None)
 
-    def wanted(self, context):
+    def list_requests(self, context):
         """Return the active player."""
-        player = active_player(context.scene.beyond_mocap)
+        player = find_active_player(context.scene.beyond_mocap)
         if player is None:
             raise InputError("variants", "no active player", "a player", "select one in step 2")
-        return [(player, orders.How("variants", count=self.count))]
+        return [(player, orders.SynthesisMode("variants", count=self.count))]
 
 
 class BEYOND_MOCAP_OT_add_preset(AddPresetBase, bpy.types.Operator):
@@ -150,4 +150,4 @@ class BEYOND_MOCAP_OT_add_preset(AddPresetBase, bpy.types.Operator):
     preset_menu = "BEYOND_MOCAP_MT_presets"
     preset_subdir = "beyond_mocap/synthesis"
     preset_defines = ["settings = bpy.context.scene.beyond_mocap"]
-    preset_values = [f"settings.{row.identifier}" for row in rows_of("synthesis") if row.in_preset]
+    preset_values = [f"settings.{row.identifier}" for row in list_settings("synthesis") if row.in_preset]

@@ -6,34 +6,34 @@ import bpy
 
 from ..beyond_mocap.base.errors import InputError
 from ..scene.throws import made, order, shown
-from ..scene.throws.settings import thrower
-from .verb import BackgroundVerb, Verb
+from ..scene.throws.settings import find_thrower
+from .verb import BackgroundOperator, BaseOperator
 
 
-class AtTarget(BackgroundVerb):
+class TargetOperator(BackgroundOperator):
     """Base of throwing and kicking."""
 
     act = ""
-    needs = "Select the armature that throws or kicks", lambda context: thrower(context) is not None
+    needs = "Select the armature that throws or kicks", lambda context: find_thrower(context) is not None
 
     def order(self, context):
         """Build the request from the scene."""
-        return order.order_of(context.scene, thrower(context), self.act)
+        return order.build_request(context.scene, find_thrower(context), self.act)
 
-    work = staticmethod(made.work)
+    work = staticmethod(made.generate_throw)
 
     def apply(self, scene, result):
         body = scene.objects.get(result.order.body)
         if body is None or body.type != "ARMATURE":
             raise InputError(f"armature {result.order.body}", "it was removed meanwhile", "the same armature",
                              "select an armature and try again")
-        shown.show(scene, body, result)
+        shown.show_throw(scene, body, result)
         for line in body.beyond_mocap_throw.told.splitlines():
             self.report({"WARNING"}, f"{body.name}: {line}")
-        self.report({"INFO"}, f"{body.name}: {'; '.join(shown.figures(result))}")
+        self.report({"INFO"}, f"{body.name}: {'; '.join(shown.list_figures(result))}")
 
 
-class BEYOND_MOCAP_OT_throw_at_target(AtTarget, bpy.types.Operator):
+class BEYOND_MOCAP_OT_throw_at_target(TargetOperator, bpy.types.Operator):
     """Throw a ball at the target with the selected armature: networks generate the throw, and wrist and release are
 changed only as much as needed. Without a target the 3D cursor is used"""
 
@@ -43,14 +43,14 @@ changed only as much as needed. Without a target the 3D cursor is used"""
     act = "throw"
 
 
-class ThrownVerb(Verb):
+class ThrowPreviewOperator(BaseOperator):
     """Base of operators on the throw or kick in preview."""
 
     needs = ("Select an armature with a throw or kick in preview",
-             lambda context: (body := thrower(context)) is not None and bool(body.beyond_mocap_throw.made))
+             lambda context: (body := find_thrower(context)) is not None and bool(body.beyond_mocap_throw.made))
 
 
-class BEYOND_MOCAP_OT_leave_throw(ThrownVerb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_leave_throw(ThrowPreviewOperator, bpy.types.Operator):
     """Revert the throw or kick: armature and ball play what they did before"""
 
     bl_idname = "beyond_mocap.leave_throw"
@@ -58,10 +58,10 @@ class BEYOND_MOCAP_OT_leave_throw(ThrownVerb, bpy.types.Operator):
 
     def do(self, context):
         """Restore the earlier animation."""
-        shown.leave(context.scene, thrower(context))
+        shown.revert_throw(context.scene, find_thrower(context))
 
 
-class BEYOND_MOCAP_OT_keep_throw(ThrownVerb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_keep_throw(ThrowPreviewOperator, bpy.types.Operator):
     """Apply the throw or kick: it becomes the armature's own motion, and the next one begins from it"""
 
     bl_idname = "beyond_mocap.keep_throw"
@@ -69,10 +69,10 @@ class BEYOND_MOCAP_OT_keep_throw(ThrownVerb, bpy.types.Operator):
 
     def do(self, context):
         """Apply the preview."""
-        shown.keep(thrower(context))
+        shown.apply_throw(find_thrower(context))
 
 
-class BEYOND_MOCAP_OT_kick_at_target(AtTarget, bpy.types.Operator):
+class BEYOND_MOCAP_OT_kick_at_target(TargetOperator, bpy.types.Operator):
     """Kick a ball at the target with the selected armature: from where it is if one is chosen, else in front of the
 foot. Without a target the 3D cursor is used"""
 

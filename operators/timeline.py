@@ -9,29 +9,29 @@ from bpy.props import BoolProperty, FloatProperty, IntProperty, StringProperty
 
 from ..beyond_mocap.base.errors import InputError
 from ..scene.core import window
-from ..scene.core.live import soon
-from ..scene.core.settings import active_player
+from ..scene.core.live import call_soon
+from ..scene.core.settings import find_active_player
 from ..scene.result import bake
 from ..scene.timeline import lanes, lay_strips, moment_names, word_checks
-from ..scene.timeline.strip_lines import said
-from ..scene.timeline.strips import can_have_timeline, subject_clock, subject_name, subject_with_lanes, timeline_subject
-from .verb import Verb
+from ..scene.timeline.strip_lines import parse_labels
+from ..scene.timeline.strips import can_have_timeline, find_target_clock, describe_target, ensure_target, find_target
+from .verb import BaseOperator
 
 
-class TimelineVerb(Verb):
+class TimelineVerb(BaseOperator):
     """A verb for the active player's timeline, or for that of a library clip that is being annotated."""
 
     needs = ("Import tracking in step 2 first, and place its players in the timeline",
-             lambda context: timeline_subject(context) is not None)
+             lambda context: find_target(context) is not None)
 
     def attempt(self, action):
         """Run the action, then update the problems of labels."""
-        done = super().attempt(action)
-        word_checks.keep(bpy.context)
-        return done
+        result = super().attempt(action)
+        word_checks.update_problems(bpy.context)
+        return result
 
 
-class WritingVerb(TimelineVerb):
+class TimelineWritingVerb(TimelineVerb):
     """A verb that creates the timeline if there is none yet."""
 
     needs = "Import tracking in step 2 first", lambda context: can_have_timeline(context)
@@ -41,43 +41,43 @@ class MomentVerb(TimelineVerb):
     """A verb for the selected key moment."""
 
     needs = (*TimelineVerb.needs, "Select a key moment first: click its name in the NLA editor or in the list",
-             lambda context: is_picked(timeline_subject(context)))
+             lambda context: has_selected_moment(find_target(context)))
 
 
-def is_picked(target: bpy.types.Object) -> bool:
+def has_selected_moment(target: bpy.types.Object) -> bool:
     """Return whether a key moment is selected, without parsing labels."""
-    return any(marker.select for _, strip in lanes.strips(target) for marker in strip.action.pose_markers)
+    return any(marker.select for _, strip in lanes.iter_strips(target) for marker in strip.action.pose_markers)
 
 
-def picked(target: bpy.types.Object) -> lanes.PlacedMoment:
+def find_selected_moment(target: bpy.types.Object) -> lanes.PlacedMoment:
     """Find the selected key moment. Raises InputError if there is none."""
-    found = next((moment for moment in lanes.moments(target) if moment.selected), None)
+    found = next((moment for moment in lanes.list_moments(target) if moment.is_selected), None)
     if found is None:
-        raise InputError(subject_name(target), "no key moment is selected", "one", "click its name in the NLA editor")
+        raise InputError(describe_target(target), "no key moment is selected", "one", "click its name in the NLA editor")
     return found
 
 
-def selected_spans(target: bpy.types.Object) -> list[lanes.PlacedSpan]:
+def list_selected_spans(target: bpy.types.Object) -> list[lanes.PlacedSpan]:
     """List the spans whose strips are selected, by start."""
-    return [span for span in lanes.spans(target) if span.selected]
+    return [span for span in lanes.list_spans(target) if span.is_selected]
 
 
-def draw_complaints(layout, context: bpy.types.Context, item) -> None:
+def draw_problems(layout, context: bpy.types.Context, item) -> None:
     """Draw what is wrong with the labels of the span or key moment that `item()` returns, a line each."""
     try:
-        lines = word_checks.lines_for(context.scene, item())
+        lines = word_checks.describe_problems(context.scene, item())
     except InputError as error:
         lines = [str(error)]
     for line in lines:
         layout.label(text=line, icon="ERROR")
 
 
-def playhead(context: bpy.types.Context, target: bpy.types.Object) -> float:
+def compute_playhead(context: bpy.types.Context, target: bpy.types.Object) -> float:
     """Compute the playhead in seconds on the clock of the object's strips."""
-    return subject_clock(context, target).seconds(context.scene.frame_current_final)
+    return find_target_clock(context, target).to_seconds(context.scene.frame_current_final)
 
 
-class BEYOND_MOCAP_OT_show_timeline(Verb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_show_timeline(BaseOperator, bpy.types.Operator):
     """Open the NLA editor below the 3D view, with the strips of all players and its Beyond Mocap tab"""
 
     bl_idname = "beyond_mocap.show_timeline"
@@ -96,24 +96,24 @@ class BEYOND_MOCAP_OT_show_timeline(Verb, bpy.types.Operator):
         if space.dopesheet is not None:
             space.dopesheet.show_only_selected = False
         uid = context.scene.session_uid
-        soon(lambda: _settle(uid), 0.1)
+        call_soon(lambda: _set_up_editor(uid), 0.1)
         area.tag_redraw()
 
 
-def _settle(scene: int) -> None:
+def _set_up_editor(scene: int) -> None:
     """Set the active tab and the view, which an editor accepts only after it has been drawn."""
-    for shown in bpy.context.window_manager.windows:
-        for area in shown.screen.areas:
-            if area.type != "NLA_EDITOR" or shown.scene.session_uid != scene:
+    for window_shown in bpy.context.window_manager.windows:
+        for area in window_shown.screen.areas:
+            if area.type != "NLA_EDITOR" or window_shown.scene.session_uid != scene:
                 continue
             regions = {region.type: region for region in area.regions}
             regions["UI"].active_panel_category = "Beyond Mocap"
-            with bpy.context.temp_override(window=shown, area=area, region=regions["WINDOW"]):
+            with bpy.context.temp_override(window=window_shown, area=area, region=regions["WINDOW"]):
                 bpy.ops.nla.view_all()
             area.tag_redraw()
 
 
-class BEYOND_MOCAP_OT_jump_to(Verb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_jump_to(BaseOperator, bpy.types.Operator):
     """Go to the frame of this line, or the next one of several, and select the player's body; Shift-click also frames
 the body in the view"""
 
@@ -136,13 +136,13 @@ the body in the view"""
         self.frame_view = self.frame_view or event.shift
         return self.execute(context)
 
-    def frame(self, scene) -> int:
+    def compute_frame(self, scene) -> int:
         """Compute the scene frame to go to."""
         try:
             seconds = [float(text) for text in self.stops.split()] or [self.seconds]
         except ValueError:
             raise InputError("stops", repr(self.stops), "seconds separated by blanks") from None
-        frames = sorted(int(round(bake.frame_at(scene, second))) for second in seconds)
+        frames = sorted(int(round(bake.compute_frame(scene, second))) for second in seconds)
         return next((frame for frame in frames if frame > scene.frame_current), frames[0])
 
     def do(self, context):
@@ -150,23 +150,23 @@ the body in the view"""
         settings = context.scene.beyond_mocap
         if self.player and self.player not in settings.players:
             raise InputError("player", self.player, "a name in the list", "check the list in step 2")
-        player = settings.players[self.player] if self.player else active_player(settings)
-        context.scene.frame_set(self.frame(context.scene))
+        player = settings.players[self.player] if self.player else find_active_player(settings)
+        context.scene.frame_set(self.compute_frame(context.scene))
         body = player.body if player is not None else None
         if body is None or body.name not in context.view_layer.objects:
             return
         if context.view_layer.objects.active is None or context.mode == "OBJECT":
             window.select_only(context, body)
         if self.frame_view and not bpy.app.background:
-            _bring_into_view(context)
+            _frame_selection(context)
 
 
-def _bring_into_view(context) -> None:
+def _frame_selection(context) -> None:
     """Frame the selection in every 3D view."""
     for area in context.screen.areas:
         if area.type == "VIEW_3D":
             region = next(region for region in area.regions if region.type == "WINDOW")
-            with context.temp_override(area=area, region=region):
+            with context.temp_override(find_area=area, region=region):
                 bpy.ops.view3d.view_selected(use_all_regions=False)
 
 
@@ -180,20 +180,20 @@ class BEYOND_MOCAP_OT_go_to_moment(TimelineVerb, bpy.types.Operator):
 
     def do(self, context):
         """Select the moment and set the frame."""
-        target = timeline_subject(context)
-        strip = lanes.strip_named(target, self.strip or lanes.MOMENTS)
+        target = find_target(context)
+        strip = lanes.find_strip(target, self.strip or lanes.MOMENTS)
         markers = strip.action.pose_markers
         if not 0 <= self.index < len(markers):
             found = f"key moment {self.index} of strip {strip.name!r}"
-            raise InputError(subject_name(target), found, "one of this strip", f"it has {len(markers)}")
-        lay_strips.pick(target, strip.name, self.index)
-        context.scene.frame_set(lanes.marker_frame(strip, markers[self.index]))
+            raise InputError(describe_target(target), found, "one of this strip", f"it has {len(markers)}")
+        lay_strips.select_moment(target, strip.name, self.index)
+        context.scene.frame_set(lanes.compute_marker_frame(strip, markers[self.index]))
 
 
-STILL = 4  # pixels that the pointer may move before a click becomes a drag
+DRAG_PIXELS = 4  # pixels that the pointer may move before a click becomes a drag
 
 
-class BEYOND_MOCAP_OT_pick_moment(Verb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_pick_moment(BaseOperator, bpy.types.Operator):
     """Select the key moment whose name is under the pointer; drag it to move the moment, Esc cancels"""
 
     bl_idname = "beyond_mocap.pick_moment"
@@ -209,63 +209,63 @@ class BEYOND_MOCAP_OT_pick_moment(Verb, bpy.types.Operator):
         region = context.region
         if region is None or region.type != "WINDOW":
             return {"PASS_THROUGH"}
-        name = moment_names.hit(context, region, event.mouse_region_x, event.mouse_region_y)
+        name = moment_names.find_name_at(context, region, event.mouse_region_x, event.mouse_region_y)
         if name is None or name.target not in context.scene.objects:
             return {"PASS_THROUGH"}
         target = context.scene.objects[name.target]
-        if self.attempt(lambda: self.pick(target, name)) == {"CANCELLED"}:
+        if self.attempt(lambda: self.select_moment(target, name)) == {"CANCELLED"}:
             return {"CANCELLED"}
-        self.target, self.begun, self.frame = name.target, event.mouse_region_x, name.frame
+        self.target, self.start_x, self.frame = name.target, event.mouse_region_x, name.frame
         self.dragged = False
         context.window_manager.modal_handler_add(self)
-        moment_names.redraw()
+        moment_names.redraw_editors()
         return {"RUNNING_MODAL"}
 
-    def pick(self, target, name):
+    def select_moment(self, target, name):
         """Select the moment and store its labels."""
         lay_strips.check_editable(target)
-        lay_strips.pick(target, name.strip, name.index)
-        self.before = next((moment for moment in lanes.moments(target) if moment.selected), None)
+        lay_strips.select_moment(target, name.strip, name.index)
+        self.before = next((moment for moment in lanes.list_moments(target) if moment.is_selected), None)
         if self.before is None:
             raise InputError(target.name, "this key moment cannot be read", "labels", "rename it in the list")
 
     def modal(self, context, event):
         """Follow the pointer by whole frames until the button is released."""
         if event.type in {"ESC", "RIGHTMOUSE"} and event.value == "PRESS":
-            self.put(context, self.before.key)
+            self.write_key(context, self.before.key)
             return {"CANCELLED"}
         if event.type == "LEFTMOUSE" and event.value == "RELEASE":
             context.area.header_text_set(None)
-            word_checks.keep(context)
+            word_checks.update_problems(context)
             return {"FINISHED"}
         if event.type == "MOUSEMOVE":
-            self.dragged |= abs(event.mouse_region_x - self.begun) > STILL
+            self.dragged |= abs(event.mouse_region_x - self.start_x) > DRAG_PIXELS
             if self.dragged:
-                self.follow(context, event.mouse_region_x)
+                self.follow_pointer(context, event.mouse_region_x)
         return {"RUNNING_MODAL"}
 
-    def follow(self, context, x: float):
+    def follow_pointer(self, context, x: float):
         """Move the moment by as many frames as the pointer moved since the press."""
         view = context.region.view2d
-        way = view.region_to_view(x, 0)[0] - view.region_to_view(self.begun, 0)[0]
-        frame = self.frame + round(way)
-        clock = lanes.written_for(context.scene.objects[self.target])
-        back = frame == self.frame
-        self.put(context, self.before.key if back else replace(self.before.key, time=clock.seconds(frame)))
+        offset = view.region_to_view(x, 0)[0] - view.region_to_view(self.start_x, 0)[0]
+        frame = self.frame + round(offset)
+        clock = lanes.read_clock(context.scene.objects[self.target])
+        is_unmoved = frame == self.frame
+        self.write_key(context, self.before.key if is_unmoved else replace(self.before.key, time=clock.to_seconds(frame)))
         context.area.header_text_set(f"Frame {frame} ({frame - self.frame:+d})    Esc: Cancel")
 
-    def put(self, context, key):
+    def write_key(self, context, key):
         """Write the key moment and redraw it."""
         target = context.scene.objects[self.target]
-        now = next(moment for moment in lanes.moments(target) if moment.selected)
+        now = next(moment for moment in lanes.list_moments(target) if moment.is_selected)
         if now.key != key:
             lay_strips.change_moment(target, now.strip, now.index, key)
         if key == self.before.key:
             context.area.header_text_set(None)
-        moment_names.redraw()
+        moment_names.redraw_editors()
 
 
-class BEYOND_MOCAP_OT_add_moment(WritingVerb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_add_moment(TimelineWritingVerb, bpy.types.Operator):
     """Add a key moment at the playhead: a kick, a header, a catch, exact to half a frame"""
 
     bl_idname = "beyond_mocap.add_moment"
@@ -278,12 +278,12 @@ class BEYOND_MOCAP_OT_add_moment(WritingVerb, bpy.types.Operator):
     def draw(self, context):
         """Draw the labels and what is wrong with them."""
         self.layout.prop(self, "words")
-        draw_complaints(self.layout, context, lambda: said(self.words, 0.0))
+        draw_problems(self.layout, context, lambda: parse_labels(self.words, 0.0))
 
     def do(self, context):
-        said(self.words, 0.0)
-        target = subject_with_lanes(context)
-        lay_strips.add_moment(target, said(self.words, playhead(context, target)), subject_clock(context, target))
+        parse_labels(self.words, 0.0)
+        target = ensure_target(context)
+        lay_strips.add_moment(target, parse_labels(self.words, compute_playhead(context, target)), find_target_clock(context, target))
 
 
 class BEYOND_MOCAP_OT_move_moment(MomentVerb, bpy.types.Operator):
@@ -294,9 +294,9 @@ class BEYOND_MOCAP_OT_move_moment(MomentVerb, bpy.types.Operator):
     frames: IntProperty(name="Frames", options={"SKIP_SAVE"}, description="Frames to move by; 0: move to the playhead")
 
     def do(self, context):
-        target = timeline_subject(context)
-        moment, clock = picked(target), lanes.written_for(target)
-        time = clock.seconds(moment.frame + self.frames) if self.frames else playhead(context, target)
+        target = find_target(context)
+        moment, clock = find_selected_moment(target), lanes.read_clock(target)
+        time = clock.to_seconds(moment.frame + self.frames) if self.frames else compute_playhead(context, target)
         lay_strips.change_moment(target, moment.strip, moment.index, replace(moment.key, time=time))
 
 
@@ -307,6 +307,6 @@ class BEYOND_MOCAP_OT_delete_moment(MomentVerb, bpy.types.Operator):
     bl_label = "Delete Key Moment"
 
     def do(self, context):
-        target = timeline_subject(context)
-        moment = picked(target)
+        target = find_target(context)
+        moment = find_selected_moment(target)
         lay_strips.remove_moment(target, moment.strip, moment.index)

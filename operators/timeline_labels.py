@@ -10,17 +10,17 @@ from bpy_extras.io_utils import ExportHelper
 
 from ..beyond_mocap.annotation import format_timeline, read_timeline, swap_sides
 from ..beyond_mocap.base.errors import InputError
-from ..scene.core.settings import active_player, as_setting
+from ..scene.core.settings import find_active_player, to_setting_path
 from ..scene.library import recordings
 from ..scene.player import tracks
 from ..scene.timeline import lanes, lay_strips, strips
-from ..scene.timeline.strip_lines import said, words_of
-from ..scene.timeline.strips import active_clip, subject_clock, subject_name, subject_with_lanes, timeline_subject
-from .timeline import TimelineVerb, WritingVerb, draw_complaints, playhead, selected_spans
-from .verb import ImportVerb, Verb
+from ..scene.timeline.strip_lines import parse_labels, format_labels
+from ..scene.timeline.strips import find_active_clip, find_target_clock, describe_target, ensure_target, find_target
+from .timeline import TimelineVerb, TimelineWritingVerb, draw_problems, compute_playhead, list_selected_spans
+from .verb import ImportOperator, BaseOperator
 
 
-class BEYOND_MOCAP_OT_add_span(WritingVerb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_add_span(TimelineWritingVerb, bpy.types.Operator):
     """Add a span with labels over the preview range (P in the editor), or one second from the playhead without one"""
 
     bl_idname = "beyond_mocap.add_span"
@@ -39,25 +39,25 @@ class BEYOND_MOCAP_OT_add_span(WritingVerb, bpy.types.Operator):
     def draw(self, context):
         """Draw the labels and what is wrong with them."""
         self.layout.prop(self, "words")
-        draw_complaints(self.layout, context, lambda: said(self.words, 0.0, 1.0))
+        draw_problems(self.layout, context, lambda: parse_labels(self.words, 0.0, 1.0))
 
     def do(self, context):
-        given = round(self.start, 4), round(self.end, 4)  # Blender's numbers are not finer
-        start, end = given if self.end != self.start else self.stretch(context)
+        chosen_range = round(self.start, 4), round(self.end, 4)  # Blender's numbers are not finer
+        start, end = chosen_range if self.end != self.start else self.compute_range(context)
         if end <= start:
             raise InputError("span", f"the end {end:g} s is not after the start {start:g} s", "an end after the start")
-        span = said(self.words, start, end)
-        target = subject_with_lanes(context)
-        lay_strips.add_span(target, span, subject_clock(context, target))
+        span = parse_labels(self.words, start, end)
+        target = ensure_target(context)
+        lay_strips.add_span(target, span, find_target_clock(context, target))
 
     @staticmethod
-    def stretch(context) -> tuple[float, float]:
+    def compute_range(context) -> tuple[float, float]:
         """Compute the preview range, or a second from the playhead on."""
-        scene, there = context.scene, timeline_subject(context) or subject_with_lanes(context)
-        time = subject_clock(context, there)
+        scene, target = context.scene, find_target(context) or ensure_target(context)
+        clock = find_target_clock(context, target)
         if scene.use_preview_range:
-            return time.seconds(scene.frame_preview_start), time.seconds(scene.frame_preview_end)
-        return time.seconds(scene.frame_current), time.seconds(scene.frame_current) + 1.0
+            return clock.to_seconds(scene.frame_preview_start), clock.to_seconds(scene.frame_preview_end)
+        return clock.to_seconds(scene.frame_current), clock.to_seconds(scene.frame_current) + 1.0
 
 
 class BEYOND_MOCAP_OT_split_span(TimelineVerb, bpy.types.Operator):
@@ -67,14 +67,14 @@ class BEYOND_MOCAP_OT_split_span(TimelineVerb, bpy.types.Operator):
     bl_label = "Split Span at Playhead"
 
     def do(self, context):
-        target = timeline_subject(context)
-        time, clock = playhead(context, target), lanes.written_for(target)
-        frame = clock.whole(time)
-        there = [span for span in lanes.spans(target) if span.first < frame < span.last and not span.automatic]
-        there = [span for span in there if span.selected] or there
+        target = find_target(context)
+        time, clock = compute_playhead(context, target), lanes.read_clock(target)
+        frame = clock.to_whole_frame(time)
+        there = [span for span in lanes.list_spans(target) if span.first < frame < span.last and not span.is_automatic]
+        there = [span for span in there if span.is_selected] or there
         if not there:
             found = "no span is under the playhead"
-            raise InputError(subject_name(target), found, "one", "move the playhead into a strip")
+            raise InputError(describe_target(target), found, "one", "move the playhead into a strip")
         for placed in there:
             lay_strips.change_span(target, placed.strip, replace(placed.span, end=time))
             lay_strips.add_span(target, replace(placed.span, start=time), clock)
@@ -91,26 +91,26 @@ class BEYOND_MOCAP_OT_join_spans(TimelineVerb, bpy.types.Operator):
         if not super().poll(context):
             return False
         cls.poll_message_set("Select two or more strips of one player first")
-        chosen = [strip for _, strip in lanes.strips(timeline_subject(context)) if strip.select]
+        chosen = [strip for _, strip in lanes.iter_strips(find_target(context)) if strip.select]
         return sum(strip.action.beyond_mocap.kind != "moments" for strip in chosen) > 1
 
     def do(self, context):
         """Extend the first span and remove the others; their key moments stay."""
-        target = timeline_subject(context)
-        chosen = selected_spans(target)
+        target = find_target(context)
+        chosen = list_selected_spans(target)
         if len(chosen) < 2:
             found = "fewer than two spans are selected"
-            raise InputError(subject_name(target), found, "two or more", "select their strips")
-        inner = [moment.key for moment in lanes.moments(target) if moment.strip in {span.strip for span in chosen[1:]}]
+            raise InputError(describe_target(target), found, "two or more", "select their strips")
+        inner = [moment.key for moment in lanes.list_moments(target) if moment.strip in {span.strip for span in chosen[1:]}]
         for placed in chosen[1:]:
             lay_strips.remove_span(target, placed.strip)
         end = max(placed.span.end for placed in chosen)
         lay_strips.change_span(target, chosen[0].strip, replace(chosen[0].span, end=end))
         for key in inner:
-            lay_strips.add_moment(target, key, lanes.written_for(target))
-        words = {words_of(placed.span) for placed in chosen}
+            lay_strips.add_moment(target, key, lanes.read_clock(target))
+        words = {format_labels(placed.span) for placed in chosen}
         if len(words) > 1:
-            self.report({"WARNING"}, f"joined as '{words_of(chosen[0].span)}'")
+            self.report({"WARNING"}, f"joined as '{format_labels(chosen[0].span)}'")
 
 
 class BEYOND_MOCAP_OT_mirror_side(TimelineVerb, bpy.types.Operator):
@@ -121,20 +121,20 @@ class BEYOND_MOCAP_OT_mirror_side(TimelineVerb, bpy.types.Operator):
 
     def do(self, context):
         """Change all items whose labels have a side."""
-        target = timeline_subject(context)
-        moments = [moment for moment in lanes.moments(target) if moment.selected]
-        sided = [placed for placed in moments if _mirrored(placed.key) != placed.key]
-        spans = [placed for placed in selected_spans(target) if _mirrored(placed.span) != placed.span]
-        if not (sided or spans):
+        target = find_target(context)
+        moments = [moment for moment in lanes.list_moments(target) if moment.is_selected]
+        moments_with_side = [placed for placed in moments if _mirror_labels(placed.key) != placed.key]
+        spans = [placed for placed in list_selected_spans(target) if _mirror_labels(placed.span) != placed.span]
+        if not (moments_with_side or spans):
             found = "nothing with left or right is selected"
-            raise InputError(subject_name(target), found, "a span or key moment with a side", "select one")
-        for placed in sided:
-            lay_strips.change_moment(target, placed.strip, placed.index, _mirrored(placed.key))
+            raise InputError(describe_target(target), found, "a span or key moment with a side", "select one")
+        for placed in moments_with_side:
+            lay_strips.change_moment(target, placed.strip, placed.index, _mirror_labels(placed.key))
         for placed in spans:
-            lay_strips.change_span(target, placed.strip, _mirrored(placed.span))
+            lay_strips.change_span(target, placed.strip, _mirror_labels(placed.span))
 
 
-def _mirrored(item):
+def _mirror_labels(item):
     """Mirror the labels of a span or key moment."""
     return replace(item, words=swap_sides(item.words), avoid=swap_sides(item.avoid))
 
@@ -148,65 +148,65 @@ class BEYOND_MOCAP_OT_edit_words(TimelineVerb, bpy.types.Operator):
 
     def invoke(self, context, _event):
         """Open the dialog with the present labels."""
-        if self.attempt(lambda: self.load(context)) == {"CANCELLED"}:
+        if self.attempt(lambda: self.load_labels(context)) == {"CANCELLED"}:
             return {"CANCELLED"}
         return context.window_manager.invoke_props_dialog(self, width=480)
 
-    def load(self, context):
+    def load_labels(self, context):
         """Load the present labels."""
-        placed = chosen(timeline_subject(context))
-        self.words = words_of(placed.key if isinstance(placed, lanes.PlacedMoment) else placed.span)
+        placed = find_selected_item(find_target(context))
+        self.words = format_labels(placed.key if isinstance(placed, lanes.PlacedMoment) else placed.span)
 
     def draw(self, context):
         """Draw the labels and what is wrong with them."""
         self.layout.prop(self, "words", text="")
-        draw_complaints(self.layout, context, lambda: _said(self.words, chosen(timeline_subject(context))))
+        draw_problems(self.layout, context, lambda: _parse_item(self.words, find_selected_item(find_target(context))))
 
     def do(self, context):
-        target = timeline_subject(context)
-        placed = chosen(target)
-        item = _said(self.words, placed)
+        target = find_target(context)
+        placed = find_selected_item(target)
+        item = _parse_item(self.words, placed)
         if isinstance(placed, lanes.PlacedMoment):
             lay_strips.change_moment(target, placed.strip, placed.index, item)
         else:
             lay_strips.change_span(target, placed.strip, item)
 
 
-def chosen(target: bpy.types.Object):
+def find_selected_item(target: bpy.types.Object):
     """Find the selected key moment, else the selected span. Raises InputError unless there is exactly one."""
-    moments = [moment for moment in lanes.moments(target) if moment.selected]
-    spans = selected_spans(target)
+    moments = [moment for moment in lanes.list_moments(target) if moment.is_selected]
+    spans = list_selected_spans(target)
     if moments:
         return moments[0]
     if len(spans) != 1:
         found = f"no key moment and {len(spans)} spans are selected"
-        raise InputError(subject_name(target), found, "one of them", "click the name of a key moment, or one strip")
+        raise InputError(describe_target(target), found, "one of them", "click the name of a key moment, or one strip")
     return spans[0]
 
 
-def _said(words: str, placed):
+def _parse_item(words: str, placed):
     if isinstance(placed, lanes.PlacedMoment):
-        return said(words, placed.time)
-    return said(words, placed.span.start, placed.span.end)
+        return parse_labels(words, placed.time)
+    return parse_labels(words, placed.span.start, placed.span.end)
 
 
-class BEYOND_MOCAP_OT_read_words(Verb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_read_words(BaseOperator, bpy.types.Operator):
     """Replace the active player's strips and key moments by the labels of the text or file chosen in step 2"""
 
     bl_idname = "beyond_mocap.read_words"
     bl_label = "Read Labels"
     needs = ("Import tracking, and choose a file or text with labels in step 2 first",
-             lambda context: (player := active_player(context.scene.beyond_mocap)) is not None
+             lambda context: (player := find_active_player(context.scene.beyond_mocap)) is not None
              and (player.annotation_text is not None or bool(player.annotation_file)))
 
     def do(self, context):
         """Read all labels, then write the strips."""
         settings = context.scene.beyond_mocap
-        player = active_player(settings)
-        timeline = strips.written_words(player, settings.rate, tracks.read_track(settings, player))
-        strips.write(context, player, timeline)
-        told = f"{player.name}: {len(timeline.spans)} spans and {len(timeline.keys)} key moments"
-        self.report({"INFO"}, f"{told} from {strips.written_in(player)}")
+        player = find_active_player(settings)
+        timeline = strips.read_written_labels(player, settings.rate, tracks.read_track(settings, player))
+        strips.write_player_timeline(context, player, timeline)
+        summary = f"{player.name}: {len(timeline.spans)} spans and {len(timeline.keys)} key moments"
+        self.report({"INFO"}, f"{summary} from {strips.describe_label_source(player)}")
 
 
 class BEYOND_MOCAP_OT_words_to_text(TimelineVerb, bpy.types.Operator):
@@ -217,12 +217,12 @@ class BEYOND_MOCAP_OT_words_to_text(TimelineVerb, bpy.types.Operator):
 
     def do(self, context):
         """Write to the player's text, or to a new one."""
-        target = timeline_subject(context)
-        words = format_timeline(lanes.read(target, subject_name(target)))
-        player = None if active_clip(context) else active_player(context.scene.beyond_mocap)
+        target = find_target(context)
+        words = format_timeline(lanes.read_timeline(target, describe_target(target)))
+        player = None if find_active_clip(context) else find_active_player(context.scene.beyond_mocap)
         text = player.annotation_text if player else None
         if text is None or text.library is not None:
-            text = bpy.data.texts.new(f"{subject_name(target)} labels")
+            text = bpy.data.texts.new(f"{describe_target(target)} labels")
         text.clear()
         text.write(words)
         if player:
@@ -242,14 +242,14 @@ class BEYOND_MOCAP_OT_export_words(TimelineVerb, ExportHelper, bpy.types.Operato
     def do(self, context):
         if not self.filepath:
             raise InputError("export", "no file is chosen", "a file to write", "choose one")
-        target = timeline_subject(context)
-        words = format_timeline(lanes.read(target, subject_name(target)))
+        target = find_target(context)
+        words = format_timeline(lanes.read_timeline(target, describe_target(target)))
         with open(bpy.path.abspath(self.filepath), "w", encoding="utf-8", newline="\n") as file:
             file.write(words)
         self.report({"INFO"}, f"{words.count(chr(10))} lines in {self.filepath}")
 
 
-class BEYOND_MOCAP_OT_import_words(ImportVerb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_import_words(ImportOperator, bpy.types.Operator):
     """Import a text file of labels ('START END labels', 'TIME labels') in place of the strips of the active player, or
 of the library clip whose armature is active"""
 
@@ -259,24 +259,24 @@ of the library clip whose armature is active"""
     filename_ext = ".txt"
     filter_glob: StringProperty(default="*.txt", options={"HIDDEN"})
     needs = ("Import tracking first: labels belong to a player",
-             lambda context: bool(recordings.shown_clip(context.object))
-             or active_player(context.scene.beyond_mocap) is not None)
+             lambda context: bool(recordings.find_shown_clip(context.object))
+             or find_active_player(context.scene.beyond_mocap) is not None)
 
     def do(self, context):
         """Read the file, then write the strips."""
-        path = self.chosen_one("one text file of labels")
+        path = self.find_chosen_file("one text file of labels")
         settings, rig = context.scene.beyond_mocap, context.object
-        if recordings.shown_clip(rig):
-            motion, _ = recordings.read_recording(settings, recordings.shown_clip(rig), rig[recordings.FOLDER])
-            timeline, whose = read_timeline(path, motion.fps), rig.name
-            recordings.lay_words(rig, context.scene, motion, timeline)
+        if recordings.find_shown_clip(rig):
+            motion, _ = recordings.read_recording(settings, recordings.find_shown_clip(rig), rig[recordings.FOLDER])
+            timeline, owner = read_timeline(path, motion.fps), rig.name
+            recordings.write_labels(rig, context.scene, motion, timeline)
         else:
-            player = active_player(settings)
+            player = find_active_player(settings)
             start = float(tracks.read_track(settings, player).times[0])
-            timeline, whose = read_timeline(path, settings.rate, start), player.name
-            strips.write(context, player, timeline)
-            player.annotation_file = as_setting(str(path))
-        self.report({"INFO"}, f"{whose}: {len(timeline.spans)} spans and {len(timeline.keys)} key moments")
+            timeline, owner = read_timeline(path, settings.rate, start), player.name
+            strips.write_player_timeline(context, player, timeline)
+            player.annotation_file = to_setting_path(str(path))
+        self.report({"INFO"}, f"{owner}: {len(timeline.spans)} spans and {len(timeline.keys)} key moments")
 
 
 class BEYOND_MOCAP_FH_words(bpy.types.FileHandler):

@@ -6,17 +6,17 @@ import bpy
 import numpy as np
 
 from ..beyond_mocap.base.errors import InputError
-from ..beyond_mocap.motion.track.drawn import FASTEST
+from ..beyond_mocap.motion.track.drawn import MAX_SPEED
 from ..scene.core import channels, window
 from ..scene.core.measure import units_per_metre
-from ..scene.core.settings import active_player, is_track
+from ..scene.core.settings import find_active_player, is_track
 from ..scene.player import dots, drawn_track, pins
 from ..scene.result import bake
-from .player import free_name, shirt_for
-from .verb import Verb
+from .player import find_free_name, choose_shirt
+from .verb import BaseOperator
 
 
-class BEYOND_MOCAP_OT_draw_track(Verb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_draw_track(BaseOperator, bpy.types.Operator):
     """Add a player whose track is a curve from the 3D cursor. Set the speed of each point with Set Speed, or its Radius
 in the Item tab (Alt-S); the player waits at points of speed 0"""
 
@@ -27,25 +27,25 @@ in the Item tab (Alt-S); the player waits at points of speed 0"""
     def do(self, context):
         scene = context.scene
         channels.check_local(scene)
-        name = free_name("Drawn", {player.name for player in scene.beyond_mocap.players})
-        drawn = drawn_track.create(context, f"{name} curve", context.collection)
-        add_player(context, drawn, name)
+        name = find_free_name("Drawn", {player.name for player in scene.beyond_mocap.players})
+        drawn = drawn_track.create_curve(context, f"{name} curve", context.collection)
+        add_drawn_player(context, drawn, name)
         window.select_only(context, drawn)
         self.report({"INFO"}, f"{name}: edit the curve (Tab), set the speeds of its points, then press Synthesize")
 
 
-def add_player(context, drawn: bpy.types.Object, name: str):
+def add_drawn_player(context, drawn: bpy.types.Object, name: str):
     """Add a player who follows `drawn` to the list, with a dot in the scene."""
     settings = context.scene.beyond_mocap
     player = settings.players.add()
     player.name, player.drawn_track = name, drawn
-    player.shirt = shirt_for(len(settings.players) - 1)
+    player.shirt = choose_shirt(len(settings.players) - 1)
     settings.active_player = len(settings.players) - 1
-    dots.ensure(context, player)
+    dots.ensure_dot(context, player)
     return player
 
 
-class BEYOND_MOCAP_OT_track_object(Verb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_track_object(BaseOperator, bpy.types.Operator):
     """Use the active object as a track of a new or the active player: a curve with speeds at its points, or any object
 that moves by keys or constraints (an Empty, a mesh, another armature's hips)"""
 
@@ -61,41 +61,41 @@ that moves by keys or constraints (an Empty, a mesh, another armature's hips)"""
         """Read the track first, so that errors are reported, then use it."""
         scene, chosen = context.scene, context.object
         channels.check_local(scene)
-        player = active_player(scene.beyond_mocap)
+        player = find_active_player(scene.beyond_mocap)
         if self.for_active and player is None:
             raise InputError("players", "no player in the list", "a player", "switch Active Player off to add one")
-        track = drawn_track.read(scene, chosen)
+        track = drawn_track.read_drawn_track(scene, chosen)
         if self.for_active:
             player.drawn_track = chosen
         else:
             names = {player.name for player in scene.beyond_mocap.players}
-            player = add_player(context, chosen, free_name(chosen.name, names))
+            player = add_drawn_player(context, chosen, find_free_name(chosen.name, names))
         seconds = track.times[-1] - track.times[0]
         self.report({"INFO"}, f"{player.name}: {seconds:.1f} s along {chosen.name}")
 
 
-class BEYOND_MOCAP_OT_set_speed(Verb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_set_speed(BaseOperator, bpy.types.Operator):
     """Set the speed in metres per second at the selected points of the active curve, outside edit mode at all points.
 The player waits at points of speed 0. Radius stores the speed, Weight the wait"""
 
     bl_idname = "beyond_mocap.set_speed"
     bl_label = "Set Speed"
-    speed: bpy.props.FloatProperty(name="Speed", default=3.0, min=0.0, max=FASTEST, precision=2,
+    speed: bpy.props.FloatProperty(name="Speed", default=3.0, min=0.0, max=MAX_SPEED, precision=2,
                                    description="Metres per second; 0 for a stop")
     wait: bpy.props.FloatProperty(name="Wait", default=1.0, min=0.01, max=60.0, precision=2, unit="TIME_ABSOLUTE",
                                   description="Seconds of waiting at a stop")
     needs = "Choose a drawn curve first", lambda context: context.object is not None and context.object.type == "CURVE"
 
     def invoke(self, context, _event):
-        points = chosen(context.object)
+        points = list_selected_points(context.object)
         if points:
-            self.speed, self.wait = min(points[0].radius, FASTEST), points[0].weight_softbody
+            self.speed, self.wait = min(points[0].radius, MAX_SPEED), points[0].weight_softbody
         return context.window_manager.invoke_props_dialog(self)
 
     def do(self, context):
         drawn = context.object
         channels.check_local(drawn, drawn.data)
-        points = chosen(drawn)
+        points = list_selected_points(drawn)
         if not points:
             raise InputError(f"curve {drawn.name}", "no point selected", "one or more", "select points in edit mode")
         drawn_track.set_speed(points, self.speed, self.wait)
@@ -103,15 +103,15 @@ The player waits at points of speed 0. Radius stores the speed, Weight the wait"
         self.report({"INFO"}, f"Points set: {len(points)}")
 
 
-def chosen(drawn: bpy.types.Object) -> list:
+def list_selected_points(drawn: bpy.types.Object) -> list:
     """List the selected control points of a curve in edit mode, all of them otherwise."""
-    points = [point for spline in drawn.data.splines for point in drawn_track.points_of(spline)]
+    points = [point for spline in drawn.data.splines for point in drawn_track.list_points(spline)]
     if drawn.mode != "EDIT":
         return points
     return [point for point in points if getattr(point, "select_control_point", getattr(point, "select", False))]
 
 
-class BEYOND_MOCAP_OT_add_pin(Verb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_add_pin(BaseOperator, bpy.types.Operator):
     """Add an Empty at which a hand, a foot or the gaze of the active player has to be on the current frame. Move it
 with G; set time and hold in the list of pins"""
 
@@ -125,36 +125,36 @@ with G; set time and hold in the list of pins"""
     hold: bpy.props.FloatProperty(name="Hold", default=0.0, min=0.0, precision=2, unit="TIME_ABSOLUTE",
                                   description="Seconds for which the part stays there")
     needs = ("Import tracking or draw a track in step 2 first",
-             lambda context: active_player(context.scene.beyond_mocap) is not None,
+             lambda context: find_active_player(context.scene.beyond_mocap) is not None,
              "Leave edit mode first (Tab)", lambda context: context.mode == "OBJECT")
 
     def do(self, context):
         """Find the position, check for another pin of the part at that time, add the pin."""
         scene, part = context.scene, self.part.replace("_", " ")
         channels.check_local(scene)
-        player, seconds = active_player(scene.beyond_mocap), pins.second_now(scene)
+        player, seconds = find_active_player(scene.beyond_mocap), pins.find_current_second(scene)
         for other in player.pins:
             if other.part == self.part and other.time <= seconds + self.hold and seconds <= other.time + other.hold:
                 found, step = f"a pin of {part} at {other.time:.2f} s", "go to another frame or move that pin"
                 raise InputError(f"player {player.name}", found, "one position at a time", step)
         if self.at == "BODY":
-            place = pins.body_place(context, player, self.part)
+            place = pins.find_part_position(context, player, self.part)
         else:
             place = np.array(scene.cursor.location) / units_per_metre(scene)
-        pins.add(context, player, self.part, seconds=seconds, hold=self.hold, place=place, room=bake.collection(scene))
+        pins.add_pin(context, player, self.part, seconds=seconds, hold=self.hold, place=place, collection=bake.find_or_create_collection(scene))
         self.report({"INFO"}, f"{player.name}: {part} pinned at {seconds:.2f} s; move it with G, then press Update")
 
 
-class BEYOND_MOCAP_OT_remove_pin(Verb, bpy.types.Operator):
+class BEYOND_MOCAP_OT_remove_pin(BaseOperator, bpy.types.Operator):
     """Remove the active pin in the list with its Empty"""
 
     bl_idname = "beyond_mocap.remove_pin"
     bl_label = "Remove Pin"
     needs = ("The active player has no pins",
-             lambda context: (player := active_player(context.scene.beyond_mocap)) is not None and len(player.pins) > 0)
+             lambda context: (player := find_active_player(context.scene.beyond_mocap)) is not None and len(player.pins) > 0)
 
     def do(self, context):
         """Remove the pin and choose the next one."""
         channels.check_local(context.scene)
-        player = active_player(context.scene.beyond_mocap)
-        pins.remove(player, min(player.active_pin, len(player.pins) - 1))
+        player = find_active_player(context.scene.beyond_mocap)
+        pins.remove_pin(player, min(player.active_pin, len(player.pins) - 1))

@@ -16,51 +16,51 @@ from bpy.props import StringProperty
 from ..beyond_mocap.annotation import Timeline
 from ..beyond_mocap.base.errors import BeyondMocapError, InputError
 from ..scene.core import background, session
-from ..scene.core.window import start_clock, stop_clock
+from ..scene.core.window import start_timer, stop_timer
 from ..scene.player import dots
 from ..scene.result import freshness, orders, plans, preview, quality, queue
 from ..scene.timeline import strips
-from .library import summary
-from .verb import NEEDS_LIBRARY, Verb
+from .library import describe_library
+from .verb import NEEDS_LIBRARY, BaseOperator
 
 
-def written(context, player, order, result) -> None:
+def store_result(context, player, order, result) -> None:
     """Store the takes of a result in the session, show the first of them, and update what depends on it."""
-    session.keep_library(result.library, order.unit)
-    context.scene.beyond_mocap.library_holds = summary(result.library)
-    shown = []
+    session.store_library(result.library, order.unit)
+    context.scene.beyond_mocap.library_holds = describe_library(result.library)
+    stored = []
     for one in result.takes:
-        lines = {"quality": quality.quality_lines(one.report),
-                 "moments": quality.moment_lines(one.report),
-                 "warnings": quality.warning_lines(one.report, order.warnings, result.library.notes),
+        lines = {"quality": quality.describe_quality(one.report),
+                 "moments": quality.describe_moments(one.report),
+                 "warnings": quality.list_warnings(one.report, order.warnings, result.library.notes),
                  "recipe": json.dumps(one.recipe),
                  "made_of": json.dumps(result.made_of)}
-        shown.append((session.keep_take(one.plan, one.take, one.report), lines))
-    preview.show(context, player, *shown[0])
+        stored.append((session.store_take(one.plan, one.take, one.report), lines))
+    preview.show_preview(context, player, *stored[0])
     if player.drawn_track is not None:
-        dots.renew(context, player)
-    preview.keep_variants(player, [(name, lines, one.report) for (name, lines), one in zip(shown, result.takes)])
-    freshness.dirty()
-    show_automatic(context, player)
+        dots.update_dot_track(context, player)
+    preview.store_variants(player, [(name, lines, one.report) for (name, lines), one in zip(stored, result.takes)])
+    freshness.mark_dirty()
+    update_automatic_strips(context, player)
 
 
-def show_automatic(context, player) -> None:
+def update_automatic_strips(context, player) -> None:
     """Update the player's automatic strips from its take.
 
     A player without strips, whose labels are in a text or a file, gets none, since strips would override them.
     """
-    made = session.made(player.take)
-    if strips.read(player, context.scene) is not None and (made is not None or not player.take):
-        strips.set_automatic(context, player, made.take.timeline if made is not None else Timeline())
+    stored = session.find_take(player.take)
+    if strips.read_player_timeline(player, context.scene) is not None and (stored is not None or not player.take):
+        strips.show_automatic_spans(context, player, stored.take.timeline if stored is not None else Timeline())
 
 
 KIND = "synthesis"
-BETWEEN = 0.2  # seconds between two redraws of the progress
-TRIES = 3  # how often a player whose settings keep changing is started again
-HOLDING = ("TRANSFORM_OT", "PAINT_OT", "SCULPT_OT", "POSE_OT", "VIEW3D_OT_select", "MESH_OT", "ARMATURE_OT")
+REDRAW_INTERVAL = 0.2  # seconds between two redraws of the progress
+MAX_TRIES = 3  # how often a player whose settings keep changing is started again
+DRAG_OPERATORS = ("TRANSFORM_OT", "PAINT_OT", "SCULPT_OT", "POSE_OT", "VIEW3D_OT_select", "MESH_OT", "ARMATURE_OT")
 
 
-class TurnsVerb(Verb):
+class TakeOperator(BaseOperator):
     """Base of operators that generate takes. `list_requests(context)`: pairs of a player and the mode of its request.
     """
 
@@ -69,21 +69,21 @@ class TurnsVerb(Verb):
     needs = (*NEEDS_LIBRARY, "Import tracking and select a player in step 2 first",
              lambda context: any(player.use for player in context.scene.beyond_mocap.players))
 
-    def wanted(self, context):
+    def list_requests(self, context):
         """List the named player, or every selected one."""
         settings = context.scene.beyond_mocap
         if self.player and self.player not in settings.players:
             raise InputError("player", self.player, "a name in the list", "see step 2")
-        players = [settings.players[self.player]] if self.player else plans.chosen(settings)
-        return [(player, orders.How(self.kind)) for player in players]
+        players = [settings.players[self.player]] if self.player else plans.list_selected_players(settings)
+        return [(player, orders.SynthesisMode(self.kind)) for player in players]
 
-    def entries(self, context) -> list[queue.Entry]:
+    def build_entries(self, context) -> list[queue.QueueEntry]:
         """Build the requests as queue entries."""
         settings = context.scene.beyond_mocap
         found = []
-        for player, how in self.wanted(context):
-            order = orders.order_of(settings, player, how)
-            found.append(queue.Entry(context.scene.session_uid, player.name, how, order, order.fingerprint))
+        for player, how in self.list_requests(context):
+            order = orders.build_request(settings, player, how)
+            found.append(queue.QueueEntry(context.scene.session_uid, player.name, how, order, order.fingerprint))
         return found
 
     def do(self, context):
@@ -91,41 +91,41 @@ class TurnsVerb(Verb):
         window = context.window_manager
         window.progress_begin(0, 100)
         try:
-            entries = self.entries(context)
-            made = []
+            entries = self.build_entries(context)
+            results = []
             for number, entry in enumerate(entries):
-                def tell(done, text, number=number):
+                def on_progress(done, text, number=number):
                     window.progress_update(int(100 * (number + done) / len(entries)))
 
-                library = made[0].library if made else _library(entry)
-                made.append(orders.work(entry.order, library, tell, lambda: False, lambda: False))
+                library = results[0].library if results else _find_library(entry)
+                results.append(orders.process_request(entry.request, library, on_progress, lambda: False, lambda: False))
         finally:
             window.progress_end()
-        for entry, result in zip(entries, made):
-            written(context, context.scene.beyond_mocap.players[entry.player], entry.order, result)
+        for entry, result in zip(entries, results):
+            store_result(context, context.scene.beyond_mocap.players[entry.player], entry.request, result)
         players = [context.scene.beyond_mocap.players[entry.player] for entry in entries]
         names = ", ".join(player.name for player in players)
-        self.report({"INFO"}, f"Generated: {names}{_kept(players)}; press Apply or Revert")
+        self.report({"INFO"}, f"Generated: {names}{_describe_kept_keys(players)}; press Apply or Revert")
 
     def invoke(self, context, event):
         """Queue the players, and process the queue if no other operator does."""
         if bpy.app.background:
             return self.execute(context)
         try:
-            entries = self.entries(context)
+            entries = self.build_entries(context)
         except (BeyondMocapError, OSError) as error:
             return self.failed(str(error))
         for entry in entries:
-            queue.add(entry)
+            queue.add_entry(entry)
         running = context.window_manager.beyond_mocap_work
-        if queue.worked():
-            running.waiting = "\n".join(queue.names())
-            self.report({"INFO"}, f"Waiting: {', '.join(queue.names())}")
+        if queue.is_busy():
+            running.waiting = "\n".join(queue.list_players())
+            self.report({"INFO"}, f"Waiting: {', '.join(queue.list_players())}")
             return {"CANCELLED"}  # nothing has changed yet, so no undo step
-        queue.work(True)
-        self.entry, self.job, self.told, self.wrote = None, None, [], 0
+        queue.set_busy(True)
+        self.entry, self.job, self.messages, self.stored_count = None, None, [], 0
         self.seen, self.drawn = None, 0.0
-        self.clock = start_clock(context)
+        self.clock = start_timer(context)
         context.window_manager.modal_handler_add(self)
         self.show(context, "Starting")
         return {"RUNNING_MODAL"}
@@ -133,185 +133,185 @@ class TurnsVerb(Verb):
     def modal(self, context, event):
         """Poll; after any error the queue is free again for the next operator."""
         try:
-            return self.turn(context, event)
+            return self.handle_event(context, event)
         except Exception:
             self.cancel(context)
             raise
 
-    def turn(self, context, event):
+    def handle_event(self, context, event):
         """Poll, pass on all other events, store what has arrived and start the next."""
         if event.type == "ESC" and event.value == "PRESS":
-            queue.clear()
+            queue.clear_queue()
             if self.job is not None:
                 self.job.cancel()
         elif event.type != "TIMER":
             return {"PASS_THROUGH"}
-        if self.job is not None and not self.job.poll() and not self.job.ended and not self.job.stale:
+        if self.job is not None and not self.job.poll() and not self.job.is_ended and not self.job.is_stale:
             self.show(context, self.job.text)
             return {"RUNNING_MODAL"}
-        if self.job is not None and not self.arrived(context):
+        if self.job is not None and not self.store_arrived(context):
             return {"RUNNING_MODAL"}
-        self.next(context)
+        self.start_next(context)
         if self.job is not None:
             return {"RUNNING_MODAL"}
-        return self.over(context)
+        return self.finish(context)
 
-    def next(self, context):
+    def start_next(self, context):
         """Start the next waiting request that is still valid."""
         self.job = None
-        while self.job is None and (entry := queue.take()) is not None:
+        while self.job is None and (entry := queue.pop_entry()) is not None:
             self.last = False
-            scene = _scene(entry)
-            player = _found(scene, entry) if scene is not None else None
+            scene = _find_scene(entry)
+            player = _find_player(scene, entry) if scene is not None else None
             if player is None:
-                self.tell(f"{entry.player} is no longer in the list and was skipped")
+                self.add_message(f"{entry.player} is no longer in the list and was skipped")
                 continue
             try:
-                entry.order = orders.order_of(scene.beyond_mocap, player, entry.how)
+                entry.request = orders.build_request(scene.beyond_mocap, player, entry.mode)
             except (BeyondMocapError, OSError) as error:
-                self.tell(f"{entry.player}: {error}", "ERROR")
+                self.add_message(f"{entry.player}: {error}", "ERROR")
                 continue
-            entry.player, entry.fingerprint = player.name, entry.order.fingerprint
-            self.entry, order, library = entry, entry.order, _library(entry)
-            self.job = background.Job(KIND, lambda *asking: orders.work(order, library, *asking), keeps=True)
+            entry.player, entry.fingerprint = player.name, entry.request.fingerprint
+            self.entry, order, library = entry, entry.request, _find_library(entry)
+            self.job = background.Job(KIND, lambda *asking: orders.process_request(order, library, *asking), can_end_early=True)
             self.show(context, "Starting")
 
-    def arrived(self, context) -> bool:
+    def store_arrived(self, context) -> bool:
         """Store the thread's result; False if that has to wait."""
         job, entry, self.last = self.job, self.entry, False
-        if background.cancelled(job):
-            self.tell(f"{entry.player}: cancelled, nothing has changed")
+        if background.is_cancelled(job):
+            self.add_message(f"{entry.player}: cancelled, nothing has changed")
             return True
         if job.error is not None:
             if not isinstance(job.error, (BeyondMocapError, OSError)):
                 raise job.error
-            self.tell(str(job.error), "ERROR")
+            self.add_message(str(job.error), "ERROR")
             return True
-        scene = _scene(entry)
+        scene = _find_scene(entry)
         if scene is None:
-            self.tell(f"{entry.player}: the scene was removed, the take is discarded")
+            self.add_message(f"{entry.player}: the scene was removed, the take is discarded")
             return True
         window = next((window for window in context.window_manager.windows if window.scene == scene), None)
-        if window is None or _holds(context):
+        if window is None or _is_user_dragging(context):
             self.show(context, f"Ready; waits for scene {scene.name}" if window is None else "Finish the transform")
             return False
-        player = _asking(scene, entry)
+        player = _find_matching_player(scene, entry)
         if player is None:
-            self.again(scene)
+            self.requeue(scene)
             return True
-        if job.ending:
-            queue.clear()
+        if job.is_ending:
+            queue.clear_queue()
         with context.temp_override(window=window):
-            ok = self.attempt(lambda: written(bpy.context, player, entry.order, job.result)) == {"FINISHED"}
-            if ok and queue.names():  # the last one's undo step is the operator's own
+            ok = self.attempt(lambda: store_result(bpy.context, player, entry.request, job.result)) == {"FINISHED"}
+            if ok and queue.list_players():  # the last one's undo step is the operator's own
                 bpy.ops.ed.undo_push(message=f"{self.bl_label} {player.name}")
-        self.wrote += ok
+        self.stored_count += ok
         self.last = ok
         if ok:
-            self.tell(f"{player.name}: generated{_kept([player])}; press Apply or Revert")
+            self.add_message(f"{player.name}: generated{_describe_kept_keys([player])}; press Apply or Revert")
         return True
 
     last = False  # whether the newest result was stored and has no undo step yet
 
-    def again(self, scene):
+    def requeue(self, scene):
         """Queue a player again whose request has changed, or discard the take."""
         entry = self.entry
-        player = _found(scene, entry)
+        player = _find_player(scene, entry)
         if player is None:
-            self.tell(f"{entry.player} is no longer in the list; the take is discarded")
-        elif entry.tries >= TRIES:
-            self.tell(f"{entry.player} keeps changing; the take is discarded, press {self.bl_label} again", "WARNING")
+            self.add_message(f"{entry.player} is no longer in the list; the take is discarded")
+        elif entry.tries >= MAX_TRIES:
+            self.add_message(f"{entry.player} keeps changing; the take is discarded, press {self.bl_label} again", "WARNING")
         else:
-            self.tell(f"{entry.player} has changed and is generated again")
-            queue.add(queue.Entry(entry.scene, player.name, entry.how, order=None, fingerprint="",
+            self.add_message(f"{entry.player} has changed and is generated again")
+            queue.add_entry(queue.QueueEntry(entry.scene, player.name, entry.mode, request=None, fingerprint="",
                                   tries=entry.tries + 1))
 
-    def over(self, context):
+    def finish(self, context):
         """Finish when the queue is empty."""
-        self.close(context)
-        for kind, text in self.told:
+        self.close_progress(context)
+        for kind, text in self.messages:
             self.report({kind}, text)
-        if self.wrote > 1:
-            self.report({"INFO"}, f"Players generated: {self.wrote}; press Apply or Revert")
+        if self.stored_count > 1:
+            self.report({"INFO"}, f"Players generated: {self.stored_count}; press Apply or Revert")
         return {"FINISHED"} if self.last else {"CANCELLED"}
 
-    def tell(self, text, kind="INFO"):
+    def add_message(self, text, kind="INFO"):
         """Store a message for the end: Blender shows a modal operator's reports only then."""
-        self.told.append((kind, text))
+        self.messages.append((kind, text))
 
     def cancel(self, context):
         """Stop when Blender ends the operator (a file is loaded, the window closes); the running job is discarded."""
-        queue.clear()
+        queue.clear_queue()
         if self.job is not None:
             self.job.cancel()
-        self.close(context)
+        self.close_progress(context)
 
     def show(self, context, text):
         """Show progress in the status bar, at the pointer and in the panel."""
         running, fraction = context.window_manager.beyond_mocap_work, self.job.fraction if self.job else 0.0
         name = self.entry.player if self.entry else ""
         running.kind, running.fraction, running.text = KIND, fraction, f"{name}: {text}" if name else text
-        running.waiting = "\n".join(queue.names())
-        running.ending = self.job is not None and self.job.ending
+        running.waiting = "\n".join(queue.list_players())
+        running.ending = self.job is not None and self.job.is_ending
         seen = (running.text, int(100 * fraction), running.waiting, running.ending)
-        if seen == self.seen or perf_counter() < self.drawn + BETWEEN:
+        if seen == self.seen or perf_counter() < self.drawn + REDRAW_INTERVAL:
             return
         self.seen, self.drawn = seen, perf_counter()
         context.window_manager.progress_update(int(100 * fraction))
-        waiting = f"   then {', '.join(queue.names())}" if queue.names() else ""
+        waiting = f"   then {', '.join(queue.list_players())}" if queue.list_players() else ""
         if context.workspace is not None:
             context.workspace.status_text_set(f"{running.text}   {fraction:.0%}{waiting}   ESC: cancel")
-        _redraw(context)
+        _redraw_sidebars(context)
 
-    def close(self, context):
+    def close_progress(self, context):
         """Remove progress display and timer."""
         running = context.window_manager.beyond_mocap_work
-        queue.work(False)
+        queue.set_busy(False)
         running.kind = running.waiting = ""
-        stop_clock(context, self.clock)
-        _redraw(context)
+        stop_timer(context, self.clock)
+        _redraw_sidebars(context)
 
 
-def _kept(players) -> str:
+def _describe_kept_keys(players) -> str:
     """Describe how many hand-made keys these players' results have kept."""
     count = sum(player.result.hand_keys for player in players)
     return f", {count} hand-made {'key' if count == 1 else 'keys'} kept" if count else ""
 
 
-def _library(entry: queue.Entry):
-    return session.library(entry.order.folder, entry.order.unit)
+def _find_library(entry: queue.QueueEntry):
+    return session.find_library(entry.request.folder, entry.request.unit)
 
 
-def _scene(entry: queue.Entry):
+def _find_scene(entry: queue.QueueEntry):
     return next((scene for scene in bpy.data.scenes if scene.session_uid == entry.scene), None)
 
 
-def _found(scene, entry: queue.Entry):
+def _find_player(scene, entry: queue.QueueEntry):
     """Find the player of an entry, under its new name if it was renamed; None where it was removed."""
     players = scene.beyond_mocap.players
-    return players[entry.player] if entry.player in players else _asking(scene, entry)
+    return players[entry.player] if entry.player in players else _find_matching_player(scene, entry)
 
 
-def _asking(scene, entry: queue.Entry):
+def _find_matching_player(scene, entry: queue.QueueEntry):
     """Find the player whose request equals the entry's; None where there is none."""
-    players, busy = scene.beyond_mocap.players, queue.names()
+    players, busy = scene.beyond_mocap.players, queue.list_players()
     named = players.get(entry.player)
     for player in [named] if named is not None else [player for player in players if player.name not in busy]:
         try:
-            if orders.order_of(scene.beyond_mocap, player, entry.how, still=True).fingerprint == entry.fingerprint:
+            if orders.build_request(scene.beyond_mocap, player, entry.mode, still=True).fingerprint == entry.fingerprint:
                 return player
         except (BeyondMocapError, OSError):
             continue
     return None
 
 
-def _holds(context) -> bool:
+def _is_user_dragging(context) -> bool:
     """Whether the user is moving, painting or selecting something."""
     running = [operator.bl_idname for window in context.window_manager.windows for operator in window.modal_operators]
-    return any(name.startswith(HOLDING) for name in running)
+    return any(name.startswith(DRAG_OPERATORS) for name in running)
 
 
-def _redraw(context) -> None:
+def _redraw_sidebars(context) -> None:
     """Redraw the sidebars of all 3D views."""
     for window in context.window_manager.windows:
         for area in window.screen.areas:

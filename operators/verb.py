@@ -18,7 +18,7 @@ NEEDS_LIBRARY = ("Choose the library's folder first",
 NEEDS_NO_EDITING = "Leave edit mode first (Tab)", lambda context: context.mode in {"OBJECT", "POSE"}
 
 
-class Verb:
+class BaseOperator:
     """An operator whose `do(context)` does the work; an error in it is reported and leaves the scene unchanged.
 
     `do` reads and computes first and changes the scene last, so that a failing step leaves the scene as it was.
@@ -62,7 +62,7 @@ class Verb:
         return {"CANCELLED"}
 
 
-class ImportVerb(Verb, ImportHelper):
+class ImportOperator(BaseOperator, ImportHelper):
     """An operator that reads files: chosen in the file browser, dropped into a view, or set by a script."""
 
     bl_options = {"REGISTER", "UNDO", "PRESET"}
@@ -75,22 +75,22 @@ class ImportVerb(Verb, ImportHelper):
             return self.execute(context)
         return ImportHelper.invoke(self, context, event)
 
-    def chosen(self) -> list[Path]:
+    def list_chosen_files(self) -> list[Path]:
         """List the chosen files; without any, the path in the file browser's name field, if there is one."""
         names = [file.name for file in self.files if file.name]
         if names:
             return [Path(self.directory or Path(self.filepath).parent, name) for name in names]
         return [Path(bpy.path.abspath(self.filepath))] if self.filepath else []
 
-    def chosen_one(self, expected: str) -> Path:
+    def find_chosen_file(self, expected: str) -> Path:
         """Return the one chosen file; InputError if there are none or several."""
-        chosen = self.chosen()
+        chosen = self.list_chosen_files()
         if len(chosen) != 1:
             raise InputError("import", f"{len(chosen)} files" if chosen else "no file given", expected)
         return chosen[0]
 
 
-class DroppedIntoView:
+class ViewDropHandler:
     """Mix-in of a file handler whose files are dropped into a 3D view."""
 
     @classmethod
@@ -99,7 +99,7 @@ class DroppedIntoView:
         return context.area is not None and context.area.type == "VIEW_3D"
 
 
-class ExportVerb(Verb, ExportHelper):
+class ExportOperator(BaseOperator, ExportHelper):
     """An operator that writes a file in the format of its property `format`."""
 
     bl_options = {"REGISTER"}
@@ -113,20 +113,20 @@ class ExportVerb(Verb, ExportHelper):
 
     def check(self, _context):
         """Give the name in the file browser the file's suffix, so that Blender warns of an existing file."""
-        named = Path(self.filepath)
-        if not named.name:
+        path = Path(self.filepath)
+        if not path.name:
             return False
-        before, self.filepath = self.filepath, str(export.with_ending(named, export.SUFFIXES[self.format]))
-        return self.filepath != before
+        previous, self.filepath = self.filepath, str(export.replace_ending(path, export.SUFFIXES[self.format]))
+        return self.filepath != previous
 
-    def out(self) -> Path:
+    def output_path(self) -> Path:
         """Return the file to write; InputError if none is chosen."""
         if not self.filepath:
             raise InputError("export", "no file given", "a file to write", "choose a file")
-        return export.with_ending(Path(bpy.path.abspath(self.filepath)), export.SUFFIXES[self.format])
+        return export.replace_ending(Path(bpy.path.abspath(self.filepath)), export.SUFFIXES[self.format])
 
 
-class BackgroundVerb(Verb):
+class BackgroundOperator(BaseOperator):
     """An operator in three parts, so that the middle one can run in a thread while the window stays responsive.
 
     Attributes:
@@ -147,8 +147,8 @@ class BackgroundVerb(Verb):
         manager.progress_begin(0, 100)
         try:
             order = self.order(context)
-            asking = (lambda done, text: manager.progress_update(int(100 * done)), lambda: False, lambda: False)
-            result = self.work(order, *asking)
+            callbacks = (lambda done, text: manager.progress_update(int(100 * done)), lambda: False, lambda: False)
+            result = self.total_work(order, *callbacks)
         finally:
             manager.progress_end()
         self.apply(context.scene, result)
@@ -157,17 +157,17 @@ class BackgroundVerb(Verb):
         """Start the thread and poll for its result."""
         if bpy.app.background:
             return self.execute(context)
-        return self.started(context) if self.attempt(lambda: self.start(context)) == {"FINISHED"} else {"CANCELLED"}
+        return self.start_polling(context) if self.attempt(lambda: self.start(context)) == {"FINISHED"} else {"CANCELLED"}
 
     def start(self, context):
         """Collect the order and start the thread."""
-        order, work = self.order(context), self.work
+        order, work = self.order(context), self.total_work
         self.scene = context.scene.session_uid
         self.job = background.Job(self.kind, lambda *asking: work(order, *asking))
 
-    def started(self, context):
+    def start_polling(self, context):
         """Start polling."""
-        self.clock = window.start_clock(context)
+        self.clock = window.start_timer(context)
         context.window_manager.modal_handler_add(self)
         self.show(context)
         return {"RUNNING_MODAL"}
@@ -178,13 +178,13 @@ class BackgroundVerb(Verb):
             self.job.cancel()
         elif event.type != "TIMER":
             return {"PASS_THROUGH"}
-        ended = self.job.poll()
-        if not ended and not self.job.stale:
+        is_done = self.job.poll()
+        if not is_done and not self.job.is_stale:
             self.show(context)
             return {"RUNNING_MODAL"}
-        self.ended(context)
+        self.stop_polling(context)
         scene = next((scene for scene in bpy.data.scenes if scene.session_uid == self.scene), None)
-        if background.cancelled(self.job) or scene is None:
+        if background.is_cancelled(self.job) or scene is None:
             self.report({"WARNING"}, f"{self.bl_label}: {self.left}")
             return {"CANCELLED"}
         return self.attempt(lambda: self.finish(scene))
@@ -199,7 +199,7 @@ class BackgroundVerb(Verb):
         """Cancel the thread when Blender ends the operator (a file is loaded, the window closes); its result is
         discarded."""
         self.job.cancel()
-        self.ended(context)
+        self.stop_polling(context)
 
     def show(self, context):
         """Show the progress in the status bar, at the pointer and in the panel."""
@@ -208,10 +208,10 @@ class BackgroundVerb(Verb):
         running.kind, running.fraction, running.text = self.kind, self.job.fraction, text
         context.window_manager.progress_update(int(100 * self.job.fraction))
         context.workspace.status_text_set(f"{text}   {self.job.fraction:.0%}   ESC: cancel")
-        window.redraw()
+        window.redraw_editors()
 
-    def ended(self, context):
+    def stop_polling(self, context):
         """Remove the progress display and the timer."""
         context.window_manager.beyond_mocap_work.kind = ""
-        window.stop_clock(context, self.clock)
-        window.redraw()
+        window.stop_timer(context, self.clock)
+        window.redraw_editors()

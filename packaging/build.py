@@ -18,25 +18,25 @@ TOP = bundle.HERE.parent
 OUT = TOP / "build" / "extension"
 PARTS = ("__init__.py", "batch.py", "LICENSE", "README.md", "CHANGELOG.md", "beyond_mocap", "scene", "operators",
          "panels")
-LEFT_OUT = shutil.ignore_patterns("__pycache__", "*.pyc")
+IGNORE = shutil.ignore_patterns("__pycache__", "*.pyc")
 
 
 def main(argv=None):
     """Fetch, stage, lint, validate, build and lint again; return 0 if the zips are complete."""
-    known = bundle.platforms()
+    known = bundle.read_platforms()
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--platforms", nargs="+", choices=sorted(known), default=["linux-x64"])
     names = parser.parse_args(argv).platforms
-    packages = bundle.packages()
+    packages = bundle.list_packages()
 
     shutil.rmtree(OUT, ignore_errors=True)
     for platform in (known[name] for name in names):
-        path = build(packages, platform)
+        path = build_zip(packages, platform)
         print(f"built {path.relative_to(TOP)}: {path.stat().st_size / 1e6:.1f} MB", flush=True)
     return 0
 
 
-def build(packages, platform):
+def build_zip(packages, platform):
     """Build the zip for one platform.
 
     Args:
@@ -46,15 +46,15 @@ def build(packages, platform):
         The zip's path.
     """
     folder = OUT / "stage" / platform.name
-    lay_out(folder, packages, platform)
-    complain(lint.lint_stage(folder, packages, platform))
-    pack(folder, OUT)
-    path = OUT / f"beyond_mocap-{version()}-{platform.name.replace('-', '_')}.zip"
-    complain(lint.lint_zip(path, platform))
+    fill_stage(folder, packages, platform)
+    exit_on_complaints(lint.lint_stage(folder, packages, platform))
+    pack_zip(folder, OUT)
+    path = OUT / f"beyond_mocap-{read_version()}-{platform.name.replace('-', '_')}.zip"
+    exit_on_complaints(lint.lint_zip(path, platform))
     return path
 
 
-def lay_out(folder, packages, platform):
+def fill_stage(folder, packages, platform):
     """Fill the staging folder that Blender's own tool packs.
 
     Args:
@@ -62,19 +62,19 @@ def lay_out(folder, packages, platform):
         packages: the bundled packages.
         platform: the platform.
     """
-    names = wheels.gather(packages, platform, folder / "wheels")
+    names = wheels.copy_wheels(packages, platform, folder / "wheels")
     copy_parts(TOP, folder)
     text = (TOP / "blender_manifest.toml").read_text("utf-8")
-    whole = complete_manifest(text, packages, platform.name, names)
-    (folder / "blender_manifest.toml").write_text(whole, "utf-8")
+    manifest = complete_manifest(text, packages, platform.name, names)
+    (folder / "blender_manifest.toml").write_text(manifest, "utf-8")
 
 
-def version():
+def read_version():
     """Read the version from the manifest."""
     return tomllib.loads((TOP / "blender_manifest.toml").read_text("utf-8"))["version"]
 
 
-def pack(folder, out):
+def pack_zip(folder, out):
     """Validate the folder and build the zip of its one platform with Blender's own tool."""
     import bpy  # noqa: F401  (brings bl_pkg)
     from bl_pkg.bl_extension_cli import cli_extension_handler as extension_tool
@@ -85,7 +85,7 @@ def pack(folder, out):
             sys.exit(f"Blender's extension tool failed: {verb[0]} {folder}")
 
 
-def complain(lines):
+def exit_on_complaints(lines):
     """Exit with these lines, if there are any."""
     if lines:
         sys.exit("\n".join(lines))
@@ -96,7 +96,7 @@ def copy_parts(source, folder):
     for part in PARTS:
         path = source / part
         if path.is_dir():
-            shutil.copytree(path, folder / part, ignore=LEFT_OUT)
+            shutil.copytree(path, folder / part, ignore=IGNORE)
         elif path.exists():
             shutil.copyfile(path, folder / part)
 
@@ -116,17 +116,17 @@ def complete_manifest(text, packages, platform, wheels):
         f"{package.copyright} ({package.name} {package.bundled_version}, {package.license})" for package in packages
     ]
     own = next(line for line in text.splitlines() if line.startswith("copyright = "))
-    ours = own.removeprefix("copyright = [").removesuffix("]")
-    added = [f"copyright = {_list([ours, *map(_quoted, holders)])}", f"platforms = {_list([_quoted(platform)])}",
-             f"wheels = {_list(_quoted(f'./wheels/{name}') for name in wheels)}"]
-    return text.replace(own, "\n".join(added))
+    own_holders = own.removeprefix("copyright = [").removesuffix("]")
+    lines = [f"copyright = {_format_list([own_holders, *map(_quote, holders)])}", f"platforms = {_format_list([_quote(platform)])}",
+             f"wheels = {_format_list(_quote(f'./wheels/{name}') for name in wheels)}"]
+    return text.replace(own, "\n".join(lines))
 
 
-def _quoted(value):
+def _quote(value):
     return '"' + value.replace("\\", "\\\\").replace('"', '\\"') + '"'
 
 
-def _list(items):
+def _format_list(items):
     return "[\n" + "".join(f"  {item},\n" for item in items) + "]"
 
 

@@ -53,7 +53,7 @@ class Wheel(NamedTuple):
     abis: frozenset[str]
     platforms: frozenset[str]
 
-    def serves(self, platform, python):
+    def is_compatible(self, platform, python):
         """Return whether Blender unpacks this wheel on a platform under a Python version.
 
         Args:
@@ -61,42 +61,42 @@ class Wheel(NamedTuple):
             python: the version, such as "311".
         """
         fits_python = f"cp{python}" in self.pythons or "py3" in self.pythons or (
-            "abi3" in self.abis and any(_older(tag, python) for tag in self.pythons))
+            "abi3" in self.abis and any(_is_older(tag, python) for tag in self.pythons))
         return fits_python and ("any" in self.platforms or bool(self.platforms & set(platform.tags)))
 
 
-def _older(tag, python):
+def _is_older(tag, python):
     return bool(re.fullmatch(r"cp3\d+", tag)) and int(tag[3:]) <= int(python[1:])
 
 
-def wheel(filename):
+def parse_wheel_name(filename):
     """Split a wheel's file name into its parts.
 
     >>> wheel("lxml-6.1.3-cp311-cp311-win_amd64.whl").platforms
     frozenset({'win_amd64'})
     """
     name, version, *_, python, abi, platform = filename.removesuffix(".whl").split("-")
-    return Wheel(plain(name), version, *(frozenset(tags.split(".")) for tags in (python, abi, platform)))
+    return Wheel(normalize_name(name), version, *(frozenset(tags.split(".")) for tags in (python, abi, platform)))
 
 
-def plain(name):
+def normalize_name(name):
     """Normalize a package's name, so that equivalent spellings are equal."""
     return re.sub(r"[-_.]+", "-", name).lower()
 
 
-def packages():
+def list_packages():
     """List all bundled packages, in the file's order."""
-    return [Package(**row) for row in _table()["package"]]
+    return [Package(**row) for row in _read_table()["package"]]
 
 
-def platforms():
+def read_platforms():
     """Read the platforms that a zip can be built for.
 
     Returns:
         Name -> platform.
     """
-    return {name: Platform(name, **row) for name, row in _table()["platform"].items()}
+    return {name: Platform(name, **row) for name, row in _read_table()["platform"].items()}
 
 
-def _table():
+def _read_table():
     return tomllib.loads((HERE / "bundle.toml").read_text("utf-8"))

@@ -15,23 +15,23 @@ import sys
 import textwrap
 from xml.sax.saxutils import escape
 
-from house import CORE, LAYERS, TOP, layer_of, room_graph
+from house import CORE, LAYERS, TOP, find_layer, build_package_graph
 
 PICTURE = TOP / "docs" / "pictures" / "architecture.svg"
 COLUMNS = {"annotation": 0, "synthetic": 1, "appearance": 5, "files": 0, "ball": 2, "library": 1, "synthesis": 1,
            "evaluation": 3, "path_editing": 0, "passes": 1, "throws": 2, "markers": 3, "study": 4, "match": 5}
 """Column of a package in its layer; other packages fill the width."""
 BLENDER = {"panels": "Panels in the sidebar", "scene": "Data in Blender, updates", "operators": "Actions of buttons"}
-_MARGIN, _STEP, _BOX, _RISE, _TALL = 36, 200, 180, 84, 56
-_ACROSS = 5 * _STEP + _BOX
-_TOP = _MARGIN + _RISE + 20
+_MARGIN, _COLUMN_STEP, _BOX_WIDTH, _ROW_STEP, _BOX_HEIGHT = 36, 200, 180, 84, 56
+_FULL_WIDTH = 5 * _COLUMN_STEP + _BOX_WIDTH
+_TOP = _MARGIN + _ROW_STEP + 20
 
 
-def draw_house() -> str:
+def draw_architecture() -> str:
     """Draw the picture; return the text of an SVG file."""
-    boxes = [_draw_box(*_corner(room), _first_words(room), room) for rooms in LAYERS for room in rooms]
-    arrows = [_draw_arrow(_route(room, other)) for room, others in _reduced().items() for other in sorted(others)]
-    right, bottom = _ACROSS + 2 * _MARGIN, _TOP + len(LAYERS) * _RISE + 20
+    boxes = [_draw_box(*_compute_corner(room), _read_summary(room), room) for rooms in LAYERS for room in rooms]
+    arrows = [_draw_arrow(_compute_route(room, other)) for room, others in _reduce_imports().items() for other in sorted(others)]
+    right, bottom = _FULL_WIDTH + 2 * _MARGIN, _TOP + len(LAYERS) * _ROW_STEP + 20
     head = (
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {right} {bottom}" font-family="sans-serif">'
         '<defs><marker id="tip" markerWidth="9" markerHeight="7" refX="8" refY="3.5" orient="auto">'
@@ -45,48 +45,48 @@ def draw_house() -> str:
 
 def _draw_blender() -> list[str]:
     """Draw the packages for Blender in a row above the core."""
-    lefts = [_MARGIN + column * _STEP for column in (0, 2, 4)]
-    middle = _MARGIN + _TALL / 2 - 14
-    arrows = [_draw_arrow([(lefts[0] + _BOX, middle), (lefts[1], middle)]),
-              _draw_arrow([(lefts[2], middle), (lefts[1] + _BOX, middle)]),
-              *(_draw_arrow([(left + _BOX / 2, middle), (left + _BOX / 2, _TOP - 30)]) for left in lefts[1:])]
+    lefts = [_MARGIN + column * _COLUMN_STEP for column in (0, 2, 4)]
+    middle = _MARGIN + _BOX_HEIGHT / 2 - 14
+    arrows = [_draw_arrow([(lefts[0] + _BOX_WIDTH, middle), (lefts[1], middle)]),
+              _draw_arrow([(lefts[2], middle), (lefts[1] + _BOX_WIDTH, middle)]),
+              *(_draw_arrow([(left + _BOX_WIDTH / 2, middle), (left + _BOX_WIDTH / 2, _TOP - 30)]) for left in lefts[1:])]
     boxes = zip(lefts, BLENDER.items())
-    return arrows + [_draw_box(left, _MARGIN - 14, _BOX, text, name, "#fdebd0") for left, (name, text) in boxes]
+    return arrows + [_draw_box(left, _MARGIN - 14, _BOX_WIDTH, text, name, "#fdebd0") for left, (name, text) in boxes]
 
 
-def _corner(room: str) -> tuple[float, float, float]:
+def _compute_corner(room: str) -> tuple[float, float, float]:
     """Compute left, top and width of a package's box."""
-    y = _TOP + (len(LAYERS) - 1 - layer_of(room)) * _RISE
-    return (_MARGIN + COLUMNS[room] * _STEP, y, _BOX) if room in COLUMNS else (_MARGIN, y, _ACROSS)
+    y = _TOP + (len(LAYERS) - 1 - find_layer(room)) * _ROW_STEP
+    return (_MARGIN + COLUMNS[room] * _COLUMN_STEP, y, _BOX_WIDTH) if room in COLUMNS else (_MARGIN, y, _FULL_WIDTH)
 
 
-def _reduced() -> dict[str, set[str]]:
+def _reduce_imports() -> dict[str, set[str]]:
     """Reduce the packages' imports to those that do not follow from others; `synthetic.ground_truth` is left out."""
-    graph = {room: {o for o in others if layer_of(o) < layer_of(room)} for room, others in room_graph().items()}
+    graph = {room: {o for o in others if find_layer(o) < find_layer(room)} for room, others in build_package_graph().items()}
 
     def reach(room: str) -> set[str]:
         return graph[room].union(*(reach(other) for other in graph[room]))
 
-    follows = {room: set().union(*map(reach, others)) for room, others in graph.items()}
-    return {room: others - follows[room] for room, others in graph.items()}
+    implied = {room: set().union(*map(reach, others)) for room, others in graph.items()}
+    return {room: others - implied[room] for room, others in graph.items()}
 
 
-def _route(room: str, other: str) -> list[tuple[float, float]]:
+def _compute_route(room: str, other: str) -> list[tuple[float, float]]:
     """Compute the corners of an arrow: straight down, or down and aside, or aside and down if a box is in the way."""
-    (left, top, wide), (to_left, to_top, to_wide) = _corner(room), _corner(other)
+    (left, top, wide), (to_left, to_top, to_wide) = _compute_corner(room), _compute_corner(other)
     start, end = left + wide / 2, to_left + to_wide / 2
     if room not in COLUMNS or other not in COLUMNS or start == end:
         x = end if room not in COLUMNS else start
-        return [(x, top + _TALL), (x, to_top)]
-    below = [r for r in COLUMNS if COLUMNS[r] == COLUMNS[room] and layer_of(other) <= layer_of(r) < layer_of(room)]
+        return [(x, top + _BOX_HEIGHT), (x, to_top)]
+    below = [r for r in COLUMNS if COLUMNS[r] == COLUMNS[room] and find_layer(other) <= find_layer(r) < find_layer(room)]
     if below:
-        y = top + 0.75 * _TALL
+        y = top + 0.75 * _BOX_HEIGHT
         return [(left if end < start else left + wide, y), (end, y), (end, to_top)]
-    y = to_top + 0.35 * _TALL
-    return [(start, top + _TALL), (start, y), (to_left + to_wide if end < start else to_left, y)]
+    y = to_top + 0.35 * _BOX_HEIGHT
+    return [(start, top + _BOX_HEIGHT), (start, y), (to_left + to_wide if end < start else to_left, y)]
 
 
-def _first_words(room: str) -> str:
+def _read_summary(room: str) -> str:
     """Return the beginning of the package's docstring."""
     text = ast.get_docstring(ast.parse((TOP / CORE / room / "__init__.py").read_text("utf-8"))) or ""
     return re.split(r"[.:;(]", text.split("\n")[0])[0].strip()
@@ -96,7 +96,7 @@ def _draw_box(x: float, y: float, wide: float, text: str, name: str, colour: str
     lines = textwrap.wrap(text, wide // 6)[:2]
     middle = x + wide / 2
     return (
-        f'<rect x="{x:g}" y="{y:g}" width="{wide}" height="{_TALL}" rx="6" fill="{colour}" stroke="#557"/>'
+        f'<rect x="{x:g}" y="{y:g}" width="{wide}" height="{_BOX_HEIGHT}" rx="6" fill="{colour}" stroke="#557"/>'
         f'<text x="{middle:g}" y="{y + 19:g}" text-anchor="middle" font-size="15">{escape(name)}</text>'
     ) + "".join(
         f'<text x="{middle:g}" y="{y + 35 + 13 * number:g}" text-anchor="middle" font-size="10.5" fill="#445">'
@@ -111,5 +111,5 @@ def _draw_arrow(corners: list[tuple[float, float]]) -> str:
 
 if __name__ == "__main__":
     if "--check" in sys.argv[1:]:
-        sys.exit(PICTURE.read_text("utf-8") != draw_house() and f"{PICTURE.name} is out of date: run {sys.argv[0]}")
-    PICTURE.write_text(draw_house(), "utf-8")
+        sys.exit(PICTURE.read_text("utf-8") != draw_architecture() and f"{PICTURE.name} is out of date: run {sys.argv[0]}")
+    PICTURE.write_text(draw_architecture(), "utf-8")

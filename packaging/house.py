@@ -26,7 +26,7 @@ features and below `match`."""
 FILES_MAY = ("base", "motion", "annotation")
 BLENDER = {"bpy", "mathutils", "gpu", "gpu_extras", "bpy_extras", "blf", "bl_ui", "bl_operators", "bmesh",
            "addon_utils", "rna_prop_ui", "rna_keymap_ui", "imbuf", "aud", "idprop", "pxr"}  # fmt: skip
-MOST_FILES = 25
+MAX_FILES = 25
 """Python files in one folder at most."""
 parse_source = functools.cache(ast.parse)
 
@@ -97,28 +97,28 @@ def is_below(name: str, prefix: str) -> bool:
     return name == prefix or name.startswith(prefix + ".")
 
 
-def room_of(name: str) -> str:
+def find_package(name: str) -> str:
     """Find the package of a dotted name of the core; "" for modules at the core's top."""
     inner = name.removeprefix(CORE + ".")
     return GROUND_TRUTH if is_below(inner, GROUND_TRUTH) else inner.partition(".")[0] if "." in inner else ""
 
 
-def layer_of(room: str) -> float:
+def find_layer(room: str) -> float:
     """Find the layer of a package; higher layers import lower ones."""
     if room == GROUND_TRUTH:
-        return layer_of("match") - 0.5
+        return find_layer("match") - 0.5
     return next((height for height, rooms in enumerate(LAYERS) if room in rooms), len(LAYERS))
 
 
-def may_import(room: str, other: str) -> bool:
+def may_import(package: str, other: str) -> bool:
     """Return whether a file of `room` may import from `other`."""
-    if room == other or not other:
+    if package == other or not other:
         return True
-    return layer_of(other) < layer_of(room) and (room != "files" or other in FILES_MAY)
+    return find_layer(other) < find_layer(package) and (package != "files" or other in FILES_MAY)
 
 
 @functools.cache
-def module_files() -> dict[str, pathlib.Path]:
+def list_modules() -> dict[str, pathlib.Path]:
     """List the modules of the product.
 
     Returns:
@@ -128,26 +128,26 @@ def module_files() -> dict[str, pathlib.Path]:
     return {".".join(path.with_suffix("").parts).removesuffix(".__init__"): path for path in files}
 
 
-def file_of(name: str) -> pathlib.Path | None:
+def find_file(name: str) -> pathlib.Path | None:
     """Find the file of an imported dotted name: the module itself, or the one that defines it."""
-    files = module_files()
+    files = list_modules()
     return files.get(name) or files.get(name.rpartition(".")[0])
 
 
-def file_graph() -> dict[pathlib.Path, set[pathlib.Path]]:
+def build_file_graph() -> dict[pathlib.Path, set[pathlib.Path]]:
     """Build the graph of imports between files, those inside functions included.
 
     Returns:
         File -> the files that it imports.
     """
     graph = {}
-    for path in module_files().values():
-        imported = (file_of(one.name) for one in read_imports(path, (TOP / path).read_text("utf-8")))
+    for path in list_modules().values():
+        imported = (find_file(one.name) for one in read_imports(path, (TOP / path).read_text("utf-8")))
         graph[path] = {other for other in imported if other is not None and other != path}
     return graph
 
 
-def find_circles(graph: dict) -> list[list]:
+def find_cycles(graph: dict) -> list[list]:
     """Find import cycles: Tarjan's strongly connected components of more than one node.
 
     Args:
@@ -159,7 +159,7 @@ def find_circles(graph: dict) -> list[list]:
     order: dict = {}
     low: dict = {}
     stack: list = []
-    circles: list[list] = []
+    cycles: list[list] = []
 
     def visit(node) -> None:
         # order: discovery number; low: smallest discovery number on the stack that the node reaches.
@@ -174,29 +174,29 @@ def find_circles(graph: dict) -> list[list]:
             group = stack[stack.index(node) :]
             del stack[stack.index(node) :]
             if len(group) > 1:
-                circles.append(sorted(group))
+                cycles.append(sorted(group))
 
     for node in graph:
         if node not in order:
             visit(node)
-    return circles
+    return cycles
 
 
-def room_graph() -> dict[str, set[str]]:
+def build_package_graph() -> dict[str, set[str]]:
     """Build the graph of imports between the core's packages, without ground truth.
 
     Returns:
         Package -> the packages that it imports.
     """
-    graph: dict[str, set[str]] = {room: set() for rooms in LAYERS for room in rooms}
-    for path, others in file_graph().items():
-        room, *below = (room_of(".".join(one.with_suffix("").parts)) for one in (path, *others))
-        if path.parts[0] == CORE and room in graph:
-            graph[room] |= {other for other in below if other in graph} - {room}
+    graph: dict[str, set[str]] = {package: set() for rooms in LAYERS for package in rooms}
+    for path, others in build_file_graph().items():
+        package, *below = (find_package(".".join(one.with_suffix("").parts)) for one in (path, *others))
+        if path.parts[0] == CORE and package in graph:
+            graph[package] |= {other for other in below if other in graph} - {package}
     return graph
 
 
-def count_side_by_side(*folders: str) -> Iterator[tuple[str, int]]:
+def count_files(*folders: str) -> Iterator[tuple[str, int]]:
     """Iterate over (folder, number of its Python files) of each folder."""
     parents = [path.parent.as_posix() for path in list_sources(*folders)]
     yield from ((folder, parents.count(folder)) for folder in sorted(set(parents)))

@@ -7,10 +7,10 @@ not name, a file that must not be in the zip.
 import tomllib
 import zipfile
 
-from bundle import plain, wheel
+from bundle import normalize_name, parse_wheel_name
 
-BLENDERS = {f"{system}-{processor}" for system in ("linux", "windows", "macos") for processor in ("x64", "arm64")}
-NEVER = ("tests/", "benchmarks/", "docs/", "packaging/", "build/", "training/", ".git", ".venv", "shared/")
+BLENDER_PLATFORMS = {f"{system}-{processor}" for system in ("linux", "windows", "macos") for processor in ("x64", "arm64")}
+FORBIDDEN = ("tests/", "benchmarks/", "docs/", "packaging/", "build/", "training/", ".git", ".venv", "shared/")
 
 
 def lint_stage(folder, packages, platform):
@@ -25,33 +25,33 @@ def lint_stage(folder, packages, platform):
     """
     manifest = tomllib.loads((folder / "blender_manifest.toml").read_text("utf-8"))
     listed = [path.removeprefix("./wheels/") for path in manifest["wheels"]]
-    there = {path.name for path in (folder / "wheels").iterdir()}
-    return [*(f"platform {name!r} is not one of Blender's" for name in manifest["platforms"] if name not in BLENDERS),
-            *(f"wheel {name} is listed but missing" for name in listed if name not in there),
-            *(f"wheel {name} exists but is not listed" for name in sorted(there) if name not in listed),
+    existing = {path.name for path in (folder / "wheels").iterdir()}
+    return [*(f"platform {name!r} is not one of Blender's" for name in manifest["platforms"] if name not in BLENDER_PLATFORMS),
+            *(f"wheel {name} is listed but missing" for name in listed if name not in existing),
+            *(f"wheel {name} exists but is not listed" for name in sorted(existing) if name not in listed),
             *(f"licence {name!r} has no SPDX name" for name in manifest["license"] if not name.startswith("SPDX:")),
-            *_copyright(manifest, packages), *_coverage(listed, packages, platform)]
+            *_check_copyright(manifest, packages), *_check_coverage(listed, packages, platform)]
 
 
-def _copyright(manifest, packages):
+def _check_copyright(manifest, packages):
     for package in packages:
         credit = f"({package.name} {package.bundled_version}, {package.license})"
         if not any(line.endswith(credit) for line in manifest["copyright"]):
             yield f"the copyright does not name {package.name} {package.bundled_version}"
 
 
-def _coverage(listed, packages, platform):
+def _check_coverage(listed, packages, platform):
     """Check that each Python version gets exactly one wheel of each package, and that each wheel is used."""
-    wheels = {name: wheel(name) for name in listed}
-    idle = set(listed)
+    wheels = {name: parse_wheel_name(name) for name in listed}
+    unused = set(listed)
     for python in platform.pythons:
         for package in packages:
-            fitting = {name for name, w in wheels.items() if w.serves(platform, python)
-                       and (w.name, w.version) == (plain(package.name), package.bundled_version)}
-            idle -= fitting
-            if len(fitting) != 1:
-                yield f"{len(fitting)} wheels of {package.name} for {platform.name}, Python {python}: {sorted(fitting)}"
-    yield from (f"wheel {name} fits no Python version of {platform.name}" for name in sorted(idle))
+            matching = {name for name, w in wheels.items() if w.is_compatible(platform, python)
+                       and (w.name, w.version) == (normalize_name(package.name), package.bundled_version)}
+            unused -= matching
+            if len(matching) != 1:
+                yield f"{len(matching)} wheels of {package.name} for {platform.name}, Python {python}: {sorted(matching)}"
+    yield from (f"wheel {name} fits no Python version of {platform.name}" for name in sorted(unused))
 
 
 def lint_zip(path, platform):
@@ -70,12 +70,12 @@ def lint_zip(path, platform):
         *(
             f"{path.name}: {name} does not belong in it"
             for name in names
-            if name.startswith(NEVER) or "__pycache__" in name
+            if name.startswith(FORBIDDEN) or "__pycache__" in name
         ),
         *(
             f"{path.name}: {name} is for another platform"
             for name in wheels
-            if not any(wheel(name).serves(platform, python) for python in platform.pythons)
+            if not any(parse_wheel_name(name).is_compatible(platform, python) for python in platform.pythons)
         ),
         *(
             f"{path.name}: {name} is missing"

@@ -22,7 +22,7 @@ names those in Blender. Files and objects that are only read or written are on e
 COLUMNS = ("setting", "option", "in Blender", "default", "limits", "meaning")
 
 
-def settings_page() -> str:
+def build_settings_page() -> str:
     """Build the settings page.
 
     Returns:
@@ -35,24 +35,24 @@ def settings_page() -> str:
     for feature, groups in groupby(tables, key=lambda table: table[0]):
         parts.append(f"\n## {feature}\n")
         for _, group, rows in groups:
-            parts.append(f"\n`{group}`\n\n" + _line(COLUMNS) + _line(["---"] * len(COLUMNS)))
-            parts.extend(_line(_cells(row)) for row in rows)
+            parts.append(f"\n`{group}`\n\n" + _format_row(COLUMNS) + _format_row(["---"] * len(COLUMNS)))
+            parts.extend(_format_row(_build_cells(row)) for row in rows)
     return "".join(parts)
 
 
-def _cells(row) -> list[str]:
+def _build_cells(row) -> list[str]:
     """Build the cells of a setting."""
     option = " ".join(f"`{flag}`" for flag in row.option.split())
-    return [f"`{row.name}`", option, row.title if row.tooltip else "", _default(row), _limits(row), _meaning(row)]
+    return [f"`{row.name}`", option, row.title if row.tooltip else "", _format_default(row), _format_limits(row), _format_meaning(row)]
 
 
-def _default(row) -> str:
+def _format_default(row) -> str:
     """Format the default in code, and the panel's if it differs."""
-    usual, shown = (_written(value) for value in (row.default, row.panel_more.get("default", row.default)))
-    return usual if usual == shown else f"{usual}; in Blender {shown}"
+    in_code, in_panel = (_format_value(value) for value in (row.default, row.panel_more.get("default", row.default)))
+    return in_code if in_code == in_panel else f"{in_code}; in Blender {in_panel}"
 
 
-def _written(value) -> str:
+def _format_value(value) -> str:
     """Format a value as users write it."""
     if isinstance(value, bool):
         return "on" if value else "off"
@@ -63,33 +63,33 @@ def _written(value) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
-def _limits(row) -> str:
+def _format_limits(row) -> str:
     """Format the choices or the limits, and those of the option and of the panel if they differ."""
     if row.choices:
         return ", ".join(f"`{name}`" for name in row.choice_names)
-    own, option, panel = (row.least, row.most), row.option_more, row.panel_more
-    asked = (option.get("least", row.least), option.get("most", row.most))
-    shown = (panel.get("min", row.least), panel.get("max", row.most))
-    parts = [_range(own), *(f"{place} {_range(pair)}" for place, pair in (("option", asked), ("Blender", shown))
-                            if pair not in (own, (None, None)))]  # fmt: skip
+    limits, option, panel = (row.least, row.most), row.option_more, row.panel_more
+    option_limits = (option.get("least", row.least), option.get("most", row.most))
+    panel_limits = (panel.get("min", row.least), panel.get("max", row.most))
+    parts = [_format_range(limits), *(f"{place} {_format_range(pair)}" for place, pair in (("option", option_limits), ("Blender", panel_limits))
+                            if pair not in (limits, (None, None)))]  # fmt: skip
     return "; ".join(filter(None, parts)) + (f" {row.unit}" if row.unit and any(parts) else "")
 
 
-def _range(pair: tuple) -> str:
-    least, most = (None if limit is None else _written(limit) for limit in pair)
+def _format_range(pair: tuple) -> str:
+    least, most = (None if limit is None else _format_value(limit) for limit in pair)
     return "" if least is None else f"{least} or more" if most is None else f"{least} to {most}"
 
 
-def _meaning(row) -> str:
+def _format_meaning(row) -> str:
     """Return the tooltip of the panel, else the help of the option."""
     return row.tooltip or re.sub(r"[;(] ?default %\(default\)[gs]\)?", "", row.help or "").strip()
 
 
-def _line(cells) -> str:
+def _format_row(cells) -> str:
     return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |\n"
 
 
-def with_tables(text: str) -> str:
+def replace_tables(text: str) -> str:
     """Replace both tables of providers in a page, in the order of their records.
 
     Args:
@@ -110,5 +110,5 @@ def with_tables(text: str) -> str:
 
 if __name__ == "__main__":
     sys.path.insert(0, str(TOP))
-    SETTINGS_PAGE.write_text(settings_page(), "utf-8")
-    PROVIDERS_PAGE.write_text(with_tables(PROVIDERS_PAGE.read_text("utf-8")), "utf-8")
+    SETTINGS_PAGE.write_text(build_settings_page(), "utf-8")
+    PROVIDERS_PAGE.write_text(replace_tables(PROVIDERS_PAGE.read_text("utf-8")), "utf-8")

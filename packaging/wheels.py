@@ -19,14 +19,14 @@ import tempfile
 import zipfile
 from concurrent.futures import ThreadPoolExecutor
 
-from bundle import plain, wheel
+from bundle import normalize_name, parse_wheel_name
 
 CACHE = pathlib.Path(os.environ.get("XDG_CACHE_HOME") or pathlib.Path.home() / ".cache") / "beyond-mocap" / "wheels"
-LEFT_OUT = ("kloppy/tests/",)
+EXCLUDED = ("kloppy/tests/",)
 STAMP = (2020, 1, 1, 0, 0, 0)  # fixed, so that the wheel is reproducible bit for bit
 
 
-def gather(packages, platform, folder):
+def copy_wheels(packages, platform, folder):
     """Copy every wheel that a platform needs into a folder.
 
     Args:
@@ -38,32 +38,32 @@ def gather(packages, platform, folder):
     """
     folder.mkdir(parents=True)
     with ThreadPoolExecutor(2) as pool:
-        fetched = list(pool.map(lambda python: _fetch(packages, platform, python), platform.pythons))
+        fetched = list(pool.map(lambda python: _fetch_wheels(packages, platform, python), platform.pythons))
     for source in sorted({path.name: path for paths in fetched for path in paths}.values()):
-        package = next(p for p in packages if plain(p.name) == wheel(source.name).name)
+        package = next(p for p in packages if normalize_name(p.name) == parse_wheel_name(source.name).name)
         if package.slimmed:
-            slim(source, folder, package)
+            reduce_wheel(source, folder, package)
         else:
             shutil.copyfile(source, folder / source.name)
     return sorted(path.name for path in folder.iterdir())
 
 
-def _fetch(packages, platform, python):
+def _fetch_wheels(packages, platform, python):
     """Return the cached wheels for one platform and Python version; download them if the cache is incomplete."""
     pins = [f"{package.name}=={package.version}" for package in packages]
     folder = CACHE / f"{platform.name}-cp{python}"
-    if not _complete(folder, packages):
-        _download(pins, platform, python, folder)
-    wanted = {(plain(package.name), package.version) for package in packages}
-    return [path for path in folder.glob("*.whl") if wheel(path.name)[:2] in wanted]
+    if not _is_complete(folder, packages):
+        _download_wheels(pins, platform, python, folder)
+    required = {(normalize_name(package.name), package.version) for package in packages}
+    return [path for path in folder.glob("*.whl") if parse_wheel_name(path.name)[:2] in required]
 
 
-def _complete(folder, packages):
-    have = {wheel(path.name)[:2] for path in folder.glob("*.whl")}
-    return all((plain(package.name), package.version) in have for package in packages)
+def _is_complete(folder, packages):
+    cached = {parse_wheel_name(path.name)[:2] for path in folder.glob("*.whl")}
+    return all((normalize_name(package.name), package.version) in cached for package in packages)
 
 
-def _download(pins, platform, python, folder):
+def _download_wheels(pins, platform, python, folder):
     """Download to a temporary folder and move complete files, so that simultaneous builds do not interfere."""
     print(f"wheels: fetching {len(pins)} packages for {platform.name}, Python {python[0]}.{python[1:]}", flush=True)
     folder.mkdir(parents=True, exist_ok=True)
@@ -77,7 +77,7 @@ def _download(pins, platform, python, folder):
             path.replace(folder / path.name)
 
 
-def slim(source, folder, package):
+def reduce_wheel(source, folder, package):
     """Write the reduced wheel of a package.
 
     Args:
@@ -89,25 +89,25 @@ def slim(source, folder, package):
     """
     old, new = (f"{package.name}-{version}" for version in (package.version, package.bundled_version))
     target = folder / source.name.replace(old, new)
-    files = {name.replace(f"{old}.dist-info/", f"{new}.dist-info/"): text for name, text in _kept(source)}
+    files = {name.replace(f"{old}.dist-info/", f"{new}.dist-info/"): text for name, text in _iter_kept_files(source)}
     metadata = f"{new}.dist-info/METADATA"
-    files[metadata] = _slim_metadata(files[metadata].decode("utf-8"), package).encode("utf-8")
+    files[metadata] = _reduce_metadata(files[metadata].decode("utf-8"), package).encode("utf-8")
     record = f"{new}.dist-info/RECORD"
-    files[record] = _record(files, record)
+    files[record] = _build_record(files, record)
     with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, data in files.items():
             archive.writestr(zipfile.ZipInfo(name, STAMP), data, zipfile.ZIP_DEFLATED)
     return target
 
 
-def _kept(source):
+def _iter_kept_files(source):
     with zipfile.ZipFile(source) as archive:
         for name in archive.namelist():
-            if not name.startswith(LEFT_OUT):
+            if not name.startswith(EXCLUDED):
                 yield name, archive.read(name)
 
 
-def _slim_metadata(text, package):
+def _reduce_metadata(text, package):
     """Return the metadata with the marked version and with fsspec without its "http" extra."""
     head, gap, description = text.partition("\n\n")
     lines = [line.replace("fsspec[http]", "fsspec") for line in head.splitlines()]
@@ -115,7 +115,7 @@ def _slim_metadata(text, package):
     return "\n".join(lines) + gap + description
 
 
-def _record(files, record):
+def _build_record(files, record):
     out = io.StringIO()
     rows = csv.writer(out, lineterminator="\n")
     for name, data in files.items():

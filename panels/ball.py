@@ -6,9 +6,9 @@ from __future__ import annotations
 
 import bpy
 
-from ..scene.ball.settings import aimed_ball
-from ..scene.passes.settings import active_row, ball_of, picture_icon, subject, told_lines
-from .tab import Step, paragraph, section, split, table
+from ..scene.ball.settings import find_aimed_ball
+from ..scene.passes.settings import find_active_row, find_ball, find_picture_icon, find_armature, parse_lines
+from .tab import TabPanel, draw_paragraph, draw_section, create_value_column, draw_table
 
 LINE = 20.0  # pixels of a line of the interface, at a scale of 1
 
@@ -31,7 +31,7 @@ class BEYOND_MOCAP_UL_touches(bpy.types.UIList):
         named.label(text=item.kind)
 
 
-class BEYOND_MOCAP_PT_ball(Step, bpy.types.Panel):
+class BEYOND_MOCAP_PT_ball(TabPanel, bpy.types.Panel):
     """The ball and the players who pass it."""
 
     bl_label = "Ball & Passes"
@@ -41,27 +41,27 @@ class BEYOND_MOCAP_PT_ball(Step, bpy.types.Panel):
     def draw(self, context):
         """Draw the sections; most are closed at first."""
         layout = self.layout
-        section(layout, "ball_scene", "Passing Scene", lambda opened: passing(self, opened, context), closed=False)
-        section(layout, "ball_tracked", "Ball from Tracking", lambda opened: tracked(self, opened, context))
-        section(layout, "ball_hits", "Hit Analysis", lambda opened: hits(opened, context))
-        section(layout, "ball_hold", "Carried Ball", lambda opened: carried(opened, context))
-        section(layout, "ball_aim", "Aim Ball", lambda opened: aim(opened, context))
-        section(layout, "ball_stream", "Live Stream", lambda opened: stream(opened, context))
-        section(layout, "ball_live", "Play Live", lambda opened: live(self, opened, context))
+        draw_section(layout, "ball_scene", "Passing Scene", lambda opened: draw_passing_scene(self, opened, context), closed=False)
+        draw_section(layout, "ball_tracked", "Ball from Tracking", lambda opened: draw_tracked_ball(self, opened, context))
+        draw_section(layout, "ball_hits", "Hit Analysis", lambda opened: draw_hit_analysis(opened, context))
+        draw_section(layout, "ball_hold", "Carried Ball", lambda opened: draw_carried_ball(opened, context))
+        draw_section(layout, "ball_aim", "Aim Ball", lambda opened: draw_aim(opened, context))
+        draw_section(layout, "ball_stream", "Live Stream", lambda opened: draw_stream(opened, context))
+        draw_section(layout, "ball_live", "Play Live", lambda opened: draw_play_live(self, opened, context))
 
 
-def tracked(panel, layout, context) -> None:
+def draw_tracked_ball(panel, layout, context) -> None:
     """Draw the button, figures of the solved ball, and its touches."""
     settings = context.scene.beyond_mocap_passes
     layout.operator("beyond_mocap.solve_ball", icon="SPHERE")
     panel.progress(context, "ball")
     if settings.solved:
-        table(layout, settings.solved.splitlines())
+        draw_table(layout, settings.solved.splitlines())
     if not len(settings.touches):
         return
     layout.template_list("BEYOND_MOCAP_UL_touches", "", settings, "touches", settings, active_propname="active_touch",
                          rows=5)
-    if touch := active_row(settings.touches, settings.active_touch):
+    if touch := find_active_row(settings.touches, settings.active_touch):
         layout.label(text=f"{touch.kind} by the {touch.part}, confidence {touch.confidence:.0%}")
         row = layout.row(align=True)
         row.prop(touch, "words", text="")
@@ -71,18 +71,18 @@ def tracked(panel, layout, context) -> None:
     row.operator("beyond_mocap.accept_touches", text="Of Active").active = True
 
 
-def hits(layout, context) -> None:
+def draw_hit_analysis(layout, context) -> None:
     """Draw the settings of the hit analysis, its picture, and a button for each strike."""
-    body = subject(context)
+    body = find_armature(context)
     if body is None:
-        paragraph(layout, "Select an armature with a motion", "INFO")
+        draw_paragraph(layout, "Select an armature with a motion", "INFO")
         return
     found = body.beyond_mocap_hits
     layout.label(text=body.name, icon="ARMATURE_DATA")
     row = layout.row(align=True)
     row.prop(found, "part", text="")
     row.prop(found, "side", text="")
-    column = split(layout)
+    column = create_value_column(layout)
     column.prop_search(found, "bone", body.data, "bones")
     column.prop(found, "threshold")
     row = layout.row(align=True)
@@ -90,18 +90,18 @@ def hits(layout, context) -> None:
     if not found.found:
         return
     row.operator("beyond_mocap.clear_hits", text="", icon="X")
-    if icon := picture_icon(found):
+    if icon := find_picture_icon(found):
         width = context.region.width / context.preferences.system.ui_scale - 2.5 * LINE
         layout.template_icon(icon, scale=max(6.0, min(width / LINE, 16.0)))
-    for frame, text in told_lines(found.lines):
+    for frame, text in parse_lines(found.lines):
         layout.operator("beyond_mocap.go_to_strike", text=f"{frame}: {text}", icon="KEYTYPE_EXTREME_VEC").frame = frame
     if not found.lines:
-        paragraph(layout, "No strike found: try the other side, another part or a threshold", "INFO")
+        draw_paragraph(layout, "No strike found: try the other side, another part or a threshold", "INFO")
 
 
-def carried(layout, context) -> None:
+def draw_carried_ball(layout, context) -> None:
     """Draw the settings of a hold and the stretches in which the ball is carried."""
-    settings, body, ball = context.scene.beyond_mocap_passes, subject(context), ball_of(context)
+    settings, body, ball = context.scene.beyond_mocap_passes, find_armature(context), find_ball(context)
     layout.label(text=ball.name if ball is not None else "No ball: select one",
                  icon="SPHERE" if ball is not None else "INFO")
     layout.label(text=body.name if body is not None else "No armature: select one",
@@ -124,23 +124,23 @@ def carried(layout, context) -> None:
         row.operator("beyond_mocap.free_ball", text="", icon="X").number = number
 
 
-def aim(layout, context) -> None:
+def draw_aim(layout, context) -> None:
     """Draw the button, and the aimed ball's settings and result."""
-    ball = aimed_ball(context)
+    ball = find_aimed_ball(context)
     layout.operator("beyond_mocap.aim_ball", icon="CON_TRACKTO", text="Aim Again" if ball is not None else "Aim Ball")
     if ball is not None:
-        of_aimed_ball(layout, ball)
-    physics(layout, context, ball)
+        draw_aimed_ball(layout, ball)
+    draw_physics(layout, context, ball)
 
 
-def of_aimed_ball(layout, ball) -> None:
+def draw_aimed_ball(layout, ball) -> None:
     """Draw an aimed ball's settings and figures."""
     settings = ball.beyond_mocap_aim
     row = layout.row(align=True)
     row.label(text=ball.name, icon="SPHERE")
     row.prop(settings, "live", text="", icon="LINKED" if settings.live else "UNLINKED")
     row.operator("beyond_mocap.leave_aim", text="", icon="X")
-    column = split(layout)
+    column = create_value_column(layout)
     column.enabled = not settings.handed
     column.prop(settings, "target")
     column.row().prop(settings, "way", expand=True)
@@ -162,11 +162,11 @@ def of_aimed_ball(layout, ball) -> None:
         if settings.way == "AIR" or name not in ("back", "left"):
             column.prop(settings, name)
     if settings.told:
-        paragraph(layout, settings.told, "ERROR")
-    table(layout, settings.figures.splitlines())
+        draw_paragraph(layout, settings.told, "ERROR")
+    draw_table(layout, settings.figures.splitlines())
 
 
-def physics(layout, context, ball) -> None:
+def draw_physics(layout, context, ball) -> None:
     """Draw the handover to Blender's rigid bodies and back."""
     row = layout.row(align=True)
     if ball is not None and ball.beyond_mocap_aim.handed:
@@ -177,32 +177,32 @@ def physics(layout, context, ball) -> None:
         row.operator("beyond_mocap.ball_to_physics", icon="PHYSICS", text=text)
 
 
-def stream(layout, context) -> None:
+def draw_stream(layout, context) -> None:
     """Draw the settings of the stream, its status, and the last strike."""
-    settings, told = context.scene.beyond_mocap_stream, context.window_manager.beyond_mocap_streaming
-    column = split(layout)
+    settings, status = context.scene.beyond_mocap_stream, context.window_manager.beyond_mocap_streaming
+    column = create_value_column(layout)
     chosen = column.column()
-    chosen.enabled = not told.on
+    chosen.enabled = not status.on
     for name in ("protocol", "port", "clip", "unit", "part", "side", "threshold"):
         chosen.prop(settings, name)
     column.prop(settings, "body")
     row = layout.row(align=True)
     row.operator("beyond_mocap.stream_start", icon="PLAY")
     row.operator("beyond_mocap.stream_stop", icon="SNAP_FACE")
-    if told.line:
-        paragraph(layout, told.line, STREAM_ICONS.get(told.state, "ERROR"))
-    if not told.on:
+    if status.line:
+        draw_paragraph(layout, status.line, STREAM_ICONS.get(status.state, "ERROR"))
+    if not status.on:
         return
-    table(layout, told.figures.splitlines())
-    if told.hit:
-        layout.label(text=f"Last strike: {told.hit}", icon="KEYTYPE_EXTREME_VEC")
+    draw_table(layout, status.figures.splitlines())
+    if status.hit:
+        layout.label(text=f"Last strike: {status.hit}", icon="KEYTYPE_EXTREME_VEC")
     layout.operator("beyond_mocap.stream_keep", icon="REC")
 
 
-def live(panel, layout, context) -> None:
+def draw_play_live(panel, layout, context) -> None:
     """Draw the settings of Play Live and the state of the rally."""
-    settings, told = context.scene.beyond_mocap_stream, context.window_manager.beyond_mocap_streaming
-    column = split(layout)
+    settings, status = context.scene.beyond_mocap_stream, context.window_manager.beyond_mocap_streaming
+    column = create_value_column(layout)
     column.prop_search(settings, "target", context.scene.beyond_mocap_passes, "players")
     column.prop(settings, "bounces")
     row = layout.row(align=True)
@@ -210,8 +210,8 @@ def live(panel, layout, context) -> None:
     row.operator("beyond_mocap.stream_end", icon="SNAP_FACE")
     layout.operator("beyond_mocap.stream_act", icon="ARMATURE_DATA")
     panel.progress(context, "live")
-    for line in told.played.splitlines():
-        paragraph(layout, line, "BLANK1")
+    for line in status.played.splitlines():
+        draw_paragraph(layout, line, "BLANK1")
 
 
 class BEYOND_MOCAP_UL_passers(bpy.types.UIList):
@@ -243,29 +243,29 @@ class BEYOND_MOCAP_UL_passes(bpy.types.UIList):
             row.label(text="", icon="CANCEL")
 
 
-def lists(layout, kind: str, settings, rows: str, active: str, verb: str) -> None:
+def draw_list(layout, kind: str, settings, rows: str, active: str, operator: str) -> None:
     """Draw a list with buttons to add, remove and move rows."""
     row = layout.row()
     row.template_list(f"BEYOND_MOCAP_UL_{kind}", "", settings, rows, settings, active_propname=active, rows=3)
     column = row.column(align=True)
-    for what, icon in (("ADD", "ADD"), ("REMOVE", "REMOVE"), ("UP", "TRIA_UP"), ("DOWN", "TRIA_DOWN")):
-        button = column.operator(f"beyond_mocap.{verb}", text="", icon=icon)
-        button.rows, button.what = rows, what
+    for action, icon in (("ADD", "ADD"), ("REMOVE", "REMOVE"), ("UP", "TRIA_UP"), ("DOWN", "TRIA_DOWN")):
+        button = column.operator(f"beyond_mocap.{operator}", text="", icon=icon)
+        button.rows, button.what = rows, action
 
 
-def passing(panel, layout, context) -> None:
+def draw_passing_scene(panel, layout, context) -> None:
     """Draw players, passes, ball, and the result of the scene."""
     settings = context.scene.beyond_mocap_passes
     row = layout.row(align=True)
     row.operator_menu_enum("beyond_mocap.passes_sample", "sample", icon="PRESET")
     row.operator("beyond_mocap.passes_from_json", text="", icon="IMPORT")
     row.operator("beyond_mocap.passes_to_json", text="", icon="EXPORT")
-    lists(layout, "passers", settings, rows="players", active="active_player", verb="passes_list")
-    if player := active_row(settings.players, settings.active_player):
-        of_player(layout, player)
-    lists(layout, "passes", settings, rows="passes", active="active_pass", verb="passes_list")
-    if one := active_row(settings.passes, settings.active_pass):
-        of_pass(layout, settings, one)
+    draw_list(layout, "passers", settings, rows="players", active="active_player", operator="passes_list")
+    if player := find_active_row(settings.players, settings.active_player):
+        draw_player(layout, player)
+    draw_list(layout, "passes", settings, rows="passes", active="active_pass", operator="passes_list")
+    if one := find_active_row(settings.passes, settings.active_pass):
+        draw_pass(layout, settings, one)
     row = layout.row(align=True)
     row.scale_y = 1.3
     row.operator("beyond_mocap.passes_make", icon="PLAY")
@@ -273,24 +273,24 @@ def passing(panel, layout, context) -> None:
     row.operator("beyond_mocap.passes_clear", text="", icon="X")
     panel.progress(context, "passes")
     for line in settings.told.splitlines():
-        paragraph(layout, line, "INFO")
+        draw_paragraph(layout, line, "INFO")
     if settings.strikes:
-        section(layout, "ball_strikes", "Strikes", lambda opened: strikes(opened, settings))
-    section(layout, "ball_choices", "Options", lambda opened: choices(opened, settings))
-    section(layout, "ball_ball", "Ball & Air", lambda opened: of_ball(opened, settings))
+        draw_section(layout, "ball_strikes", "Strikes", lambda opened: draw_strikes(opened, settings))
+    draw_section(layout, "ball_choices", "Options", lambda opened: draw_choices(opened, settings))
+    draw_section(layout, "ball_ball", "Ball & Air", lambda opened: draw_ball(opened, settings))
 
 
-def strikes(layout, settings) -> None:
+def draw_strikes(layout, settings) -> None:
     """Draw figures and a button for each strike."""
-    table(layout, settings.figures.splitlines())
+    draw_table(layout, settings.figures.splitlines())
     column = layout.column(align=True)
-    for frame, text in told_lines(settings.strikes):
+    for frame, text in parse_lines(settings.strikes):
         column.operator("beyond_mocap.go_to_strike", text=f"{frame}  {text}", icon="KEYTYPE_KEYFRAME_VEC").frame = frame
 
 
-def of_player(layout, player) -> None:
+def draw_player(layout, player) -> None:
     """Draw the settings of the active player."""
-    column = split(layout)
+    column = create_value_column(layout)
     for name in ("place", "body", "part"):
         column.prop(player, name)
     if player.part in {"foot", "hand", "tool"} and not player.bone:
@@ -302,9 +302,9 @@ def of_player(layout, player) -> None:
     column.prop(player, "height")
 
 
-def of_pass(layout, settings, one) -> None:
+def draw_pass(layout, settings, one) -> None:
     """Draw the settings of the active pass."""
-    column = split(layout)
+    column = create_value_column(layout)
     column.prop_search(one, "who", settings, "players")
     column.prop_search(one, "to", settings, "players")
     column.row().prop(one, "kind", expand=True)
@@ -321,9 +321,9 @@ def of_pass(layout, settings, one) -> None:
         column.prop(one, name)
 
 
-def choices(layout, settings) -> None:
+def draw_choices(layout, settings) -> None:
     """Draw the settings of all passes."""
-    column = split(layout)
+    column = create_value_column(layout)
     for name in ("library_folder", "repeat", "rate", "start_frame", "lead_in", "lead_out", "serve_from"):
         column.prop(settings, name)
     if settings.serve_from == "PLAYER":
@@ -335,12 +335,12 @@ def choices(layout, settings) -> None:
     if settings.net:
         for name in ("net_from", "net_to", "net_height"):
             column.prop(settings, name)
-    section(column, "ball_weights", "Weights", lambda opened: weights(opened, settings))
+    draw_section(column, "ball_weights", "Weights", lambda opened: draw_weights(opened, settings))
 
 
-def weights(layout, settings) -> None:
+def draw_weights(layout, settings) -> None:
     """Draw the weights of eq. 1 and eq. 2."""
-    column = split(layout)
+    column = create_value_column(layout)
     for title, names in (("Compare Strikes", ("speed", "vectors", "times")),
                          ("Compare Poses", ("position", "velocity", "bones"))):
         column.label(text=title)
@@ -348,9 +348,9 @@ def weights(layout, settings) -> None:
             column.prop(settings.weights, name)
 
 
-def of_ball(layout, settings) -> None:
+def draw_ball(layout, settings) -> None:
     """Draw the ball's kind, or its custom values."""
-    column = split(layout)
+    column = create_value_column(layout)
     column.prop(settings, "ball")
     column.prop(settings, "own")
     if settings.own:

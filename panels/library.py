@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import bpy
 
-from .tab import Step, paragraph, part, table
+from .tab import TabPanel, draw_paragraph, draw_header, draw_table
 
-MARKS = ("STRIP_COLOR_04", "STRIP_COLOR_02", "STRIP_COLOR_01", "BLANK1")  # green, orange, red, not measured
-STATES = {"OPEN": "RADIOBUT_OFF", "ACCEPTED": "CHECKMARK", "REFUSED": "X"}
+QUALITY_ICONS = ("STRIP_COLOR_04", "STRIP_COLOR_02", "STRIP_COLOR_01", "BLANK1")  # green, orange, red, not measured
+STATE_ICONS = {"OPEN": "RADIOBUT_OFF", "ACCEPTED": "CHECKMARK", "REFUSED": "X"}
 
 
 class BEYOND_MOCAP_UL_clips(bpy.types.UIList):
@@ -16,7 +16,7 @@ class BEYOND_MOCAP_UL_clips(bpy.types.UIList):
     def draw_item(self, _context, layout, _data, clip, _icon, _active_data, _active_property):
         row = layout.row(align=True)
         names = row.split(factor=0.66, align=True)
-        names.label(text=clip.name, icon=MARKS[clip.mark])
+        names.label(text=clip.name, icon=QUALITY_ICONS[clip.grade])
         names.label(text=clip.brief)
         row.operator("beyond_mocap.import_clip", text="", icon="IMPORT", emboss=False).path = clip.path
 
@@ -31,7 +31,7 @@ class BEYOND_MOCAP_UL_proposals(bpy.types.UIList):
         row = layout.row(align=True)
         row.active = one.state != "REFUSED"
         names = row.split(factor=0.72, align=True)
-        names.label(text=one.name.replace("_", " "), icon=STATES[one.state])
+        names.label(text=one.name.replace("_", " "), icon=STATE_ICONS[one.state])
         names.label(text=f"{min(one.confidence, 0.99):.0%}")
         for what, icon in (("ACCEPT", "CHECKMARK"), ("REFUSE", "X")):
             button = row.operator("beyond_mocap.judge_proposal", text="", icon=icon, emboss=False)
@@ -41,7 +41,7 @@ class BEYOND_MOCAP_UL_proposals(bpy.types.UIList):
         """Draw nothing: the list is short."""
 
 
-class BEYOND_MOCAP_PT_library(Step, bpy.types.Panel):
+class BEYOND_MOCAP_PT_library(TabPanel, bpy.types.Panel):
     """The library's folder, its content, its clips, and tools."""
 
     bl_label = "1  Library"
@@ -54,27 +54,27 @@ class BEYOND_MOCAP_PT_library(Step, bpy.types.Panel):
         layout.prop(settings, "library_folder", text="")
         if listing.missing:
             box = layout.box()
-            paragraph(box, "This folder does not exist", "ERROR")
+            draw_paragraph(box, "This folder does not exist", "ERROR")
             box.operator("beyond_mocap.relink_library", icon="FILE_FOLDER")
         row = layout.row(align=True)
         row.scale_y = 1.3
         row.operator("beyond_mocap.build_library", icon="ASSET_MANAGER")
-        self.progress(context, "library")
+        self.draw_progress(context, "library")
         current = listing.folder == settings.library_folder
         if current and listing.news:
             box = layout.box()
-            paragraph(box, f"{listing.news}; build the library again to use them", "INFO")
+            draw_paragraph(box, f"{listing.news}; build the library again to use them", "INFO")
             box.operator("beyond_mocap.build_library", text="Build Again", icon="FILE_REFRESH")
-        first, *held = settings.library_holds.splitlines() or ("",)
-        if held:
-            if body := part(layout, "library_holds", first):
-                table(body, held)
-        if body := part(layout, "library_clips", f"Clips ({listing.total})" if current and listing.total else "Clips"):
+        first, *content = settings.library_holds.splitlines() or ("",)
+        if content:
+            if body := draw_header(layout, "library_holds", first):
+                draw_table(body, content)
+        if body := draw_header(layout, "library_clips", f"Clips ({listing.total})" if current and listing.total else "Clips"):
             draw_clips(body, settings, listing, current)
         if context.object is not None and "beyond_mocap_clip" in context.object:
-            draw_opened(layout, context.object, settings)
-        self.progress(context, "learning")
-        if body := part(layout, "library_more", "Tools"):
+            draw_open_clip(layout, context.object, settings)
+        self.draw_progress(context, "learning")
+        if body := draw_header(layout, "library_more", "Tools"):
             draw_tools(body, settings)
 
 
@@ -93,14 +93,14 @@ def draw_clips(layout, settings, listing, current) -> None:
         return
     clip = listing.shown[listing.active]
     column = layout.column(align=True)
-    paragraph(column, clip.path, "FILE")
-    paragraph(column, clip.words.replace("_", " ") or "No labels: the library does not use this clip", "BOOKMARKS")
-    paragraph(column, clip.figures, "TIME")
-    table(column, clip.told.splitlines())
+    draw_paragraph(column, clip.path, "FILE")
+    draw_paragraph(column, clip.words.replace("_", " ") or "No labels: the library does not use this clip", "BOOKMARKS")
+    draw_paragraph(column, clip.figures, "TIME")
+    draw_table(column, clip.details.splitlines())
     row = layout.row(align=True)
     row.operator("beyond_mocap.import_clip", text="Import", icon="IMPORT").path = clip.path
     row.operator("beyond_mocap.annotate_clip", text="Annotate", icon="GREASEPENCIL").path = clip.path
-    if body := part(layout, "library_assets", "Assets"):
+    if body := draw_header(layout, "library_assets", "Assets"):
         draw_assets(body, listing)
 
 
@@ -114,7 +114,7 @@ def draw_assets(layout, listing) -> None:
     column.operator("beyond_mocap.make_assets", text="Selected Armatures", icon="ARMATURE_DATA").which = "SELECTED"
 
 
-def draw_opened(layout, thing, settings) -> None:
+def draw_open_clip(layout, thing, settings) -> None:
     """Draw the operators for a clip that is in the scene."""
     box = layout.box()
     box.label(text=thing.name, icon="ARMATURE_DATA")
@@ -137,8 +137,8 @@ def draw_proposals(layout, group) -> None:
     layout.template_list("BEYOND_MOCAP_UL_proposals", "", group, "listed", group, active_propname="active", rows=4)
     if 0 <= group.active < len(group.listed):
         one = group.listed[group.active]
-        paragraph(layout, one.name.replace("_", " "), "BOOKMARKS")
-        paragraph(layout, f"{one.source}: {one.why}" if one.why else one.source, "INFO")
+        draw_paragraph(layout, one.name.replace("_", " "), "BOOKMARKS")
+        draw_paragraph(layout, f"{one.source}: {one.why}" if one.why else one.source, "INFO")
     column = layout.column(align=True)
     column.operator("beyond_mocap.review_proposals", icon="EVENT_A")
     row = column.row(align=True)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import bpy
 
-from ..scene.markers.settings import active_label, cloud_meant
-from .tab import Step, paragraph, section, split, table
+from ..scene.markers.settings import find_active_label, find_target_cloud
+from .tab import TabPanel, draw_paragraph, draw_section, create_value_column, draw_table
 
-MOST = 6  # messages that are shown
+MAX_MESSAGES = 6  # messages that are shown
 ROLE_ICONS = {"OPTIONAL": "CHECKBOX_DEHLT", "STATIC": "ARMATURE_DATA", "BALL": "MESH_UVSPHERE", "OTHER": "CANCEL"}
 
 
@@ -27,7 +27,7 @@ class BEYOND_MOCAP_UL_markers(bpy.types.UIList):
         share.label(text=f"{item.seen:.0f} %")
 
 
-class BEYOND_MOCAP_PT_markers(Step, bpy.types.Panel):
+class BEYOND_MOCAP_PT_markers(TabPanel, bpy.types.Panel):
     """Recordings of optical markers, and their reconstruction."""
 
     bl_label = "Optical Markers"
@@ -36,74 +36,74 @@ class BEYOND_MOCAP_PT_markers(Step, bpy.types.Panel):
 
     def draw(self, context):
         """Draw the active cloud, section by section."""
-        layout, cloud = self.layout, cloud_meant(context)
+        layout, cloud = self.layout, find_target_cloud(context)
         layout.operator("beyond_mocap.import_markers", icon="IMPORT")
         settings = context.scene.beyond_mocap_markers
         if cloud is None or settings.unit:
-            split(layout).prop(settings, "unit")
+            create_value_column(layout).prop(settings, "unit")
         if cloud is None:
             return
-        kept = cloud.beyond_mocap_cloud
+        properties = cloud.beyond_mocap_cloud
         row = layout.row(align=True)
         row.label(text=cloud.name, icon="POINTCLOUD_DATA")
         row.prop(settings, "names", text="", icon="FONT_DATA")
-        row.prop(kept, "lines", text="", icon="MOD_WIREFRAME")
-        row.prop(kept, "size", text="")
-        section(layout, "markers_labels", "Labels & Segments", lambda opened: labels(opened, kept), closed=False)
-        section(layout, "markers_clean", "Clean Up", lambda opened: clean(self, opened, context, kept))
-        section(layout, "markers_model", "Static Trial & Model", lambda opened: model(opened, kept))
-        section(layout, "markers_pose", "Reconstruct", lambda opened: pose(self, opened, context, kept), closed=False)
-        section(layout, "markers_release", "Ball & Release", lambda opened: release(self, opened, context, kept))
+        row.prop(properties, "lines", text="", icon="MOD_WIREFRAME")
+        row.prop(properties, "size", text="")
+        draw_section(layout, "markers_labels", "Labels & Segments", lambda opened: draw_labels(opened, properties), closed=False)
+        draw_section(layout, "markers_clean", "Clean Up", lambda opened: draw_clean_up(self, opened, context, properties))
+        draw_section(layout, "markers_model", "Static Trial & Model", lambda opened: draw_model(opened, properties))
+        draw_section(layout, "markers_pose", "Reconstruct", lambda opened: draw_pose(self, opened, context, properties), closed=False)
+        draw_section(layout, "markers_release", "Ball & Release", lambda opened: draw_release(self, opened, context, properties))
 
 
-def labels(layout, kept) -> None:
+def draw_labels(layout, properties) -> None:
     """Draw the list and the properties of the active marker."""
     row = layout.row(align=True)
-    row.operator_menu_enum("beyond_mocap.use_marker_set", "which", text=kept.set_name or "Marker Set", icon="PRESET")
+    row.operator_menu_enum("beyond_mocap.use_marker_set", "which", text=properties.set_name or "Marker Set", icon="PRESET")
     row.operator("beyond_mocap.load_marker_set", text="", icon="FILE_FOLDER")
     row.operator("beyond_mocap.save_marker_set", text="", icon="FILE_TICK")
-    layout.template_list("BEYOND_MOCAP_UL_markers", "", kept, "labels", kept, active_propname="active_label", rows=5)
+    layout.template_list("BEYOND_MOCAP_UL_markers", "", properties, "labels", properties, active_propname="active_label", rows=5)
     layout.operator_menu_enum("beyond_mocap.assign_markers", "segment", text="Assign to Segment", icon="BONE_DATA")
-    label = active_label(kept.id_data)
+    label = find_active_label(properties.id_data)
     if label is not None:
-        column = split(layout)
+        column = create_value_column(layout)
         for name in ("segment", "landmark", "role"):
             column.prop(label, name)
 
 
-def lines(layout, text: str, icon: str) -> None:
+def draw_lines(layout, text: str, icon: str) -> None:
     """Draw the first lines of a text, and how many more there are."""
-    told = text.splitlines()
-    for line in told[:MOST]:
-        paragraph(layout, line, icon)
-    if len(told) > MOST:
-        layout.label(text=f"and {len(told) - MOST} more, in the Info editor", icon="BLANK1")
+    messages = text.splitlines()
+    for line in messages[:MAX_MESSAGES]:
+        draw_paragraph(layout, line, icon)
+    if len(messages) > MAX_MESSAGES:
+        layout.label(text=f"and {len(messages) - MAX_MESSAGES} more, in the Info editor", icon="BLANK1")
 
 
-def clean(panel, layout, context, kept) -> None:
+def draw_clean_up(panel, layout, context, properties) -> None:
     """Draw the clean-up button and its report."""
     layout.operator("beyond_mocap.clean_markers", icon="BRUSH_DATA")
     panel.progress(context, "clean markers")
-    lines(layout, kept.cleaned, "DOT")
+    draw_lines(layout, properties.cleaned, "DOT")
 
 
-def model(layout, kept) -> None:
+def draw_model(layout, properties) -> None:
     """Draw static trial and model."""
-    column = split(layout)
-    column.prop(kept, "static")
+    column = create_value_column(layout)
+    column.prop(properties, "static")
     layout.operator("beyond_mocap.set_static", icon="ARMATURE_DATA")
-    column = split(layout)
-    column.prop(kept, "model")
-    column.prop(kept, "use_model")
+    column = create_value_column(layout)
+    column.prop(properties, "model")
+    column.prop(properties, "use_model")
     row = layout.row(align=True)
     row.operator("beyond_mocap.load_marker_model", text="Load Model", icon="FILE_FOLDER")
     row.operator("beyond_mocap.save_marker_model", text="Save Model", icon="FILE_TICK")
 
 
-def pose(panel, layout, context, kept) -> None:
+def draw_pose(panel, layout, context, properties) -> None:
     """Draw the settings of the reconstruction, its button and its figures."""
     settings = context.scene.beyond_mocap_markers
-    column = split(layout)
+    column = create_value_column(layout)
     column.prop(settings, "filter")
     if settings.filter != "none":
         column.prop(settings, "cutoff")
@@ -115,18 +115,18 @@ def pose(panel, layout, context, kept) -> None:
     row.scale_y = 1.3
     row.operator("beyond_mocap.reconstruct_markers", icon="PLAY")
     panel.progress(context, "reconstruct markers")
-    table(layout, kept.figures.splitlines())
-    lines(layout, kept.told, "INFO")
+    draw_table(layout, properties.figures.splitlines())
+    draw_lines(layout, properties.told, "INFO")
 
 
-def release(panel, layout, context, kept) -> None:
+def draw_release(panel, layout, context, properties) -> None:
     """Draw settings, button and figures of the release."""
     settings = context.scene.beyond_mocap_markers
-    column = split(layout)
+    column = create_value_column(layout)
     for name in ("hand", "thrown", "radius"):
         column.prop(settings, name)
     layout.operator("beyond_mocap.find_release", icon="FORCE_FORCE")
     panel.progress(context, "find release")
-    table(layout, kept.release.splitlines())
-    if kept.ball is not None:
-        split(layout).prop(kept, "ball")
+    draw_table(layout, properties.release.splitlines())
+    if properties.ball is not None:
+        create_value_column(layout).prop(properties, "ball")

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import bpy
 
-from ..scene.match.settings import active_of
-from .tab import Step, paragraph, section, split
+from ..scene.match.settings import find_active_player
+from .tab import TabPanel, draw_paragraph, draw_section, create_value_column
 
-LINES = 12  # lines of a report shown in the panel
+MAX_LINES = 12  # lines of a report shown in the panel
 TEAM_ICONS = {"home": "EVENT_H", "away": "EVENT_A", "referee": "EVENT_R"}
 
 
@@ -24,7 +24,7 @@ class BEYOND_MOCAP_UL_match(bpy.types.UIList):
         row.label(text=item.name or item.feed_id)
 
 
-class BEYOND_MOCAP_PT_match(Step, bpy.types.Panel):
+class BEYOND_MOCAP_PT_match(TabPanel, bpy.types.Panel):
     """Files, players, time and result of a match."""
 
     bl_label = "Match"
@@ -34,33 +34,33 @@ class BEYOND_MOCAP_PT_match(Step, bpy.types.Panel):
     def draw(self, context):
         """Draw files, list, time and buttons."""
         layout, match = self.layout, context.scene.beyond_mocap_match
-        column = split(layout)
+        column = create_value_column(layout)
         column.prop(match, "tracking_file")
-        section(layout, "match_files", "More Files", lambda opened: more_files(opened, match))
+        draw_section(layout, "match_files", "More Files", lambda opened: draw_more_files(opened, match))
         layout.operator("beyond_mocap.read_match", icon="FILE_REFRESH")
-        self.progress(context, "match file")
+        self.draw_progress(context, "match file")
         if not match.tracking_file:
-            paragraph(layout, "Choose a provider's tracking file, or drop it into the view", "INFO")
+            draw_paragraph(layout, "Choose a provider's tracking file, or drop it into the view", "INFO")
         if match.players:
-            people(layout, match)
+            draw_players(layout, match)
         if match.report:
-            section(layout, "match_data", "Data", lambda opened: told(opened, match.report))
-        column = split(layout)
+            draw_section(layout, "match_data", "Data", lambda opened: draw_messages(opened, match.report))
+        column = create_value_column(layout)
         for name in ("start", "end", "folder"):
             column.prop(match, name)
-        section(layout, "match_work", "Processing", lambda opened: work(opened, context.scene))
+        draw_section(layout, "match_work", "Processing", lambda opened: draw_processing(opened, context.scene))
         row = layout.row(align=True)
         row.scale_y = 1.3
         row.operator("beyond_mocap.make_match", icon="PLAY")
         row.operator("beyond_mocap.show_match", icon="HIDE_OFF")
-        self.progress(context, "match")
+        self.draw_progress(context, "match")
         if match.shown:
-            look(layout, match)
+            draw_display(layout, match)
 
 
-def more_files(layout, match) -> None:
+def draw_more_files(layout, match) -> None:
     """Draw the files that are not found from the tracking file's name."""
-    column = split(layout)
+    column = create_value_column(layout)
     for name in ("metadata_file", "provider", "events_file"):
         column.prop(match, name)
     if match.events_file:
@@ -68,7 +68,7 @@ def more_files(layout, match) -> None:
             column.prop(match, name)
 
 
-def people(layout, match) -> None:
+def draw_players(layout, match) -> None:
     """Draw the list, buttons to select many players, and the teams' colours."""
     layout.template_list("BEYOND_MOCAP_UL_match", "", match, "players", match, active_propname="active", rows=5)
     row = layout.row(align=True)
@@ -79,31 +79,31 @@ def people(layout, match) -> None:
         row.prop(match, f"{team}_colour", text="")
 
 
-def told(layout, lines: str) -> None:
+def draw_messages(layout, lines: str) -> None:
     """Draw messages about detected and corrected data."""
-    found = lines.splitlines()
-    for line in found[:LINES]:
-        paragraph(layout, line, "DOT")
-    if len(found) > LINES:
-        layout.label(text=f"... and {len(found) - LINES} more lines")
+    messages = lines.splitlines()
+    for line in messages[:MAX_LINES]:
+        draw_paragraph(layout, line, "DOT")
+    if len(messages) > MAX_LINES:
+        layout.label(text=f"... and {len(messages) - MAX_LINES} more lines")
 
 
-def work(layout, scene) -> None:
+def draw_processing(layout, scene) -> None:
     """Draw how the work is done."""
     match = scene.beyond_mocap_match
-    column = split(layout)
+    column = create_value_column(layout)
     for name in ("solve_touches", "workers", "scheduler", "first_frame"):
         column.prop(match, name)
     column.prop(scene.beyond_mocap, "rate")
 
 
-def look(layout, match) -> None:
+def draw_display(layout, match) -> None:
     """Draw the cameras, and messages about the displayed match."""
     row = layout.row(align=True)
     row.operator("beyond_mocap.match_camera", text="Broadcast", icon="VIEW_CAMERA").which = "STAND"
-    chosen = active_of(match)
+    chosen = find_active_player(match)
     name = f"Eyes of {chosen.name or chosen.feed_id}" if chosen is not None else "Eyes"
     row.operator("beyond_mocap.match_camera", text=name, icon="HIDE_OFF").which = "EYES"
     layout.operator("beyond_mocap.match_export", icon="EXPORT")
-    for line in match.told.splitlines()[:LINES]:
-        paragraph(layout, line, "INFO")
+    for line in match.told.splitlines()[:MAX_LINES]:
+        draw_paragraph(layout, line, "INFO")

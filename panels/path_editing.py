@@ -9,19 +9,19 @@ from functools import lru_cache
 
 import bpy
 
-from ..scene.core.settings import active_player
-from ..scene.path_editing.settings import meant
-from .tab import Step, figures, paragraph, section, split
+from ..scene.core.settings import find_active_player
+from ..scene.path_editing.settings import list_target_bodies
+from .tab import TabPanel, draw_figures, draw_paragraph, draw_section, create_value_column
 
 OVERLAYS = {"path_source": "CURVE_PATH", "path_new": "CURVE_NCURVE", "path_trackers": "EMPTY_SINGLE_ARROW",
             "path_residuals": "TRACKING_REFINE_BACKWARDS", "path_ghost": "GHOST_ENABLED"}
 CAMERAS = (("ABOVE", "Above"), ("SIDE", "Side"), ("QUARTER", "Quarter"), ("BEHIND", "Behind"))
-LOOKED = "beyond_mocap_path_camera"  # custom property of the extension's cameras: which one it is
+CAMERA_MARK = "beyond_mocap_path_camera"  # custom property of the extension's cameras: which one it is
 NUDGES = (
     ("LEFT", "TRIA_LEFT"), ("RIGHT", "TRIA_RIGHT"), ("FORTH", "TRIA_UP"), ("BACK", "TRIA_DOWN"), ("UP", "SORT_DESC"),
     ("DOWN", "SORT_ASC"),
 )
-WORSE = {  # the effect of each frame
+FRAME_NOTES = {  # the effect of each frame
     "path": "Offsets turn with the path, seen from above: recommended",
     "tangent": "Offsets turn with the full tangent: the body tilts on hills and lies flat on steep paths",
     "absolute": "Offsets do not turn with the path: in a bend the sway of the steps has the wrong direction",
@@ -43,7 +43,7 @@ FIGURES = (  # name, key path in the figures, factor, format, unit; target: a nu
 SLACK = 1.02  # factor on a target: a difference that the displayed digits do not show
 
 
-class BEYOND_MOCAP_PT_path(Step, bpy.types.Panel):
+class BEYOND_MOCAP_PT_path(TabPanel, bpy.types.Panel):
     """The armature, its curve, and how its motion follows the curve."""
 
     bl_label = "Path Editing"
@@ -52,55 +52,55 @@ class BEYOND_MOCAP_PT_path(Step, bpy.types.Panel):
 
     def draw(self, context):
         """Draw the armature, its path, its figures, cameras and overlays."""
-        layout, body = self.layout, subject(context)
+        layout, body = self.layout, find_subject(context)
         if body is None:
-            paragraph(layout, "Select an armature with a motion", "INFO")
+            draw_paragraph(layout, "Select an armature with a motion", "INFO")
         else:
-            ride = body.beyond_mocap_ride
-            who(layout, body, ride)
-            if ride.on:
-                section(layout, "path_curve", "New Curve", lambda opened: new_curve(opened, context.scene.beyond_mocap))
-                section(layout, "path_following", "Path Following", lambda opened: following(opened, ride))
-                section(layout, "path_body", "Body", lambda opened: own_body(opened, ride))
-                if told := figure_lines(ride.figures):
-                    section(layout, "path_figures", "Figures", lambda opened: figures(opened, told))
-        section(layout, "path_cameras", "Cameras & Nudging", lambda opened: looking(opened, context), closed=False)
-        section(layout, "path_overlays", "Overlays", lambda opened: overlays(opened, context.scene.beyond_mocap.view))
+            edit = body.beyond_mocap_ride
+            draw_armature(layout, body, edit)
+            if edit.on:
+                draw_section(layout, "path_curve", "New Curve", lambda opened: draw_new_curve(opened, context.scene.beyond_mocap))
+                draw_section(layout, "path_following", "Path Following", lambda opened: draw_following(opened, edit))
+                draw_section(layout, "path_body", "Body", lambda opened: draw_body(opened, edit))
+                if figure_text := describe_figures(edit.figures):
+                    draw_section(layout, "path_figures", "Figures", lambda opened: draw_figures(opened, figure_text))
+        draw_section(layout, "path_cameras", "Cameras & Nudging", lambda opened: draw_cameras(opened, context), closed=False)
+        draw_section(layout, "path_overlays", "Overlays", lambda opened: draw_overlays(opened, context.scene.beyond_mocap.view))
 
 
-def subject(context) -> bpy.types.Object | None:
+def find_subject(context) -> bpy.types.Object | None:
     """Find the active armature, the armature on the active curve, or else the active player's body."""
     active = context.view_layer.objects.active
     if active is not None and active.type == "ARMATURE":
         return active
-    if active is not None and active.type == "CURVE" and (ridden := meant(context)):
-        return ridden[0]
-    player = active_player(context.scene.beyond_mocap)
+    if active is not None and active.type == "CURVE" and (edited := list_target_bodies(context)):
+        return edited[0]
+    player = find_active_player(context.scene.beyond_mocap)
     body = player.body if player is not None else None
     return body if body is not None and body.type == "ARMATURE" else None
 
 
-def who(layout, body, ride) -> None:
+def draw_armature(layout, body, edit) -> None:
     """Draw the armature, its curve and the buttons to start, apply and revert."""
-    layout.label(text=f"{body.name} on Path" if ride.on else body.name, icon="ARMATURE_DATA")
-    layout.prop(ride, "curve", text="", placeholder="Curve fitted to its motion")
+    layout.label(text=f"{body.name} on Path" if edit.on else body.name, icon="ARMATURE_DATA")
+    layout.prop(edit, "curve", text="", placeholder="Curve fitted to its motion")
     row = layout.row(align=True)
     row.scale_y = 1.3
-    if not ride.on:
+    if not edit.on:
         row.operator("beyond_mocap.edit_path", icon="CURVE_BEZCURVE")
     else:
         row.operator("beyond_mocap.bake_path", text="Apply", icon="CHECKMARK")
         row.operator("beyond_mocap.leave_path", text="Revert", icon="X")
         row = layout.row(align=True)
-        row.prop(ride, "live", toggle=True, icon="PLAY")
+        row.prop(edit, "live", toggle=True, icon="PLAY")
         row.operator("beyond_mocap.update_path", text="Update", icon="FILE_REFRESH")
-    for line in ride.told.splitlines():
-        paragraph(layout, line, "INFO")
+    for line in edit.told.splitlines():
+        draw_paragraph(layout, line, "INFO")
 
 
-def new_curve(layout, settings) -> None:
+def draw_new_curve(layout, settings) -> None:
     """Draw the settings and buttons of a new curve."""
-    column = split(layout)
+    column = create_value_column(layout)
     for name in ("curve_kind", "curve_points", "curve_degree"):
         if name != "curve_degree" or settings.curve_kind == "NURBS":
             column.prop(settings, name)
@@ -111,48 +111,48 @@ def new_curve(layout, settings) -> None:
         button.count, button.degree = settings.curve_points, settings.curve_degree
 
 
-def following(layout, ride) -> None:
+def draw_following(layout, edit) -> None:
     """Draw how the motion follows its path."""
-    column = split(layout)
-    column.prop(ride, "fit")
-    if ride.fit == "polynomial":
-        column.prop(ride, "degree")
+    column = create_value_column(layout)
+    column.prop(edit, "fit")
+    if edit.fit == "polynomial":
+        column.prop(edit, "degree")
     for name in ("by_arc_length", "speed", "delay", "end", "cycle", "bends", "climbs"):
-        column.prop(ride, name)
+        column.prop(edit, name)
     row = layout.row(align=True)
     row.operator("beyond_mocap.path_apart", icon="MOD_PHYSICS")
     row.operator("beyond_mocap.path_apart", text="", icon="X").clear = True
 
 
-def own_body(layout, ride) -> None:
+def draw_body(layout, edit) -> None:
     """Draw what the body does on the path."""
-    column = split(layout)
+    column = create_value_column(layout)
     for name in ("plant", "lean", "slopes", "ground"):
-        column.prop(ride, name)
-    section(layout, "path_paper", "As in the Paper", lambda opened: paper(opened, ride))
+        column.prop(edit, name)
+    draw_section(layout, "path_paper", "As in the Paper", lambda opened: draw_frame_choice(opened, edit))
 
 
-def paper(layout, ride) -> None:
+def draw_frame_choice(layout, edit) -> None:
     """Draw the alternatives for the frame of the offsets, with their effects."""
-    split(layout).prop(ride, "frame")
-    paragraph(layout, WORSE[ride.frame], "INFO")
+    create_value_column(layout).prop(edit, "frame")
+    draw_paragraph(layout, FRAME_NOTES[edit.frame], "INFO")
 
 
-def looking(layout, context) -> None:
+def draw_cameras(layout, context) -> None:
     """Draw the four cameras, and the step and directions of nudging."""
     column = layout.column(align=True)
     column.operator("beyond_mocap.path_cameras", icon="VIEW_CAMERA")
     row, camera = column.row(align=True), context.scene.camera
-    seen = camera.get(LOOKED) if camera is not None else ""
+    active_camera = camera.get(CAMERA_MARK) if camera is not None else ""
     for kind, text in CAMERAS:
-        row.operator("beyond_mocap.path_camera", text=text, depress=kind == seen).which = kind
+        row.operator("beyond_mocap.path_camera", text=text, depress=kind == active_camera).which = kind
     row = layout.row(align=True)
     row.prop(context.scene.beyond_mocap, "nudge_step", text="Nudge")
     for direction, icon in NUDGES:
         row.operator("beyond_mocap.nudge_points", text="", icon=icon).direction = direction
 
 
-def overlays(layout, view) -> None:
+def draw_overlays(layout, view) -> None:
     """Draw the switches of the path overlays."""
     grid = layout.grid_flow(columns=2, even_columns=True, align=True)
     grid.active = view.show
@@ -161,7 +161,7 @@ def overlays(layout, view) -> None:
 
 
 @lru_cache(maxsize=64)
-def figure_lines(figures: str) -> str:
+def describe_figures(figures: str) -> str:
     """Describe figures given as JSON text, "" without any; cached, since panels ask at every redraw."""
     try:
         table = json.loads(figures) if figures else {}
@@ -169,25 +169,25 @@ def figure_lines(figures: str) -> str:
         table = {}
     found = []
     for name, path, factor, form, unit, aim in FIGURES:
-        value = _figure(table, path)
+        value = _find_figure(table, path)
         if value is None:
             continue
-        most = _most(table, aim)
+        most = _compute_target(table, aim)
         status = "" if most is None else ("met" if value * factor <= most * factor * SLACK + 0.05 else "missed")
-        told = "" if most is None else f"≤ {form.format(factor * most)}"
-        found.append(f"{name}: {form.format(factor * value)}{unit}\t{told}\t{status}")
+        target_text = "" if most is None else f"≤ {form.format(factor * most)}"
+        found.append(f"{name}: {form.format(factor * value)}{unit}\t{target_text}\t{status}")
     return "\n".join(found)
 
 
-def _most(table: Mapping, aim) -> float | None:
+def _compute_target(table: Mapping, aim) -> float | None:
     """Compute the target of a figure, see FIGURES."""
     if isinstance(aim, tuple):
-        own = _figure(table, aim[0])
+        own = _find_figure(table, aim[0])
         return max(own, aim[1]) if own is not None else aim[1]
-    return _figure(table, aim) if isinstance(aim, str) else aim
+    return _find_figure(table, aim) if isinstance(aim, str) else aim
 
 
-def _figure(table: Mapping, path: str) -> float | None:
+def _find_figure(table: Mapping, path: str) -> float | None:
     for part in path.split("."):
         table = table.get(part) if isinstance(table, Mapping) else None
     return float(table) if isinstance(table, (int, float)) and math.isfinite(table) else None

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import bpy
 
-from ..scene.core.settings import active_player
-from .tab import Step, paragraph, part, split
+from ..scene.core.settings import find_active_player
+from .tab import TabPanel, draw_paragraph, draw_header, create_value_column
 
 
 class BEYOND_MOCAP_UL_players(bpy.types.UIList):
@@ -21,7 +21,7 @@ class BEYOND_MOCAP_UL_players(bpy.types.UIList):
         row.label(text="", icon="CHECKMARK" if item.take else "BLANK1")
 
 
-class BEYOND_MOCAP_PT_players(Step, bpy.types.Panel):
+class BEYOND_MOCAP_PT_players(TabPanel, bpy.types.Panel):
     """The players, their tracks and their labels."""
 
     bl_label = "2  Track & Labels"
@@ -40,14 +40,14 @@ class BEYOND_MOCAP_PT_players(Step, bpy.types.Panel):
         row.column(align=True).operator("beyond_mocap.remove_player", text="", icon="REMOVE")
         if any(player.dot is None for player in settings.players):
             layout.operator("beyond_mocap.place_players", icon="NLA")
-        player = active_player(settings)
+        player = find_active_player(settings)
         if player is None:
-            paragraph(layout, "Import a tracking file, drop one into the view, or draw a track", "INFO")
+            draw_paragraph(layout, "Import a tracking file, drop one into the view, or draw a track", "INFO")
             return
-        column = split(layout)
+        column = create_value_column(layout)
         column.prop(player, "drawn_track")
         if player.drawn_track is not None:
-            drawn_on(column, player)
+            draw_curve_settings(column, player)
         else:
             column.prop(player, "tracking_file")
         if player.feed_id:
@@ -61,8 +61,8 @@ class BEYOND_MOCAP_PT_players(Step, bpy.types.Panel):
         row.prop(player, "annotation_text")
         row.operator("beyond_mocap.read_words", text="", icon="NLA")
         column.prop(player, "body")
-        own(layout, player)
-        pinned(layout, player)
+        draw_player_settings(layout, player)
+        draw_pins(layout, player)
 
 
 class BEYOND_MOCAP_UL_pins(bpy.types.UIList):
@@ -78,24 +78,24 @@ class BEYOND_MOCAP_UL_pins(bpy.types.UIList):
         row.prop(item, "hold", text="")
 
 
-def drawn_on(column, player) -> None:
+def draw_curve_settings(column, player) -> None:
     """Draw the settings of a drawn track."""
     if player.drawn_track.type == "CURVE":
         column.prop(player, "drawn_start")
         column.operator("beyond_mocap.set_speed", icon="DRIVER_DISTANCE")
 
 
-def own(layout, player) -> None:
+def draw_player_settings(layout, player) -> None:
     """Draw the settings of this player: height, foot, style."""
-    if body := part(layout, "player_own", "Player"):
+    if body := draw_header(layout, "player_own", "Player"):
         body.use_property_split, body.use_property_decorate = True, False
         for name in ("height", "strong_foot", "style", "style_weight"):
             body.prop(player, name)
 
 
-def pinned(layout, player) -> None:
+def draw_pins(layout, player) -> None:
     """Draw the pins of hands, feet and gaze."""
-    if body := part(layout, "player_pins", f"Pins: {len(player.pins)}" if player.pins else "Pins"):
+    if body := draw_header(layout, "player_pins", f"Pins: {len(player.pins)}" if player.pins else "Pins"):
         row = body.row()
         row.template_list("BEYOND_MOCAP_UL_pins", "", player, "pins", player, active_propname="active_pin", rows=2)
         row.column(align=True).operator("beyond_mocap.remove_pin", text="", icon="REMOVE")
@@ -104,7 +104,7 @@ def pinned(layout, player) -> None:
         row.operator_menu_enum("beyond_mocap.add_pin", "part", text="at Cursor", icon="PIVOT_CURSOR").at = "CURSOR"
 
 
-class BEYOND_MOCAP_PT_annotate(Step, bpy.types.Panel):
+class BEYOND_MOCAP_PT_annotate(TabPanel, bpy.types.Panel):
     """Start of annotation."""
 
     bl_label = "Annotate"
@@ -118,7 +118,7 @@ class BEYOND_MOCAP_PT_annotate(Step, bpy.types.Panel):
         row.operator("beyond_mocap.show_timeline", icon="NLA", text="")
 
 
-class BEYOND_MOCAP_PT_video(Step, bpy.types.Panel):
+class BEYOND_MOCAP_PT_video(TabPanel, bpy.types.Panel):
     """A movie or image sequence beside the match."""
 
     bl_label = "Reference Video"

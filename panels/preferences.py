@@ -9,13 +9,13 @@ import bpy
 import rna_keymap_ui
 
 from ..scene.core.preferences import EXTENSION, Preferences
-from .tab import part
+from .tab import draw_header
 
 
 def draw_keys(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """Draw a row for every key of the extension, under the name of its editor."""
     configurations = context.window_manager.keyconfigs
-    for keymap in _with_our_keys(configurations.addon):
+    for keymap in _find_keymaps(configurations.addon):
         own = configurations.user.keymaps.find(keymap.name, space_type=keymap.space_type,
                                                region_type=keymap.region_type)
         if own is None:
@@ -40,7 +40,7 @@ class BeyondMocapPreferences(Preferences, bpy.types.AddonPreferences):
         column.use_property_split = True
         column.prop(self, "cache_folder", placeholder="Beside each library")
         column.prop(self, "threads", text="Threads (0: all)")
-        if body := part(layout, "keys", "Keys", closed=False):
+        if body := draw_header(layout, "keys", "Keys", closed=False):
             draw_keys(body, context)
 
 
@@ -77,6 +77,6 @@ def unregister():
     bpy.types.TOPBAR_MT_file_export.remove(draw_export)
 
 
-def _with_our_keys(configuration: bpy.types.KeyConfig | None) -> list[bpy.types.KeyMap]:
+def _find_keymaps(configuration: bpy.types.KeyConfig | None) -> list[bpy.types.KeyMap]:
     keymaps = configuration.keymaps if configuration is not None else ()
     return [k for k in keymaps if any(item.idname.startswith("beyond_mocap.") for item in k.keymap_items)]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from .tab import Step, paragraph, part, split
+from .tab import TabPanel, draw_paragraph, draw_header, create_value_column
 
 
 class BEYOND_MOCAP_UL_bones(bpy.types.UIList):
@@ -18,7 +18,7 @@ class BEYOND_MOCAP_UL_bones(bpy.types.UIList):
             row.prop_search(item, "bone", target.data, "bones", text="", icon="BONE_DATA")
 
 
-class BEYOND_MOCAP_PT_rig(Step, bpy.types.Panel):
+class BEYOND_MOCAP_PT_rig(TabPanel, bpy.types.Panel):
     """The rig, its bones, bake settings and export."""
 
     bl_label = "5  Rig & Export"
@@ -26,14 +26,14 @@ class BEYOND_MOCAP_PT_rig(Step, bpy.types.Panel):
 
     def draw(self, context):
         layout, rig = self.layout, context.scene.beyond_mocap.rig
-        column = split(layout)
+        column = create_value_column(layout)
         row = column.row(align=True)
         row.prop(rig, "target")
         row.operator("beyond_mocap.use_selected_rig", text="", icon="EYEDROPPER")
         column.prop(rig, "source", placeholder="The active player's body")
         if rig.target is not None:
             self.draw_map(layout, rig)
-        column = split(layout)
+        column = create_value_column(layout)
         for name in ("root", "steps", "ik", "plants", "reduces"):
             column.prop(rig, name)
         if rig.reduces:
@@ -47,13 +47,13 @@ class BEYOND_MOCAP_PT_rig(Step, bpy.types.Panel):
         row = layout.row(align=True)
         row.operator("beyond_mocap.bake_to_rig", text="Selected Rigs").targets = "SELECTED"
         row.operator("beyond_mocap.bake_to_rig", text="All Players").targets = "PLAYERS"
-        for line in rig.told.splitlines():
-            paragraph(layout, line, "INFO")
+        for line in rig.messages.splitlines():
+            draw_paragraph(layout, line, "INFO")
         self.draw_export(layout, rig)
 
     def draw_map(self, layout, rig) -> None:
         """Draw the bone map."""
-        if body := part(layout, "bone_map", "Bone Map"):
+        if body := draw_header(layout, "bone_map", "Bone Map"):
             body.template_list("BEYOND_MOCAP_UL_bones", "", rig, "bones", rig, active_propname="active_bone", rows=8)
             row = body.row(align=True)
             row.operator("beyond_mocap.map_bones", text="Map", icon="FILE_REFRESH")
@@ -63,7 +63,7 @@ class BEYOND_MOCAP_PT_rig(Step, bpy.types.Panel):
 
     def draw_export(self, layout, rig) -> None:
         """Draw the export settings."""
-        if body := part(layout, "export", "Export", closed=False):
+        if body := draw_header(layout, "export", "Export", closed=False):
             body.use_property_split, body.use_property_decorate = True, False
             for name in ("format", "engine", "who", "own_rate", "deform_only", "meshes"):
                 body.prop(rig, name)

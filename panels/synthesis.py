@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 from bl_ui.utils import PresetPanel
 
-from .tab import Step, part
+from .tab import TabPanel, draw_header
 
 
 class BEYOND_MOCAP_MT_presets(bpy.types.Menu):
@@ -26,7 +26,7 @@ class BEYOND_MOCAP_PT_presets(PresetPanel, bpy.types.Panel):
     preset_add_operator = "beyond_mocap.add_preset"
 
 
-class BEYOND_MOCAP_PT_synthesis(Step, bpy.types.Panel):
+class BEYOND_MOCAP_PT_synthesis(TabPanel, bpy.types.Panel):
     """Synthesize button, progress and settings."""
 
     bl_label = "3  Synthesize"
@@ -42,17 +42,17 @@ class BEYOND_MOCAP_PT_synthesis(Step, bpy.types.Panel):
         row.operator("beyond_mocap.synthesize", icon="ARMATURE_DATA")
         row.operator("beyond_mocap.update", icon="FILE_REFRESH")
         row.prop(settings, "live", text="", icon="UV_SYNC_SELECT")
-        self.queue(context)
-        if body := part(layout, "synthesis_more", "Settings"):
+        self.draw_queue(context)
+        if body := draw_header(layout, "synthesis_more", "Settings"):
             body.use_property_split, body.use_property_decorate = True, False
             body.prop(settings, "method")
             if settings.method == "distance":
                 body.prop(settings, "catch_up")
             for name in ("solve_touches", "mirror", "nearest", "rate"):
                 body.prop(settings, name)
-            self.fine_tuning(body, settings)
+            self.draw_fine_tuning(body, settings)
 
-    def queue(self, context):
+    def draw_queue(self, context):
         """Draw the running job, its progress, and the waiting players."""
         running = context.window_manager.beyond_mocap_work
         if running.trouble:
@@ -71,9 +71,9 @@ class BEYOND_MOCAP_PT_synthesis(Step, bpy.types.Panel):
             row.label(text=f"{name} (waiting)", icon="TIME")
             row.operator("beyond_mocap.cancel", text="", icon="X", emboss=False).player = name
 
-    def fine_tuning(self, layout, settings):
+    def draw_fine_tuning(self, layout, settings):
         """Draw the settings that seldom need another value, closed at first."""
-        body = part(layout, "synthesis_tuning", "Fine-Tuning")
+        body = draw_header(layout, "synthesis_tuning", "Fine-Tuning")
         if not body:
             return
         for name in settings.list_tuning():

@@ -6,12 +6,12 @@ import textwrap
 
 import bpy
 
-LETTER = 5.7  # mean width of an interface letter in pixels, at a scale of 1
+LETTER_WIDTH = 5.7  # mean width of an interface letter in pixels, at a scale of 1
 MARKS = {"met": "CHECKMARK", "missed": "ERROR", "": "BLANK1"}
-EDGES = 70  # pixels of a sidebar without text: tabs, the box and its icon
+MARGIN = 70  # pixels of a sidebar without text: tabs, the box and its icon
 
 
-def table(layout, lines) -> None:
+def draw_table(layout, lines) -> None:
     """Draw lines "name: value" in two columns; a line without a colon fills the width."""
     column = layout.column(align=True)
     column.scale_y = 0.85
@@ -25,37 +25,37 @@ def table(layout, lines) -> None:
         row.label(text=value)
 
 
-def paragraph(layout, text: str, icon: str) -> None:
+def draw_paragraph(layout, text: str, icon: str) -> None:
     """Draw text over as many lines as the sidebar's width needs, because labels are cut; an icon precedes the first."""
     column = layout.column(align=True)
     column.scale_y = 0.85
-    for number, line in enumerate(wrapped(text)):
+    for number, line in enumerate(wrap_text(text)):
         column.label(text=line, icon="BLANK1" if number else icon)
 
 
-def figures(layout, text: str) -> None:
+def draw_figures(layout, text: str) -> None:
     """Draw lines "name: value" with target and status separated by tabs; an icon shows whether the target is met."""
     column = layout.column(align=True)
     column.scale_y = 0.85
     for line in text.splitlines():
-        told, target, status = (*line.split("\t"), "", "")[:3]
-        name, _, value = told.partition(": ")
+        name_and_value, target, status = (*line.split("\t"), "", "")[:3]
+        name, _, value = name_and_value.partition(": ")
         row = column.split(factor=0.54)
         row.label(text=name, icon=MARKS.get(status, "BLANK1"))
         right = row.split(factor=0.54)
         right.label(text=value)
-        aim = right.row()
-        aim.active = False
-        aim.label(text=target)
+        target_row = right.row()
+        target_row.active = False
+        target_row.label(text=target)
 
 
-def wrapped(text: str) -> list[str]:
+def wrap_text(text: str) -> list[str]:
     """Wrap text to the sidebar's width."""
     width = bpy.context.region.width / bpy.context.preferences.system.ui_scale
-    return textwrap.wrap(text, max(16, int((width - EDGES) / LETTER)))
+    return textwrap.wrap(text, max(16, int((width - MARGIN) / LETTER_WIDTH)))
 
 
-def part(layout, name: str, title: str, closed: bool = True, icon: str = "NONE"):
+def draw_header(layout, name: str, title: str, closed: bool = True, icon: str = "NONE"):
     """Draw the header of a collapsible part.
 
     Args:
@@ -72,27 +72,27 @@ def part(layout, name: str, title: str, closed: bool = True, icon: str = "NONE")
     return body
 
 
-def section(layout, name: str, title: str, draw, closed: bool = True) -> None:
+def draw_section(layout, name: str, title: str, draw, closed: bool = True) -> None:
     """Draw a collapsible part with the function `draw` while it is open."""
-    if body := part(layout, name, title, closed):
+    if body := draw_header(layout, name, title, closed):
         draw(body)
 
 
-def split(layout):
+def create_value_column(layout):
     """Create a column of named values."""
     column = layout.column()
     column.use_property_split, column.use_property_decorate = True, False
     return column
 
 
-class Step:
+class TabPanel:
     """A collapsible panel in the 3D view's sidebar; the panels are ordered by `bl_order`."""
 
     bl_space_type = "VIEW_3D"
     bl_region_type = "UI"
     bl_category = "Beyond Mocap"
 
-    def progress(self, context, kind: str) -> None:
+    def draw_progress(self, context, kind: str) -> None:
         """Draw a progress bar and a Cancel button while work of this kind runs in the background."""
         running = context.window_manager.beyond_mocap_work
         if running.kind == kind:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import bpy
 
-from ..scene.throws.settings import thrower
-from .tab import Step, paragraph, section, split, table
+from ..scene.throws.settings import find_thrower
+from .tab import TabPanel, draw_paragraph, draw_section, create_value_column, draw_table
 
 
-class BEYOND_MOCAP_PT_throws(Step, bpy.types.Panel):
+class BEYOND_MOCAP_PT_throws(TabPanel, bpy.types.Panel):
     """Settings, preview and figures of a throw or kick."""
 
     bl_label = "Throws & Kicks"
@@ -17,43 +17,43 @@ class BEYOND_MOCAP_PT_throws(Step, bpy.types.Panel):
 
     def draw(self, context):
         """Draw the armature, its settings, the two buttons and the figures."""
-        layout, body = self.layout, thrower(context)
+        layout, body = self.layout, find_thrower(context)
         if body is None:
-            paragraph(layout, "Select the armature that throws or kicks", "INFO")
+            draw_paragraph(layout, "Select the armature that throws or kicks", "INFO")
             return
-        wish = body.beyond_mocap_throw
+        settings = body.beyond_mocap_throw
         layout.label(text=body.name, icon="ARMATURE_DATA")
-        layout.row().prop(wish, "side", expand=True)
-        column = split(layout)
+        layout.row().prop(settings, "side", expand=True)
+        column = create_value_column(layout)
         for name in ("target", "frame", "speed", "ball", "kind", "library"):
-            column.prop(wish, name)
-        if wish.target is None:
-            paragraph(layout, "Without a target the 3D cursor is used", "CURSOR")
+            column.prop(settings, name)
+        if settings.target is None:
+            draw_paragraph(layout, "Without a target the 3D cursor is used", "CURSOR")
         row = layout.row(align=True)
         row.scale_y = 1.3
         row.operator("beyond_mocap.throw_at_target", text="Throw", icon="VIEW_PAN")
         row.operator("beyond_mocap.kick_at_target", text="Kick", icon="MOD_DYNAMICPAINT")
         for kind in ("throw", "kick"):
-            self.progress(context, kind)
-        shown(layout, wish)
-        section(layout, "throw_models", "Models", lambda opened: models(opened, wish))
+            self.draw_progress(context, kind)
+        draw_preview(layout, settings)
+        draw_section(layout, "throw_models", "Models", lambda opened: draw_models(opened, settings))
 
 
-def shown(layout, wish) -> None:
+def draw_preview(layout, settings) -> None:
     """Draw the figures of the preview, and the buttons to apply or revert it."""
-    if not wish.made:
+    if not settings.made:
         return
-    table(layout, wish.figures.splitlines())
-    for line in wish.told.splitlines():
-        paragraph(layout, line, "INFO")
-    layout.prop(wish, "live")
+    draw_table(layout, settings.figures.splitlines())
+    for line in settings.told.splitlines():
+        draw_paragraph(layout, line, "INFO")
+    layout.prop(settings, "live")
     row = layout.row(align=True)
     row.operator("beyond_mocap.keep_throw", text="Apply", icon="CHECKMARK")
     row.operator("beyond_mocap.leave_throw", text="Revert", icon="X")
 
 
-def models(layout, wish) -> None:
+def draw_models(layout, settings) -> None:
     """Draw the choice of networks."""
-    column = split(layout)
+    column = create_value_column(layout)
     for name in ("throw_model", "kick_model", "seed"):
-        column.prop(wish, name)
+        column.prop(settings, name)

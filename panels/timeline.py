@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import bpy
 
-from ..scene.core.settings import active_player
-from .tab import paragraph, part
+from ..scene.core.settings import find_active_player
+from .tab import draw_paragraph, draw_header
 
 MOST = 60  # key moments that the list shows
 
@@ -18,11 +18,11 @@ class BEYOND_MOCAP_MT_choose_player(bpy.types.Menu):
     def draw(self, context):
         """Draw a line for each player."""
         for player in context.scene.beyond_mocap.players:
-            icon = "LAYER_ACTIVE" if player == active_player(context.scene.beyond_mocap) else "BLANK1"
+            icon = "LAYER_ACTIVE" if player == find_active_player(context.scene.beyond_mocap) else "BLANK1"
             self.layout.operator("beyond_mocap.choose_player", text=player.name, icon=icon).player = player.name
 
 
-class Timeline:
+class TimelineTab:
     """The content that all time editors share."""
 
     bl_region_type = "UI"
@@ -32,7 +32,7 @@ class Timeline:
     def draw(self, context):
         """Draw the player, key moments, problems and tools."""
         layout, settings = self.layout, context.scene.beyond_mocap
-        target, player = written_on(context), active_player(settings)
+        target, player = find_target(context), find_active_player(settings)
         clip = target is not None and not target.beyond_mocap_dot.player
         row = layout.row(align=True)
         row.menu("BEYOND_MOCAP_MT_choose_player", text=target.name if clip else player.name if player else "No Player")
@@ -41,13 +41,13 @@ class Timeline:
         if target is None:
             layout.operator("beyond_mocap.place_players", icon="NLA")
         else:
-            self.moments(layout, target)
-            self.problems(layout, context, target)
-        self.tools(layout)
+            self.draw_moments(layout, target)
+            self.draw_problems(layout, context, target)
+        self.draw_tools(layout)
 
-    def moments(self, layout, target):
+    def draw_moments(self, layout, target):
         """Draw the key moments by frame; a click goes there and selects the moment."""
-        found = sorted(shown_moments(target), key=lambda one: one[0])
+        found = sorted(iter_visible_moments(target), key=lambda one: one[0])
         box = layout.column(align=True)
         for frame, name, strip, index, picked in found[:MOST]:
             line = box.operator("beyond_mocap.go_to_moment", text=f"{frame}   {name}", depress=picked)
@@ -59,13 +59,13 @@ class Timeline:
         row.operator("beyond_mocap.move_moment", text="Move", icon="TRIA_DOWN_BAR")
         row.operator("beyond_mocap.delete_moment", text="Delete", icon="REMOVE")
 
-    def problems(self, layout, context, target):
+    def draw_problems(self, layout, context, target):
         """Draw the problems of the labels, as of their last change."""
         for one in context.window_manager.beyond_mocap_problems.lines:
             if one.target == target.name:
-                paragraph(layout, f"{one.frame}: {one.line}", "ERROR")
+                draw_paragraph(layout, f"{one.frame}: {one.line}", "ERROR")
 
-    def tools(self, layout):
+    def draw_tools(self, layout):
         """Draw the tools for labels, spans and the text form."""
         layout.operator("beyond_mocap.annotate", icon="SYNTAX_ON")
         column = layout.column(align=True)
@@ -75,7 +75,7 @@ class Timeline:
         column.operator("beyond_mocap.add_span", icon="ADD")
         column.operator("beyond_mocap.split_span", icon="UNLINKED")
         column.operator("beyond_mocap.join_spans", icon="LINKED")
-        if body := part(layout, "timeline_text", "Text Form"):
+        if body := draw_header(layout, "timeline_text", "Text Form"):
             column = body.column(align=True)
             column.operator("beyond_mocap.read_words", icon="IMPORT")
             column.operator("beyond_mocap.words_to_text", icon="TEXT")
@@ -83,29 +83,29 @@ class Timeline:
             body.operator("beyond_mocap.player_from_dot", icon="ADD")
 
 
-class BEYOND_MOCAP_PT_timeline(Timeline, bpy.types.Panel):
+class BEYOND_MOCAP_PT_timeline(TimelineTab, bpy.types.Panel):
     """The tab in the NLA editor."""
 
     bl_space_type = "NLA_EDITOR"
 
 
-class BEYOND_MOCAP_PT_timeline_dope_sheet(Timeline, bpy.types.Panel):
+class BEYOND_MOCAP_PT_timeline_dope_sheet(TimelineTab, bpy.types.Panel):
     """The tab in the dope sheet."""
 
     bl_space_type = "DOPESHEET_EDITOR"
 
 
-def written_on(context) -> bpy.types.Object | None:
+def find_target(context) -> bpy.types.Object | None:
     """Find the target object: a clip that is being annotated, else the active player's dot."""
     active = context.view_layer.objects.active
     if active is not None and active.beyond_mocap_lanes.clock and not active.beyond_mocap_dot.player:
         return active
-    player = active_player(context.scene.beyond_mocap)
+    player = find_active_player(context.scene.beyond_mocap)
     dot = player.dot if player else None
     return dot if dot is not None and dot.beyond_mocap_lanes.clock and dot.animation_data else None
 
 
-def shown_moments(target):
+def iter_visible_moments(target):
     """Iterate over (frame, name, strip, index, is_selected) of the visible markers of an object's strips."""
     for track in target.animation_data.nla_tracks if target.animation_data else ():
         for strip in track.strips:

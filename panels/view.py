@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import bpy
 
-from ..scene.core.settings import active_player
-from .tab import Step
+from ..scene.core.settings import find_active_player
+from .tab import TabPanel
 
 ICONS = {"track": "CURVE_PATH", "footprints": "MOD_DYNAMICPAINT", "contacts": "PIVOT_CURSOR", "seams": "SEQUENCE",
          "moments": "KEYTYPE_KEYFRAME_VEC", "speed": "DRIVER_DISTANCE", "ghosts": "GHOST_ENABLED",
          "shots": "CON_TRACKTO"}
 
 
-class BEYOND_MOCAP_PT_view(Step, bpy.types.Panel):
+class BEYOND_MOCAP_PT_view(TabPanel, bpy.types.Panel):
     """Overlays and error curves."""
 
     bl_label = "View"
@@ -41,7 +41,7 @@ class BEYOND_MOCAP_PT_view(Step, bpy.types.Panel):
         more.prop(view, "in_front")
         row = layout.row(align=True)
         row.operator("beyond_mocap.error_curves", icon="GRAPH")
-        player = active_player(settings)
+        player = find_active_player(settings)
         shown = player is not None and player.body is not None and player.body.type == "ARMATURE"
         if shown and "Root Error (cm)" in player.body.data:
             row.operator("beyond_mocap.error_curves", text="", icon="X").remove = True

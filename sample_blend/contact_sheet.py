@@ -20,11 +20,11 @@ HERE = Path(__file__).resolve().parent
 if __name__ == "__main__":
     sys.path.insert(0, str(HERE.parent))
 
-from beyond_mocap.appearance.body import MATERIALS, BodyMesh, deformed, low_poly_body  # noqa: E402
+from beyond_mocap.appearance.body import MATERIALS, BodyMesh, deform_body, build_body  # noqa: E402
 from beyond_mocap.files.bvh import bvh  # noqa: E402
-from beyond_mocap.motion.humanoid import heading  # noqa: E402
-from beyond_mocap.motion.motion import Motion, at_frames, place, pose_kinematics  # noqa: E402
-from beyond_mocap.motion.quaternion import turned_about_up  # noqa: E402
+from beyond_mocap.motion.humanoid import compute_heading  # noqa: E402
+from beyond_mocap.motion.motion import Motion, sample_frames, place_motion, compute_pose  # noqa: E402
+from beyond_mocap.motion.quaternion import rotate_about_up  # noqa: E402
 
 COLOURS = {"skin": (0.60, 0.36, 0.24), "shirt": (0.72, 0.06, 0.05), "shorts": (0.86, 0.86, 0.84),
            "socks": (0.72, 0.06, 0.05), "boots": (0.03, 0.03, 0.035), "hair": (0.045, 0.028, 0.02)}
@@ -46,7 +46,7 @@ class Actor:
     body: BodyMesh | None = None
 
 
-def new_scene(width: int, height: int, samples: int = 24) -> bpy.types.Scene:
+def create_scene(width: int, height: int, samples: int = 24) -> bpy.types.Scene:
     """Create an empty file with sun, sky and grass, set to render with Cycles on the CPU."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     scene = bpy.context.scene
@@ -63,16 +63,16 @@ def new_scene(width: int, height: int, samples: int = 24) -> bpy.types.Scene:
     world.node_tree.nodes["Background"].inputs[1].default_value = 0.75
     scene.world = world
     light = bpy.data.lights.new("sun", "SUN")
-    light.energy, light.angle = 3.2, 0.03
+    light.compute_energy, light.angle = 3.2, 0.03
     sun = bpy.data.objects.new("sun", light)
     sun.rotation_euler = (0.75, 0.15, -0.5)
     scene.collection.objects.link(sun)
     add_mesh("grass", [(-300, -300, 0), (300, -300, 0), (300, 300, 0), (-300, 300, 0)], [(0, 1, 2, 3)],
-             [paint("grass", (0.10, 0.25, 0.07))])
+             [create_material("grass", (0.10, 0.25, 0.07))])
     return scene
 
 
-def paint(name: str, colour) -> bpy.types.Material:
+def create_material(name: str, colour) -> bpy.types.Material:
     """Create a matt material."""
     material = bpy.data.materials.new(name)
     material.use_nodes = True
@@ -92,9 +92,9 @@ def add_mesh(name: str, vertices, faces, materials, material=None, smooth: bool 
         mesh.polygons.foreach_set("material_index", np.asarray(material, dtype=np.int32))
     mesh.polygons.foreach_set("use_smooth", np.full(len(mesh.polygons), smooth))
     mesh.update()
-    thing = bpy.data.objects.new(name, mesh)
-    bpy.context.scene.collection.objects.link(thing)
-    return thing
+    mesh_object = bpy.data.objects.new(name, mesh)
+    bpy.context.scene.collection.objects.link(mesh_object)
+    return mesh_object
 
 
 def add_bodies(actor: Actor, frames: np.ndarray, moved: np.ndarray | None = None) -> None:
@@ -105,12 +105,12 @@ def add_bodies(actor: Actor, frames: np.ndarray, moved: np.ndarray | None = None
         frames: (N,) fractional frames.
         moved: (N, 3) m by which each is moved, None for none.
     """
-    body = actor.body or low_poly_body(actor.motion.skeleton, example=actor.motion)
-    root, local = at_frames(actor.motion, np.asarray(frames, dtype=float))
-    places, world = pose_kinematics(actor.motion.skeleton, root, local)
-    skins = deformed(body, actor.motion.skeleton, places, world)
+    body = actor.body or build_body(actor.motion.skeleton, example=actor.motion)
+    root, local = sample_frames(actor.motion, np.asarray(frames, dtype=float))
+    places, world = compute_pose(actor.motion.skeleton, root, local)
+    skins = deform_body(body, actor.motion.skeleton, places, world)
     colours = {**COLOURS, **(actor.colours or {})}
-    materials = [paint(name, colours[name]) for name in MATERIALS]
+    materials = [create_material(name, colours[name]) for name in MATERIALS]
     for i, vertices in enumerate(skins):
         shifted = vertices if moved is None else vertices + moved[i]
         add_mesh("body", shifted, body.faces, materials, body.material, smooth=True)
@@ -118,7 +118,7 @@ def add_bodies(actor: Actor, frames: np.ndarray, moved: np.ndarray | None = None
 
 def add_ball(centres: np.ndarray) -> None:
     """Add the ball at `centres` (N, 3) m."""
-    material = paint("ball", (0.9, 0.9, 0.88))
+    material = create_material("ball", (0.9, 0.9, 0.88))
     for centre in np.atleast_2d(centres):
         bpy.ops.mesh.primitive_uv_sphere_add(segments=20, ring_count=12, radius=BALL_RADIUS, location=tuple(centre))
         ball = bpy.context.object
@@ -126,7 +126,7 @@ def add_ball(centres: np.ndarray) -> None:
         ball.data.polygons.foreach_set("use_smooth", np.full(len(ball.data.polygons), True))
 
 
-def look(scene: bpy.types.Scene, eye, at, wide: float | None = None, lens: float = 50.0) -> None:
+def add_camera(scene: bpy.types.Scene, eye, at, wide: float | None = None, lens: float = 50.0) -> None:
     """Add a camera.
 
     Args:
@@ -141,12 +141,12 @@ def look(scene: bpy.types.Scene, eye, at, wide: float | None = None, lens: float
     if wide is not None:
         camera.type, camera.ortho_scale = "ORTHO", wide
     camera.lens = lens
-    thing = bpy.data.objects.new("camera", camera)
-    thing.location = eye
+    camera_object = bpy.data.objects.new("camera", camera)
+    camera_object.location = eye
     direction = np.asarray(at, dtype=float) - np.asarray(eye, dtype=float)
-    thing.rotation_euler = mathutils.Vector(direction).to_track_quat("-Z", "Y").to_euler()
-    scene.collection.objects.link(thing)
-    scene.camera = thing
+    camera_object.rotation_euler = mathutils.Vector(direction).to_track_quat("-Z", "Y").to_euler()
+    scene.collection.objects.link(camera_object)
+    scene.camera = camera_object
 
 
 def render(scene: bpy.types.Scene, path: Path) -> np.ndarray:
@@ -164,7 +164,7 @@ def render(scene: bpy.types.Scene, path: Path) -> np.ndarray:
     return pixels.reshape(image.size[1], image.size[0], 4)[::-1]
 
 
-def save(picture: np.ndarray, path: Path) -> None:
+def save_picture(picture: np.ndarray, path: Path) -> None:
     """Save a picture (H, W, 4) as PNG."""
     height, width = picture.shape[:2]
     image = bpy.data.images.new("sheet", width, height)
@@ -173,13 +173,13 @@ def save(picture: np.ndarray, path: Path) -> None:
     image.save()
 
 
-def _follow(scene, centres: np.ndarray) -> None:
+def _add_side_camera(scene, centres: np.ndarray) -> None:
     """Add a camera beside a place (1, 3) m."""
     middle = centres[0] * [1, 1, 0] + [0, 0, 0.85]
-    look(scene, middle + np.array([2.2, -6.0, 1.9]), middle, lens=45.0)
+    add_camera(scene, middle + np.array([2.2, -6.0, 1.9]), middle, lens=45.0)
 
 
-def _grid(tiles: list[np.ndarray], columns: int) -> np.ndarray:
+def _arrange_grid(tiles: list[np.ndarray], columns: int) -> np.ndarray:
     """Arrange pictures of one size in a grid."""
     height, width = tiles[0].shape[:2]
     rows = -(-len(tiles) // columns)
@@ -190,7 +190,7 @@ def _grid(tiles: list[np.ndarray], columns: int) -> np.ndarray:
     return sheet
 
 
-def strip(motion: Motion, frames: np.ndarray, out_png, *, ball=None, spacing: float = 1.15, samples: int = 12,
+def render_strip(motion: Motion, frames: np.ndarray, out_png, *, ball=None, spacing: float = 1.15, samples: int = 12,
           width: int = 1300) -> None:
     """Render moments of one motion side by side, seen from the side and (below) half from the front.
 
@@ -206,34 +206,34 @@ def strip(motion: Motion, frames: np.ndarray, out_png, *, ball=None, spacing: fl
         width: pixels.
     """
     frames = np.asarray(frames, dtype=float)
-    facing = float(heading(motion)[int(frames[0])])
+    facing = float(compute_heading(motion)[int(frames[0])])
     out = Path(out_png)
     pictures = []
     for turned in (0.0, np.radians(-52.0)):
-        row = place(motion, turned - facing)
-        root, _ = at_frames(row, frames)
+        row = place_motion(motion, turned - facing)
+        root, _ = sample_frames(row, frames)
         stand = spacing * np.arange(len(frames))
         moved = np.stack([stand - root[:, 0], -root[:, 1], np.zeros(len(frames))], axis=-1)
-        scene = new_scene(width, int(width * 2.2 / (spacing * len(frames))), samples)
+        scene = create_scene(width, int(width * 2.2 / (spacing * len(frames))), samples)
         add_bodies(Actor(row), frames, moved)
         if ball is not None:
-            centres = np.stack([turned_about_up(b, turned - facing) for b in np.asarray(ball)])
+            centres = np.stack([rotate_about_up(b, turned - facing) for b in np.asarray(ball)])
             add_ball(centres + moved)
         middle = np.array([stand[-1] / 2, 0.0, 0.93])
-        look(scene, middle + np.array([0.0, -30.0, 4.0]), middle, wide=spacing * len(frames))
+        add_camera(scene, middle + np.array([0.0, -30.0, 4.0]), middle, wide=spacing * len(frames))
         part = out.with_suffix(".part.png")
         pictures.append(render(scene, part))
         part.unlink()
-    save(np.concatenate(pictures, axis=0), out)
+    save_picture(np.concatenate(pictures, axis=0), out)
 
 
 def main(arguments: list[str]) -> None:
     """Parse the command line and render."""
     clip, out, *span = arguments
-    motion = bvh.read(clip).motion
+    motion = bvh.read_bvh(clip).motion
     first, last = (float(span[0]), float(span[1])) if len(span) >= 2 else (0.5, 1.5)
     frames = np.linspace(first, last, int(span[2]) if len(span) > 2 else 10) * motion.fps
-    strip(motion, frames, out)
+    render_strip(motion, frames, out)
 
 
 if __name__ == "__main__":

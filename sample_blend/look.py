@@ -18,12 +18,12 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-from beyond_mocap.appearance.body import deformed, low_poly_body  # noqa: E402
+from beyond_mocap.appearance.body import deform_body, build_body  # noqa: E402
 from beyond_mocap.base.errors import InputError  # noqa: E402
 from beyond_mocap.base.vectors import unit_vectors  # noqa: E402
 from beyond_mocap.files.bvh import bvh  # noqa: E402
 from beyond_mocap.files.tables import read_ball  # noqa: E402
-from beyond_mocap.motion.motion import Motion, at_frames, pose_kinematics  # noqa: E402
+from beyond_mocap.motion.motion import Motion, sample_frames, compute_pose  # noqa: E402
 from beyond_mocap.synthesis.provenance import read_provenance  # noqa: E402
 
 COLOURS = np.array([(190, 140, 110), (200, 40, 35), (235, 235, 230), (40, 60, 150), (30, 30, 34), (40, 28, 22)], float)
@@ -67,33 +67,33 @@ class View:
         return self.size * (0.5 + seen[..., :2] / depth[..., None] * far / self.wide), seen[..., 2]
 
 
-def picture(view: View, skins, body, balls):
+def draw_picture(view: View, skins, body, balls):
     """Draw one picture (Pillow) of characters `skins` (N, V, 3) m and `balls` (N, 3) m, NaN rows for none."""
     from PIL import Image, ImageDraw
 
     image = Image.new("RGB", (view.size, view.size), GRASS)
     draw = ImageDraw.Draw(image)
-    _grid(draw, view)
+    _draw_grid(draw, view)
     balls = np.asarray(balls, dtype=float).reshape(-1, 3)
     balls = balls[np.isfinite(balls).all(axis=1)]
     quads = np.array([face if len(face) == 4 else (*face, face[-1]) for face in body.faces])
     for skin in skins:
-        flat, _ = view(_on_grass(skin))
+        flat, _ = view(_cast_shadow(skin))
         for corners in flat[quads]:
             draw.polygon(list(map(tuple, corners)), fill=SHADOW)
     for centre in balls:
-        _disc(draw, view, _on_grass(centre), SHADOW, 0.4)
+        _draw_disc(draw, view, _cast_shadow(centre), SHADOW, 0.4)
     for skin in sorted(skins, key=lambda skin: -np.linalg.norm(skin.mean(axis=0) - view.eye)):
-        _body(draw, view, skin, quads, body.material, balls)
+        _draw_body(draw, view, skin, quads, body.material, balls)
     return image
 
 
-def _body(draw, view: View, skin, quads, material, balls) -> None:
+def _draw_body(draw, view: View, skin, quads, material, balls) -> None:
     """Draw the faces of one character and the balls (N, 3) m, the far ones first."""
     flat, depth = view(skin)
     corners = skin[quads]
     normal = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
-    normal = unit_vectors(normal, least=1e-12)
+    normal = unit_vectors(normal, min_length=1e-12)
     light = 0.5 + 0.5 * np.clip(normal @ SUN, -0.4, 1.0)
     colour = (COLOURS[material] * light[:, None]).astype(int)
     colour[corners[..., 2].mean(axis=1) < -0.01] = BELOW
@@ -103,15 +103,15 @@ def _body(draw, view: View, skin, quads, material, balls) -> None:
         if item < len(seen):
             draw.polygon(list(map(tuple, flat[quads[seen[item]]])), fill=tuple(colour[seen[item]]))
         else:
-            _disc(draw, view, balls[item - len(seen)], BALL, 1.0)
+            _draw_disc(draw, view, balls[item - len(seen)], BALL, 1.0)
 
 
-def _on_grass(points: np.ndarray) -> np.ndarray:
+def _cast_shadow(points: np.ndarray) -> np.ndarray:
     """Return where the sun casts the shadow of points (..., 3) on the ground."""
     return points - np.maximum(points[..., 2:], 0.0) * SUN / SUN[2] * [1.0, 1.0, 1.0]
 
 
-def _disc(draw, view: View, centre, colour, flat: float) -> None:
+def _draw_disc(draw, view: View, centre, colour, flat: float) -> None:
     """Draw a ball or its shadow."""
     (x, y), depth = view(centre)
     if depth > 0.1:
@@ -119,7 +119,7 @@ def _disc(draw, view: View, centre, colour, flat: float) -> None:
         draw.ellipse([x - r, y - flat * r, x + r, y + flat * r], fill=colour, outline=(90, 90, 90))
 
 
-def _grid(draw, view: View, step: float = 0.5) -> None:
+def _draw_grid(draw, view: View, step: float = 0.5) -> None:
     """Draw the sky, and lines on the grass around the camera's target; every second metre is brighter."""
     reach = min(3.0 * view.wide, 60.0)
     middle = np.round(view.at[:2] / step) * step
@@ -139,7 +139,7 @@ def _grid(draw, view: View, step: float = 0.5) -> None:
         draw.rectangle([0, 0, view.size, horizon], fill=SKY)
 
 
-def sheet(motion: Motion, frames, out, *, camera="follow", side=-90.0, ball=None, labels=None, columns=6, tile=220,
+def write_sheet(motion: Motion, frames, out, *, camera="follow", side=-90.0, ball=None, labels=None, columns=6, tile=220,
           wide=2.2):
     """Write the contact sheet of some frames.
 
@@ -158,33 +158,33 @@ def sheet(motion: Motion, frames, out, *, camera="follow", side=-90.0, ball=None
     from PIL import Image, ImageDraw
 
     frames = np.asarray(frames, dtype=float)
-    body = low_poly_body(motion.skeleton, example=motion)
-    root, local = at_frames(motion, frames)
-    skins = deformed(body, motion.skeleton, *pose_kinematics(motion.skeleton, root, local))
+    body = build_body(motion.skeleton, example=motion)
+    root, local = sample_frames(motion, frames)
+    skins = deform_body(body, motion.skeleton, *compute_pose(motion.skeleton, root, local))
     balls = np.full((len(frames), 3), np.nan) if ball is None else np.asarray(ball, dtype=float)
     span = root[:, :2].max(axis=0) - root[:, :2].min(axis=0)
     whole = 0.5 * (root[:, :2].max(axis=0) + root[:, :2].min(axis=0))
     across = wide if camera == "follow" else max(float(span.max()) + 1.6, wide)
     if camera == "strobe":
-        big = _view(whole, side, across, 5 * tile)
-        picture(big, skins, body, balls).save(out)
+        big = _build_view(whole, side, across, 5 * tile)
+        draw_picture(big, skins, body, balls).save(out)
         return
     rows = -(-len(frames) // columns)
     page = Image.new("RGB", (min(columns, len(frames)) * tile, rows * tile))
     for i in range(len(frames)):
-        view = _view(root[i, :2] if camera == "follow" else whole, side, across, 2 * tile)
-        one = picture(view, skins[i : i + 1], body, balls[i : i + 1]).resize((tile, tile), Image.Resampling.LANCZOS)
+        view = _build_view(root[i, :2] if camera == "follow" else whole, side, across, 2 * tile)
+        tile_picture = draw_picture(view, skins[i : i + 1], body, balls[i : i + 1]).resize((tile, tile), Image.Resampling.LANCZOS)
         if labels is not None:
-            ImageDraw.Draw(one).text((4, 2), labels[i], fill=(0, 0, 0))
-        page.paste(one, (i % columns * tile, i // columns * tile))
+            ImageDraw.Draw(tile_picture).text((4, 2), labels[i], fill=(0, 0, 0))
+        page.paste(tile_picture, (i % columns * tile, i // columns * tile))
     page.save(out)
 
 
-def _view(ground, side: float, wide: float, size: int) -> View:
+def _build_view(ground, side: float, wide: float, size: int) -> View:
     """Build the camera of a place on the ground."""
     at = np.array([*ground, 0.85 if wide < 4 else 0.5])
-    way = np.array([np.cos(np.radians(side)), np.sin(np.radians(side)), 0.0])
-    return View(at + (2.5 * wide) * way + [0.0, 0.0, 0.55 * wide], at, size, wide)
+    direction = np.array([np.cos(np.radians(side)), np.sin(np.radians(side)), 0.0])
+    return View(at + (2.5 * wide) * direction + [0.0, 0.0, 0.55 * wide], at, size, wide)
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -205,18 +205,18 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--wide", type=float, default=2.2, help="metres across a tile of the following camera")
     options = parser.parse_args(arguments)
     try:
-        run(options)
+        write_requested_sheet(options)
     except InputError as error:
         print(error, file=sys.stderr)
         return 2
     return 0
 
 
-def run(options) -> None:
+def write_requested_sheet(options) -> None:
     """Read the files and write the sheet."""
-    motion = bvh.read(options.take, unit=0.01).motion
+    motion = bvh.read_bvh(options.take, unit=0.01).motion
     last = len(motion) - 1 if options.end is None else min(options.end * motion.fps, len(motion) - 1)
-    step = max(options.every * motion.fps, 1.0)
+    step = max(options.compute_all * motion.fps, 1.0)
     frames = np.unique(
         np.rint(np.arange(options.start * motion.fps, last + 0.5, step)).astype(int).clip(0, len(motion) - 1)
     )
@@ -227,11 +227,11 @@ def run(options) -> None:
         ball = ball[np.minimum(frames, len(ball) - 1)]
     labels = [f"{frame / motion.fps:.2f}" for frame in frames]
     if options.provenance:
-        told = read_provenance(options.provenance)
-        marks = [("L" if l else ".") + ("R" if r else ".") for l, r in told.contacts[frames]]
-        new = [f > 0 and (told.clip[f] != told.clip[f - 1] or told.mirrored[f] != told.mirrored[f - 1]) for f in frames]
+        provenance = read_provenance(options.provenance)
+        marks = [("L" if l else ".") + ("R" if r else ".") for l, r in provenance.contacts[frames]]
+        new = [f > 0 and (provenance.clip[f] != provenance.clip[f - 1] or provenance.mirrored[f] != provenance.mirrored[f - 1]) for f in frames]
         labels = [f"{a} {m}{'|' if s else ''}" for a, m, s in zip(labels, marks, new)]
-    sheet(motion, frames, options.out, camera=options.camera, side=options.side, ball=ball, labels=labels,
+    write_sheet(motion, frames, options.out, camera=options.camera, side=options.side, ball=ball, labels=labels,
           columns=options.columns, tile=options.tile, wide=options.wide)
 
 

@@ -22,11 +22,11 @@ if __name__ == "__main__":
 
 from beyond_mocap.markers.files.trc import write_trc  # noqa: E402
 from beyond_mocap.markers.trial import MarkerTrial  # noqa: E402
-from beyond_mocap.motion.retargeting.adult import adult_skeleton  # noqa: E402
-from beyond_mocap.synthetic.gait import gait  # noqa: E402
-from beyond_mocap.synthetic.ground_truth.planted_ball import PlantedBall  # noqa: E402
-from beyond_mocap.synthetic.ground_truth.planted_markers import Planted, planted  # noqa: E402
-from beyond_mocap.synthetic.throws import throw  # noqa: E402
+from beyond_mocap.motion.retargeting.adult import build_adult_skeleton  # noqa: E402
+from beyond_mocap.synthetic.gait import build_gait  # noqa: E402
+from beyond_mocap.synthetic.ground_truth.planted_ball import BallRequest  # noqa: E402
+from beyond_mocap.synthetic.ground_truth.planted_markers import SyntheticTrial, build_trial  # noqa: E402
+from beyond_mocap.synthetic.throws import build_throw  # noqa: E402
 
 SPEED, TARGET = 28.0, (18.0, 0.0, 1.0)
 """The throw: m/s, and the place (3,) m that it hits without air."""
@@ -34,26 +34,26 @@ _THROW_FPS, _WALK_FPS = 240.0, 100.0  # frames per second
 _STATIC_FRAMES = 60  # frames of the static trial
 
 
-def thrown() -> Planted:
+def generate_throw() -> SyntheticTrial:
     """Generate the throw, its static trial and the ground truth of both; the second around the ball's release."""
-    made = throw(TARGET, SPEED, fps=_THROW_FPS)
-    return planted(made.motion, "driveline", seed=11, ball=PlantedBall(made.release, turns=18.0, seen=0.12),
+    movement = build_throw(TARGET, SPEED, fps=_THROW_FPS)
+    return build_trial(movement.motion, "driveline", seed=11, ball=BallRequest(movement.release, spin_rate=18.0, seconds_seen=0.12),
                    occlusion=0.01)
 
 
-def walked() -> Planted:
+def generate_walk() -> SyntheticTrial:
     """Generate the walk of a smaller performer, with faults."""
-    motion = gait(1.4, 1.8, fps=_WALK_FPS, skeleton=adult_skeleton(1.68), seed=4)
-    return planted(motion, "plug_in_gait", seed=12, occlusion=0.03, swaps=1, jumps=2, unlabeled=1)
+    motion = build_gait(1.4, 1.8, fps=_WALK_FPS, skeleton=build_adult_skeleton(1.68), seed=4)
+    return build_trial(motion, "plug_in_gait", seed=12, occlusion=0.03, swaps=1, jumps=2, unlabeled=1)
 
 
-def make(folder: Path = HERE / "markers") -> None:
+def write_recordings(folder: Path = HERE / "markers") -> None:
     """Write the recordings to `folder`."""
     folder.mkdir(parents=True, exist_ok=True)
-    throwing, walking = thrown(), walked()
-    write_trc(throwing.static.frames(0, _STATIC_FRAMES), folder / "static.trc")
-    release = int(throwing.ball.asked.release * _THROW_FPS)
-    write_c3d(throwing.trial.frames(release - 230, release + 110), folder / "throw.c3d")
+    throwing, walking = generate_throw(), generate_walk()
+    write_trc(throwing.static.select_frames(0, _STATIC_FRAMES), folder / "static.trc")
+    release = int(throwing.ball.request.release * _THROW_FPS)
+    write_c3d(throwing.trial.select_frames(release - 230, release + 110), folder / "throw.c3d")
     write_trc(walking.trial, folder / "walk.trc")
 
 
@@ -77,4 +77,4 @@ def write_c3d(trial: MarkerTrial, path: Path) -> None:
 
 
 if __name__ == "__main__":
-    make(*(Path(argument) for argument in sys.argv[1:2]))
+    write_recordings(*(Path(argument) for argument in sys.argv[1:2]))

@@ -22,10 +22,10 @@ HERE = Path(__file__).resolve().parent
 if __name__ == "__main__":
     sys.path[:0] = [str(HERE.parent), str(HERE)]
 
-from make_sample import tracked  # noqa: E402
+from make_sample import add_tracking_noise  # noqa: E402
 
-from beyond_mocap.ball.aim import aim, along_ground  # noqa: E402
-from beyond_mocap.ball.flight import Flight, Launch, fly  # noqa: E402
+from beyond_mocap.ball.aim import solve_launches, solve_ground_launches  # noqa: E402
+from beyond_mocap.ball.flight import Flight, Launch, simulate_flight  # noqa: E402
 from beyond_mocap.ball.physics import FOOTBALL  # noqa: E402
 
 SECONDS, RATE = 24.0, 25.0  # s, and frames per second
@@ -92,7 +92,7 @@ EVENTS = {"kick": "pass", "header": "pass", "receive": "ball touch"}
 
 
 @dataclass(frozen=True, eq=False)
-class Played:
+class TimedTouch:
     """A touch with its flight.
 
     Attributes:
@@ -109,31 +109,31 @@ class Played:
 
 
 @lru_cache(maxsize=1)
-def played() -> tuple[Played, ...]:
+def compute_touches() -> tuple[TimedTouch, ...]:
     """Compute every touch with its time and flight."""
     time, position, found = KICK_OFF, np.array([0.0, 0.0, FOOTBALL.radius]), []
     for touch in TOUCHES:
-        flight = _launched(time, position, touch)
-        found.append(Played(touch, time, position, flight))
+        flight = _launch_ball(time, position, touch)
+        found.append(TimedTouch(touch, time, position, flight))
         time += touch.seconds
         position = flight.at([time])[0]
     return tuple(found)
 
 
-def _launched(time: float, position: np.ndarray, touch: Touch) -> Flight:
+def _launch_ball(time: float, position: np.ndarray, touch: Touch) -> Flight:
     """Compute the flight after a touch."""
     if position[2] > 2.0 * FOOTBALL.radius and len(touch.target) == 2:  # the ball falls, and rolls on
-        way = (np.array(touch.target) - position[:2]) / touch.seconds
-        return fly(Launch(time, position, np.array([*way, -0.5])), FOOTBALL, touch.seconds + 6.0)
+        velocity = (np.array(touch.target) - position[:2]) / touch.seconds
+        return simulate_flight(Launch(time, position, np.array([*velocity, -0.5])), FOOTBALL, touch.seconds + 6.0)
     target = np.array([*touch.target, FOOTBALL.radius][:3])
-    aimed = (along_ground if len(touch.target) == 2 else aim)(position, target, FOOTBALL, seconds=touch.seconds)
+    aimed = (solve_ground_launches if len(touch.target) == 2 else solve_launches)(position, target, FOOTBALL, seconds=touch.seconds)
     launch = Launch(time, position, aimed.velocity[0], aimed.spin[0])
-    return fly(launch, FOOTBALL, touch.seconds + 6.0)
+    return simulate_flight(launch, FOOTBALL, touch.seconds + 6.0)
 
 
-def ball_at(times: np.ndarray) -> np.ndarray:
+def compute_ball(times: np.ndarray) -> np.ndarray:
     """Compute the ball's centre (N, 3) m at `times` (N,) s."""
-    touches = played()
+    touches = compute_touches()
     which = np.clip(np.searchsorted([t.time for t in touches], times, side="right") - 1, 0, None)
     out = np.empty((len(times), 3))
     for i in np.unique(which):
@@ -141,25 +141,25 @@ def ball_at(times: np.ndarray) -> np.ndarray:
     return out
 
 
-def player_at(player: str, times: np.ndarray) -> np.ndarray:
+def compute_player(player: str, times: np.ndarray) -> np.ndarray:
     """Compute where a player is (N, 2) m at `times` (N,) s, NaN off the pitch."""
     from scipy.interpolate import CubicSpline
 
-    knots = dict(_meetings(player))
+    knots = dict(_list_touch_places(player))
     for time, *place in PLACES[player]:
         if all(abs(time - known) > 0.9 for known in knots):
             knots[float(time)] = np.array(place, float)
     when = np.array(sorted(knots))
-    course = CubicSpline(when, np.array([knots[time] for time in when]), bc_type="natural")
-    places = course(np.clip(times, when[0], when[-1]))
+    spline = CubicSpline(when, np.array([knots[time] for time in when]), bc_type="natural")
+    places = spline(np.clip(times, when[0], when[-1]))
     first, last = PRESENT.get(player, (0.0, SECONDS))
     return np.where(((times >= first) & (times <= last))[:, None], places, np.nan)
 
 
-def _meetings(player: str) -> list[tuple[float, np.ndarray]]:
+def _list_touch_places(player: str) -> list[tuple[float, np.ndarray]]:
     """List (s, (2,) m) of the player at each touch: behind the ball as it leaves, under it for a header."""
     found = []
-    for one in played():
+    for one in compute_touches():
         if one.touch.player == player:
             along = np.array(one.flight.launch.velocity[:2])
             reach = BESIDE if one.touch.part == "foot" else 0.2
@@ -167,23 +167,23 @@ def _meetings(player: str) -> list[tuple[float, np.ndarray]]:
     return found
 
 
-def feed() -> tuple[np.ndarray, dict[str, np.ndarray], np.ndarray]:
+def simulate_feed() -> tuple[np.ndarray, dict[str, np.ndarray], np.ndarray]:
     """Simulate what the tracking system measures.
 
     Returns:
         Times (N,) s, per player (N, 2) m, and the lowest point of the ball (N, 3) m.
     """
     times = np.arange(round(SECONDS * RATE) + 1) / RATE
-    seen = {player: tracked(times, player_at(player, times), 10 + i) for i, player in enumerate(PLAYERS)}
-    ball = ball_at(times)
-    ball[:, :2] = tracked(times, ball[:, :2], seed=9, slow=0.05)
+    seen = {player: add_tracking_noise(times, compute_player(player, times), 10 + i) for i, player in enumerate(PLAYERS)}
+    ball = compute_ball(times)
+    ball[:, :2] = add_tracking_noise(times, ball[:, :2], seed=9, slow=0.05)
     ball[:, 2] = np.maximum(ball[:, 2] - FOOTBALL.radius, 0.0)
     return times, seen, ball
 
 
 def write_metrica(folder: Path) -> None:
     """Write `small_Home.csv`, `small_Away.csv`: places as shares of the pitch, y downward, no heights."""
-    times, seen, ball = feed()
+    times, seen, ball = simulate_feed()
     for team in ("Home", "Away"):
         ids = [player for player in seen if player.startswith(team.lower())]
         heads = [[",,", *(f"{team}," for _ in ids), ","], [",,", *(f"{player.split('_')[1]}," for player in ids), ","],
@@ -193,12 +193,12 @@ def write_metrica(folder: Path) -> None:
             places = [*(seen[player][row] for player in ids), ball[row, :2]]
             cells = (f"{p[0] / LENGTH + 0.5:.5f},{0.5 - p[1] / WIDTH:.5f}" for p in places)
             lines.append(f"1,{row + 1},{time:.2f}," + ",".join(cells).replace("nan", "NaN"))
-        _write(folder / f"small_{team}.csv", lines)
+        _write_lines(folder / f"small_{team}.csv", lines)
 
 
 def write_tracab(folder: Path) -> None:
     """Write `small.dat`, `small_meta.xml`: centimetres from the centre, heights, and names."""
-    times, seen, ball = feed()
+    times, seen, ball = simulate_feed()
     lines = []
     for row, time in enumerate(times):
         found = []
@@ -209,20 +209,20 @@ def write_tracab(folder: Path) -> None:
                 found.append(f"{int(team == 'home')},{target},{number},{x},{y},0.00;")
         centimetres = ",".join(str(int(round(100.0 * value))) for value in ball[row])
         lines.append(f"{row + 1}:{''.join(found)}:{centimetres},0.00,H,Alive;:")
-    _write(folder / "small.dat", lines)
-    _write(folder / "small_meta.xml", [_tracab_meta(len(times))])
+    _write_lines(folder / "small.dat", lines)
+    _write_lines(folder / "small_meta.xml", [_format_tracab_meta(len(times))])
 
 
-def _tracab_meta(frames: int) -> str:
+def _format_tracab_meta(frames: int) -> str:
     """Format the TRACAB metadata."""
     teams = []
     for number, team in enumerate(("home", "away"), start=1):
         rows = []
         for player in (player for player in PLAYERS if player.startswith(team)):
             first, last = (int(second * RATE) + 1 for second in PRESENT.get(player, (0.0, SECONDS)))
-            given, family = PLAYERS[player].split()
+            first_name, last_name = PLAYERS[player].split()
             rows.append(
-                f"<Player><PlayerId>{player}</PlayerId><FirstName>{given}</FirstName><LastName>{family}</LastName>"
+                f"<Player><PlayerId>{player}</PlayerId><FirstName>{first_name}</FirstName><LastName>{last_name}</LastName>"
                 f"<JerseyNo>{player.split('_')[1]}</JerseyNo><StartFrameCount>{first}</StartFrameCount>"
                 f"<EndFrameCount>{last}</EndFrameCount></Player>"
             )
@@ -244,31 +244,31 @@ def write_events(folder: Path) -> None:
     """Write `small_events.csv`: a provider's events, on a clock of its own."""
     random = np.random.default_rng(7)
     lines = ["time_s,type,player,detail,success,x,y"]
-    for one in played():
+    for one in compute_touches():
         kind = EVENTS.get(one.touch.words.split()[0])
         late = CLOCK_LATE + EVENTS_SCATTER * random.normal()
         x, y = one.position[:2] + 0.8 * random.normal(size=2)
         if kind is not None:
             detail = "head" if one.touch.part == "head" else "long_ball" if len(one.touch.target) == 3 else ""
             lines.append(f"{one.time + late:.1f},{kind},{one.touch.player},{detail},True,{x:.1f},{y:.1f}")
-    _write(folder / "small_events.csv", lines)
+    _write_lines(folder / "small_events.csv", lines)
 
 
 def write_truth(folder: Path) -> None:
     """Write `small_touches.csv`: every touch as it was planned, the ball's centre in metres."""
     lines = ["time_s,player,part,words,x_m,y_m,z_m"]
-    for one in played():
+    for one in compute_touches():
         x, y, z = one.position
         lines.append(f"{one.time:.3f},{one.touch.player},{one.touch.part},{one.touch.words},{x:.3f},{y:.3f},{z:.3f}")
-    _write(folder / "small_touches.csv", lines)
+    _write_lines(folder / "small_touches.csv", lines)
 
 
-def _write(path: Path, lines: list[str]) -> None:
+def _write_lines(path: Path, lines: list[str]) -> None:
     """Write lines to a file."""
     path.write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
 
 
-def make(folder: Path = HERE / "match" / "small") -> None:
+def write_match_files(folder: Path = HERE / "match" / "small") -> None:
     """Write all files to `folder`."""
     folder.mkdir(parents=True, exist_ok=True)
     for write in (write_metrica, write_tracab, write_events, write_truth):
@@ -276,4 +276,4 @@ def make(folder: Path = HERE / "match" / "small") -> None:
 
 
 if __name__ == "__main__":
-    make(Path(sys.argv[1]) if len(sys.argv) > 1 else HERE / "match" / "small")
+    write_match_files(Path(sys.argv[1]) if len(sys.argv) > 1 else HERE / "match" / "small")

@@ -16,17 +16,17 @@ HERE = Path(__file__).resolve().parent
 if __name__ == "__main__":
     sys.path[:0] = [str(HERE.parent), str(HERE)]
 
-from make_sample import FPS, Clip, clips, words_of  # noqa: E402
+from make_sample import FPS, Clip, build_clips, label_clip  # noqa: E402
 
 from beyond_mocap.annotation import KeyMoment, Span, Timeline, format_timeline  # noqa: E402
 from beyond_mocap.files.bvh import bvh  # noqa: E402
-from beyond_mocap.synthetic.volleys import VOLLEYS, idle, volley  # noqa: E402
+from beyond_mocap.synthetic.volleys import VOLLEYS, build_idle, build_volley  # noqa: E402
 
-TAKEN = ("standing_turn_left", "standing_turn_right", "walking_0_8", "walking_1_2", "walking_1_6", "walking_turn_left",
+REUSED_CLIPS = ("standing_turn_left", "standing_turn_right", "walking_0_8", "walking_1_2", "walking_1_6", "walking_turn_left",
          "walking_turn_right", "walking_back", "walking_left", "walking_right", "start_stop_walking", "walk_jog_walk",
          "jogging_2_4", "jogging_3_5", "jogging_back", "header")
 """Clips of the sample's library that are reused."""
-STOPPED = 186
+STOP_FRAME = 186
 """Frames after which the player of start_stop_walking has stopped; the clip continues with half a step."""
 STRIKES = (("toss", "toss", 1.25), ("toss_quick", "toss", 1.5), ("pass", "pass", 1.25), ("pass_quick", "pass", 1.45),
            ("attack", "attack", 1.4), ("attack_quick", "attack", 1.6), ("receive", "receive", 1.0),
@@ -35,38 +35,38 @@ STRIKES = (("toss", "toss", 1.25), ("toss_quick", "toss", 1.5), ("pass", "pass",
 """Name, kind (`synthetic.volleys`) and speed of every strike."""
 
 
-def library() -> list[Clip]:
+def build_passes_clips() -> list[Clip]:
     """Build all clips of the library."""
-    taken = [clip for clip in clips() if clip.name in TAKEN]
-    taken = [replace(c, motion=c.motion.frames(0, STOPPED)) if c.name == "start_stop_walking" else c for c in taken]
-    ready = [Clip(f"ready_{seed}", idle(9.0, fps=FPS, seed=60 + seed), ("standing",)) for seed in (1, 2, 3)]
-    return [*taken, *ready, *(_strike(*row, seed=70 + number) for number, row in enumerate(STRIKES))]
+    reused = [clip for clip in build_clips() if clip.name in REUSED_CLIPS]
+    reused = [replace(c, motion=c.motion.frames(0, STOP_FRAME)) if c.name == "start_stop_walking" else c for c in reused]
+    ready = [Clip(f"ready_{seed}", build_idle(9.0, fps=FPS, seed=60 + seed), ("standing",)) for seed in (1, 2, 3)]
+    return [*reused, *ready, *(_build_strike(*row, seed=70 + number) for number, row in enumerate(STRIKES))]
 
 
-def _strike(name: str, kind: str, speed: float, seed: int) -> Clip:
+def _build_strike(name: str, kind: str, speed: float, seed: int) -> Clip:
     """Build the clip of a strike."""
-    gesture = volley(kind, fps=FPS, seed=seed, speed=speed)
-    return Clip(f"volley_{name}", gesture.motion, tuple(VOLLEYS[kind].words.split()), gesture)
+    gesture = build_volley(kind, fps=FPS, seed=seed, speed=speed)
+    return Clip(f"volley_{name}", gesture.motion, tuple(VOLLEYS[kind].labels.split()), gesture)
 
 
-def make(folder: Path = HERE / "passes" / "library") -> None:
+def write_passing_library(folder: Path = HERE / "passes" / "library") -> None:
     """Write the library's files to `folder`."""
     folder.mkdir(parents=True, exist_ok=True)
-    for clip in library():
-        bvh.write(folder / f"{clip.name}.bvh", clip.motion)
-        words = format_timeline(_words(clip))
+    for clip in build_passes_clips():
+        bvh.write_bvh(folder / f"{clip.name}.bvh", clip.motion)
+        words = format_timeline(_label_clip(clip))
         (folder / f"{clip.name}.txt").write_text(words, encoding="utf-8", newline="\n")
 
 
-def _words(clip: Clip) -> Timeline:
+def _label_clip(clip: Clip) -> Timeline:
     """Return the labels as in the sample's other library; a strike has standing before and after it."""
     gesture = clip.gesture
     if gesture is None or not clip.name.startswith("volley"):
-        return words_of(clip)
+        return label_clip(clip)
     start, stop, end = round(gesture.start, 2), round(gesture.end, 2), clip.motion.duration
     still = (Span(0.0, start, ("standing",)), Span(stop, round(end, 2), ("standing",)))
     return Timeline((still[0], Span(start, stop, clip.words), still[1]), (KeyMoment(gesture.key, clip.words),))
 
 
 if __name__ == "__main__":
-    make(Path(sys.argv[1]) if len(sys.argv) > 1 else HERE / "passes" / "library")
+    write_passing_library(Path(sys.argv[1]) if len(sys.argv) > 1 else HERE / "passes" / "library")

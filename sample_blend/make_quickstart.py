@@ -32,32 +32,32 @@ then press Update in step 3.
 """
 
 
-def relative_paths(settings) -> None:
+def make_paths_relative(settings) -> None:
     """Make the settings' paths relative, so that they stay valid when the folder is moved."""
-    def from_here(path: str) -> str:
+    def to_relative(path: str) -> str:
         return "//" + pathlib.Path(path).relative_to(demo.HERE).as_posix()
 
-    settings.library_folder = from_here(settings.library_folder)
+    settings.library_folder = to_relative(settings.library_folder)
     for player in settings.players:
-        player.tracking_file = from_here(player.tracking_file)
-        player.annotation_file = from_here(player.annotation_file)
+        player.tracking_file = to_relative(player.tracking_file)
+        player.annotation_file = to_relative(player.annotation_file)
         player.dot.beyond_mocap_dot.tracking_file = player.tracking_file
 
 
-def open_the_tab(bpy) -> None:
+def open_sidebars(bpy) -> None:
     """Open the sidebars and the camera view in all windows; file browsers get no personal folder."""
     spaces = [space for screen in bpy.data.screens for area in screen.areas for space in area.spaces]
     for space in spaces:
         if space.type == "VIEW_3D":
             space.show_region_ui = True
-            like_a_pitch(space.shading, space.overlay)
+            style_viewport(space.shading, space.overlay)
             space.region_3d.view_perspective = "CAMERA"
             space.region_3d.view_camera_zoom, space.region_3d.view_camera_offset = 12.0, (0.08, 0.0)
         elif space.type == "FILE_BROWSER" and space.params is not None:
             space.params.directory = b"//"
 
 
-def like_a_pitch(shading, overlay) -> None:
+def style_viewport(shading, overlay) -> None:
     """Set colours, shadows and a sky in the solid view, which every computer draws quickly."""
     shading.type, shading.light = "SOLID", "STUDIO"  # the light first: it decides which studio lights exist
     shading.color_type, shading.studio_light = "MATERIAL", "paint.sl"
@@ -69,24 +69,24 @@ def like_a_pitch(shading, overlay) -> None:
 
 def main() -> int:
     """Write the file."""
-    _, switch_off = demo.load_extension()
+    _, unregister = demo.load_extension()
     import bpy
 
     if bpy.app.version >= (5, 0, 0):
         print("run this with Blender 4.5, so that 4.5 can open the file it writes", file=sys.stderr)
         return 2
-    demo.prepare(bpy)
+    demo.prepare_scene(bpy)
     scene = bpy.context.scene
     scene.frame_end, scene.beyond_mocap.active_player = 1201, 0
     scene.camera.data.show_passepartout = False
-    relative_paths(scene.beyond_mocap)
+    make_paths_relative(scene.beyond_mocap)
     bpy.data.texts.new("Read me").write(HOW_TO)
-    open_the_tab(bpy)
+    open_sidebars(bpy)
     with tempfile.TemporaryDirectory() as folder:  # Blender stores the path in the file: save to a temporary one
         written = pathlib.Path(folder, OUT.name)
         bpy.ops.wm.save_as_mainfile(filepath=str(written), compress=True, relative_remap=False)
         shutil.move(written, OUT)
-    switch_off()
+    unregister()
     print(f"{OUT}: {os.path.getsize(OUT) / 1024:.0f} KB")
     return 0
 

@@ -20,16 +20,16 @@ if __name__ == "__main__":
 
 from beyond_mocap.annotation import KeyMoment, Span, Timeline, format_timeline  # noqa: E402
 from beyond_mocap.base.time_series import (  # noqa: E402
-    equal_runs,  # noqa: E402
+    find_equal_runs,  # noqa: E402
     hann_smooth,
-    interpolate,
+    interpolate_columns,
 )
 from beyond_mocap.base.vectors import unit_vectors  # noqa: E402
 from beyond_mocap.files.bvh import bvh  # noqa: E402
 from beyond_mocap.motion.motion import Motion  # noqa: E402
-from beyond_mocap.synthetic.gait import gait  # noqa: E402
-from beyond_mocap.synthetic.gestures import Gesture, dribble, strike  # noqa: E402
-from beyond_mocap.synthetic.moves import celebration, getting_up, header, throw_in  # noqa: E402
+from beyond_mocap.synthetic.gait import build_gait  # noqa: E402
+from beyond_mocap.synthetic.gestures import Gesture, build_dribble, build_strike  # noqa: E402
+from beyond_mocap.synthetic.moves import build_celebration, build_get_up, build_header, build_throw_in  # noqa: E402
 
 FPS = 30.0
 # speeds (m/s) at which one gait's label ends and the next begins, as in Faustino's data
@@ -53,60 +53,60 @@ class Clip:
     gesture: Gesture | None = None
 
 
-def clips() -> list[Clip]:
+def build_clips() -> list[Clip]:
     """Build all clips of the sample's library, in the order of their kinds."""
-    return [*_standing(), *_straight(), *_curves(), *_other_ways(), *_changes(), *_moves()]
+    return [*_build_standing(), *_build_straight(), *_build_curves(), *_build_directions(), *_build_speed_changes(), *_build_moves()]
 
 
-def _standing() -> list[Clip]:
+def _build_standing() -> list[Clip]:
     """Build clips of standing and turning on the spot."""
     turn = np.concatenate([np.zeros(45), np.full(60, 0.9), np.zeros(60), np.full(75, 0.7), np.zeros(45)])
-    out = [Clip("standing_1", gait(0.0, 8.0, FPS, seed=1), None), Clip("standing_2", gait(0.0, 6.0, FPS, seed=2), None)]
+    out = [Clip("standing_1", build_gait(0.0, 8.0, FPS, seed=1), None), Clip("standing_2", build_gait(0.0, 6.0, FPS, seed=2), None)]
     for side, sign in (("left", 1.0), ("right", -1.0)):
         words = ("standing", "turning", side)
-        out.append(Clip(f"standing_turn_{side}", gait(0.0, None, FPS, turn_rate=sign * _eased(turn), seed=3), words))
+        out.append(Clip(f"standing_turn_{side}", build_gait(0.0, None, FPS, turn_rate=sign * _smooth_corners(turn), seed=3), words))
     return out
 
 
-def _straight() -> list[Clip]:
+def _build_straight() -> list[Clip]:
     """Build clips of steady locomotion."""
     table = (("walking", (0.8, 1.2, 1.6), 6.4), ("jogging", (2.4, 2.9, 3.5), 6.0), ("running", (4.2, 4.9), 6.0),
              ("sprinting", (6.0, 7.2, 8.6), 6.0))
     return [
-        Clip(f"{word}_{speed:.1f}".replace(".", "_"), gait(speed + _breeze(seconds, i), None, FPS, seed=10 + i), None)
+        Clip(f"{word}_{speed:.1f}".replace(".", "_"), build_gait(speed + _build_unsteadiness(seconds, i), None, FPS, seed=10 + i), None)
         for word, speeds, seconds in table
         for i, speed in enumerate(speeds)
     ]
 
 
-def _curves() -> list[Clip]:
+def _build_curves() -> list[Clip]:
     """Build clips of locomotion in curves."""
     out = []
     for word, speed, rate, seconds in (("walking", 1.3, 0.75, 7.0), ("jogging", 2.8, 0.7, 6.0),
                                        ("running", 4.6, 0.5, 6.0)):
         for side, sign in (("left", 1.0), ("right", -1.0)):
-            times = _times(seconds)
+            times = _clip_times(seconds)
             rates = sign * rate * (0.25 + 1.5 * np.sin(np.pi * times / seconds) ** 2)
             out.append(
-                Clip(f"{word}_turn_{side}", gait(speed, None, FPS, turn_rate=rates, seed=20), (word, "turning", side))
+                Clip(f"{word}_turn_{side}", build_gait(speed, None, FPS, turn_rate=rates, seed=20), (word, "turning", side))
             )
-    times = _times(8.0)
+    times = _clip_times(8.0)
     weave = 0.9 * np.sin(2 * np.pi * times / 4.2) + 0.5 * np.sin(2 * np.pi * times / 2.7)
-    out.append(Clip("jogging_weave", gait(3.0 + 0.5 * np.sin(0.9 * times), None, FPS, turn_rate=weave, seed=21), None))
+    out.append(Clip("jogging_weave", build_gait(3.0 + 0.5 * np.sin(0.9 * times), None, FPS, turn_rate=weave, seed=21), None))
     return out
 
 
-def _other_ways() -> list[Clip]:
+def _build_directions() -> list[Clip]:
     """Build clips of locomotion backward and sideways."""
     out = []
-    for word, way, angle, speed in (("walking", "back", np.pi, 1.1), ("jogging", "back", np.pi, 2.3),
+    for word, direction, angle, speed in (("walking", "back", np.pi, 1.1), ("jogging", "back", np.pi, 2.3),
                                     ("walking", "left", np.pi / 2, 0.9), ("walking", "right", -np.pi / 2, 0.9)):
-        speeds = _profile(((0, 0), (1.2, speed), (5.2, speed), (6.4, 0), (6.8, 0)))
-        out.append(Clip(f"{word}_{way}", gait(speeds, None, FPS, direction=angle, seed=30), (word, way)))
+        speeds = _build_speed_profile(((0, 0), (1.2, speed), (5.2, speed), (6.4, 0), (6.8, 0)))
+        out.append(Clip(f"{word}_{direction}", build_gait(speeds, None, FPS, direction=angle, seed=30), (word, direction)))
     return out
 
 
-def _changes() -> list[Clip]:
+def _build_speed_changes() -> list[Clip]:
     """Build clips that change speed."""
     table = {
         "start_stop_walking": ((0, 0), (0.8, 0), (2.0, 1.3), (4.0, 1.4), (5.4, 0), (6.4, 0), (7.4, 0.9), (8.6, 0),
@@ -118,40 +118,40 @@ def _changes() -> list[Clip]:
         "run_stop_run": ((0, 4.0), (1.0, 4.0), (3.2, 0.3), (4.0, 0.2), (6.4, 4.4), (7.4, 4.4)),
     }
     return [
-        Clip(name, gait(_profile(rows), None, FPS, seed=40 + i), None) for i, (name, rows) in enumerate(table.items())
+        Clip(name, build_gait(_build_speed_profile(rows), None, FPS, seed=40 + i), None) for i, (name, rows) in enumerate(table.items())
     ]
 
 
-def _moves() -> list[Clip]:
+def _build_moves() -> list[Clip]:
     """Build clips of dribbling, kicks and other moves."""
-    weave = 0.8 * np.sin(2 * np.pi * _times(7.0) / 3.5)
+    weave = 0.8 * np.sin(2 * np.pi * _clip_times(7.0) / 3.5)
     out = [
-        Clip("dribble_jogging", dribble(2.7, 7.0, fps=FPS, seed=50, turn_rate=weave), ("dribble", "jogging", "front")),
-        Clip("dribble_walking", dribble(1.7, 6.0, fps=FPS, seed=51), ("dribble", "walking", "front")),
-        Clip("dribble_running", dribble(4.3, 6.0, fps=FPS, seed=52), ("dribble", "running", "front")),
-        Clip("celebration", celebration(6.4, fps=FPS, seed=53), ("celebration", "running", "arms", "outside")),
+        Clip("dribble_jogging", build_dribble(2.7, 7.0, fps=FPS, seed=50, turn_rate=weave), ("dribble", "jogging", "front")),
+        Clip("dribble_walking", build_dribble(1.7, 6.0, fps=FPS, seed=51), ("dribble", "walking", "front")),
+        Clip("dribble_running", build_dribble(4.3, 6.0, fps=FPS, seed=52), ("dribble", "running", "front")),
+        Clip("celebration", build_celebration(6.4, fps=FPS, seed=53), ("celebration", "running", "arms", "outside")),
     ]
     for name, gesture, words in (
-        ("kick_low_inside", strike("kick low inside"), "kick right low inside running front"),
-        ("kick_low_inside_slow", strike("kick low inside", fps=FPS, speed=0.6, seed=1),
+        ("kick_low_inside", build_strike("kick low inside"), "kick right low inside running front"),
+        ("kick_low_inside_slow", build_strike("kick low inside", fps=FPS, speed=0.6, seed=1),
          "kick right low inside standing front"),
-        ("kick_low_top", strike("kick low top"), "kick right low top running front"),
-        ("receive_foot", strike("receive foot low inside"), "receive right foot low inside front"),
-        ("header", header(fps=FPS), "header standing jump front"),
-        ("throw_in", throw_in(fps=FPS), "throwb high front"),
-        ("getting_up", getting_up(fps=FPS), "getting_up long_duration back"),
+        ("kick_low_top", build_strike("kick low top"), "kick right low top running front"),
+        ("receive_foot", build_strike("receive foot low inside"), "receive right foot low inside front"),
+        ("header", build_header(fps=FPS), "header standing jump front"),
+        ("throw_in", build_throw_in(fps=FPS), "throwb high front"),
+        ("getting_up", build_get_up(fps=FPS), "getting_up long_duration back"),
     ):
         out.append(Clip(name, gesture.motion, tuple(words.split()), gesture))
     return out
 
 
-def words_of(clip: Clip) -> Timeline:
+def label_clip(clip: Clip) -> Timeline:
     """Return the annotation of a clip."""
     end = clip.motion.duration
     if clip.gesture is None:
-        return Timeline(tuple(_by_speed(clip.motion)) if clip.words is None else (Span(0.0, end, clip.words),), ())
+        return Timeline(tuple(_label_by_speed(clip.motion)) if clip.words is None else (Span(0.0, end, clip.words),), ())
     start, stop = round(clip.gesture.start, 2), round(min(clip.gesture.end, end), 2)
-    around = [s for s in _by_speed(clip.motion) if s.end <= start + 0.5 or s.start >= stop - 0.5]
+    around = [s for s in _label_by_speed(clip.motion) if s.end <= start + 0.5 or s.start >= stop - 0.5]
     around = [
         Span(s.start, min(s.end, start), s.words) if s.start < start else Span(max(s.start, stop), s.end, s.words)
         for s in around
@@ -162,7 +162,7 @@ def words_of(clip: Clip) -> Timeline:
     return Timeline((*(s for s in around if s.end > s.start + 0.2), move), (KeyMoment(clip.gesture.key, clip.words),))
 
 
-def _by_speed(motion: Motion) -> list[Span]:
+def _label_by_speed(motion: Motion) -> list[Span]:
     """Label stretches of one gait by the speed of the root, smoothed over a second; short ones join the one before."""
     width = int(motion.fps)
     window = np.hanning(width + 2)[1:-1]
@@ -172,7 +172,7 @@ def _by_speed(motion: Motion) -> list[Span]:
     velocity = np.gradient(smooth, 1.0 / motion.fps, axis=0)
     names = np.searchsorted([limit for _, limit in _GAITS], np.linalg.norm(velocity, axis=1), side="right")
     spans: list[list] = []
-    for begin, end in equal_runs(names):
+    for begin, end in find_equal_runs(names):
         word = _GAITS[names[begin]][0]
         if spans and (end - begin < 0.4 * motion.fps or spans[-1][2] == word):
             spans[-1][1] = end
@@ -185,25 +185,25 @@ def _by_speed(motion: Motion) -> list[Span]:
     ]
 
 
-def _times(seconds: float) -> np.ndarray:
+def _clip_times(seconds: float) -> np.ndarray:
     """Return the times (T,) s of a clip."""
     return np.arange(int(round(seconds * FPS)) + 1) / FPS
 
 
-def _profile(rows) -> np.ndarray:
+def _build_speed_profile(rows) -> np.ndarray:
     """Build speeds (T,) through rows (seconds, m/s), corners rounded over half a second."""
     seconds, values = np.array(rows, dtype=float).T
-    return _eased(np.interp(_times(seconds[-1]), seconds, values))
+    return _smooth_corners(np.interp(_clip_times(seconds[-1]), seconds, values))
 
 
-def _eased(values: np.ndarray) -> np.ndarray:
+def _smooth_corners(values: np.ndarray) -> np.ndarray:
     """Smooth values over 0.6 s."""
     return hann_smooth(values, int(0.3 * FPS))
 
 
-def _breeze(seconds: float, seed: int) -> np.ndarray:
+def _build_unsteadiness(seconds: float, seed: int) -> np.ndarray:
     """Build a slight unsteadiness of a steady speed (T,), some hundredths of m/s."""
-    times = _times(seconds)
+    times = _clip_times(seconds)
     return 0.06 * np.sin(2 * np.pi * times / 3.7 + seed) + 0.04 * np.sin(2 * np.pi * times / 2.3 + 2 * seed)
 
 
@@ -243,32 +243,32 @@ STRETCHES = {
 }
 
 
-def true_paths() -> tuple[np.ndarray, dict[str, np.ndarray], np.ndarray]:
+def compute_true_paths() -> tuple[np.ndarray, dict[str, np.ndarray], np.ndarray]:
     """Compute the true paths, without noise.
 
     Returns:
         Times (N,) s at 100 Hz, players' positions (N, 2) m by name, and the ball's (N, 3) m.
     """
     times = np.arange(int(MATCH_SECONDS * 100) + 1) / 100.0
-    players = {name: _rounded(rows, times) for name, rows in PATHS.items()}
-    return times, players, _ball(times, players)
+    players = {name: _round_path(rows, times) for name, rows in PATHS.items()}
+    return times, players, _compute_ball(times, players)
 
 
-def _rounded(rows, times: np.ndarray) -> np.ndarray:
+def _round_path(rows, times: np.ndarray) -> np.ndarray:
     """Build a path (N, 2) through waypoints, rounded in space and speed by a Hann window of 1.2 s, twice."""
     table = np.array(rows, dtype=float)
-    path = interpolate(times, table[:, 0], table[:, 1:3])
+    path = interpolate_columns(times, table[:, 0], table[:, 1:3])
     for _ in range(2):
         path = np.stack([hann_smooth(column, 60) for column in path.T], axis=-1)
     return path
 
 
-def _ball(times: np.ndarray, players: dict[str, np.ndarray]) -> np.ndarray:
+def _compute_ball(times: np.ndarray, players: dict[str, np.ndarray]) -> np.ndarray:
     """Compute the ball (N, 3): rolled ahead from touch to touch in a dribble, rolling or flying between players."""
     ball = np.full((len(times), 3), np.nan)
     for begin, end, name in DRIBBLES:
         inside = (times >= begin - 1e-9) & (times <= end + 1e-9)
-        ball[inside] = _dribbled(times, players[name], begin, end)[inside]
+        ball[inside] = _dribble_ball(times, players[name], begin, end)[inside]
     ball[times < DRIBBLES[0][0]] = ball[np.flatnonzero(np.isfinite(ball[:, 0]))[0]]
     for a, b in ((8.5, 10.2), (16.5, 17.9)):
         inside = (times > a) & (times < b)
@@ -276,10 +276,10 @@ def _ball(times: np.ndarray, players: dict[str, np.ndarray]) -> np.ndarray:
         share = (times[inside] - a) / (b - a)
         share = share * (1.18 - 0.18 * share)  # rolling slows it down
         ball[inside] = start + (stop - start) * share[:, None]
-    return _shot(ball, times)
+    return _add_shot(ball, times)
 
 
-def _shot(ball: np.ndarray, times: np.ndarray) -> np.ndarray:
+def _add_shot(ball: np.ndarray, times: np.ndarray) -> np.ndarray:
     """Add the shot at goal to the ball (N, 3)."""
     kick, (net, target) = TOUCHES[-1][0], NET
     flying = (times > kick) & (times <= net)
@@ -295,29 +295,29 @@ def _shot(ball: np.ndarray, times: np.ndarray) -> np.ndarray:
     return ball
 
 
-def _dribbled(times: np.ndarray, path: np.ndarray, begin: float, end: float) -> np.ndarray:
+def _dribble_ball(times: np.ndarray, path: np.ndarray, begin: float, end: float) -> np.ndarray:
     """Compute the ball (N, 3) of a dribble: half a metre ahead at each touch, further between."""
     velocity = np.gradient(path, times, axis=0)
     speed = np.linalg.norm(velocity, axis=1)
-    way = velocity / np.maximum(speed, 0.05)[:, None]
+    direction = velocity / np.maximum(speed, 0.05)[:, None]
     half = 25
-    way = np.stack(
+    direction = np.stack(
         [
-            np.convolve(np.pad(way[:, a], half, mode="edge"), np.full(2 * half + 1, 1 / (2 * half + 1)), "valid")
+            np.convolve(np.pad(direction[:, a], half, mode="edge"), np.full(2 * half + 1, 1 / (2 * half + 1)), "valid")
             for a in (0, 1)
         ],
         -1,
     )
-    way = unit_vectors(way, least=1e-6)
+    direction = unit_vectors(direction, min_length=1e-6)
     since = ((end - times) / 0.75) % 1.0
     running = np.clip((times - begin) / 0.8, 0.0, 1.0) * np.minimum(speed, 3.5)
     ahead = 0.46 + 0.16 * running * np.sin(np.pi * since) ** 1.5
-    right = np.stack([way[:, 1], -way[:, 0]], axis=-1)
-    place = path + ahead[:, None] * way + 0.10 * right
+    right = np.stack([direction[:, 1], -direction[:, 0]], axis=-1)
+    place = path + ahead[:, None] * direction + 0.10 * right
     return np.column_stack([place, np.full(len(times), BALL_RADIUS)])
 
 
-def tracked(times: np.ndarray, positions: np.ndarray, seed: int, slow: float = 0.08, fast: float = 0.01) -> np.ndarray:
+def add_tracking_noise(times: np.ndarray, positions: np.ndarray, seed: int, slow: float = 0.08, fast: float = 0.01) -> np.ndarray:
     """Add the noise of a tracking system.
 
     Optical systems have 8 to 9 cm against truth, and about 1 cm between frames.
@@ -340,12 +340,12 @@ def tracked(times: np.ndarray, positions: np.ndarray, seed: int, slow: float = 0
 
 def write_match(folder: Path) -> None:
     """Write `player1.csv`, `player2.csv` (track and ball at 10 Hz) and their `.txt` timelines."""
-    times, players, ball = true_paths()
+    times, players, ball = compute_true_paths()
     every = slice(None, None, int(100 / MATCH_RATE))
     seen_ball = ball[every].copy()
-    seen_ball[:, :2] = tracked(times[every], seen_ball[:, :2], seed=99, slow=0.05)
+    seen_ball[:, :2] = add_tracking_noise(times[every], seen_ball[:, :2], seed=99, slow=0.05)
     for seed, (name, path) in enumerate(players.items(), start=1):
-        seen = tracked(times[every], path[every], seed)
+        seen = add_tracking_noise(times[every], path[every], seed)
         rows = np.column_stack([times[every], seen, seen_ball])
         head = "time_s,x_m,y_m,ball_x_m,ball_y_m,ball_z_m"
         lines = [head, *(f"{r[0]:.1f}," + ",".join(f"{v:.3f}" for v in r[1:]) for r in rows)]
@@ -360,12 +360,12 @@ def write_match(folder: Path) -> None:
 
 def write_library(folder: Path) -> None:
     """Write each clip as `NAME.bvh` with its labels in `NAME.txt`."""
-    for clip in clips():
-        bvh.write(folder / f"{clip.name}.bvh", clip.motion)
-        (folder / f"{clip.name}.txt").write_text(format_timeline(words_of(clip)), encoding="utf-8", newline="\n")
+    for clip in build_clips():
+        bvh.write_bvh(folder / f"{clip.name}.bvh", clip.motion)
+        (folder / f"{clip.name}.txt").write_text(format_timeline(label_clip(clip)), encoding="utf-8", newline="\n")
 
 
-def make(folder: Path = HERE) -> None:
+def write_sample(folder: Path = HERE) -> None:
     """Write the whole sample below `folder`."""
     for part, write in (("library", write_library), ("match", write_match)):
         (folder / part).mkdir(parents=True, exist_ok=True)
@@ -373,4 +373,4 @@ def make(folder: Path = HERE) -> None:
 
 
 if __name__ == "__main__":
-    make(Path(sys.argv[1]) if len(sys.argv) > 1 else HERE)
+    write_sample(Path(sys.argv[1]) if len(sys.argv) > 1 else HERE)

@@ -16,10 +16,10 @@ import demo
 OUT = demo.HERE.parent / "docs" / "pictures"
 SPAN = (6.0, 12.0)  # seconds: a run with the ball, a cross, a header
 STAND, EYES = 9.7, 9.35  # seconds of the two pictures
-WHO = "home_10"  # the player of the second picture
+PLAYER = "home_10"  # the player of the second picture
 
 
-def shown(bpy, folder: str) -> None:
+def synthesize_match(bpy, folder: str) -> None:
     """Synthesize the match in an empty file."""
     bpy.ops.wm.read_homefile(use_empty=True)
     scene = bpy.context.scene
@@ -28,10 +28,10 @@ def shown(bpy, folder: str) -> None:
     bpy.ops.beyond_mocap.read_match(filepath=str(demo.HERE / "match" / "small" / "small.dat"))
     match = scene.beyond_mocap_match
     match.start, match.end, match.folder = *SPAN, folder
-    bpy.ops.beyond_mocap.make_match()
+    bpy.ops.beyond_mocap.synthesize_match()
 
 
-def render(bpy, second: float, path: pathlib.Path) -> None:
+def render_second(bpy, second: float, path: pathlib.Path) -> None:
     """Render a second of the match's clock through the scene's camera."""
     scene, match = bpy.context.scene, bpy.context.scene.beyond_mocap_match
     scene.frame_set(round(match.shown_first + (second - match.shown_start) * 30.0))
@@ -44,16 +44,16 @@ def render(bpy, second: float, path: pathlib.Path) -> None:
 def main() -> int:
     """Render both pictures."""
     folder = pathlib.Path(sys.argv[1]) if len(sys.argv) > 1 else OUT
-    _, switch_off = demo.load_extension()
+    _, unregister = demo.load_extension()
     import bpy
 
-    with tempfile.TemporaryDirectory() as made:
-        shown(bpy, made)
+    with tempfile.TemporaryDirectory() as match_folder:
+        synthesize_match(bpy, match_folder)
     bpy.ops.beyond_mocap.match_camera(which="STAND")
-    render(bpy, STAND, folder / "match-stand.png")
-    bpy.ops.beyond_mocap.match_camera(which="EYES", player=WHO)
-    render(bpy, EYES, folder / "match-eyes.png")
-    switch_off()
+    render_second(bpy, STAND, folder / "match-stand.png")
+    bpy.ops.beyond_mocap.match_camera(which="EYES", player=PLAYER)
+    render_second(bpy, EYES, folder / "match-eyes.png")
+    unregister()
     return 0
 
 

@@ -23,7 +23,7 @@ def register():
 def unregister():
     """Stop what runs, undo the registration, and clear what is stored in memory."""
     stop_watching()
-    child.end_all()
+    child.stop_all()
     registration.unregister_package(__name__)
-    session.clear()
-    solve.forget_reconstructions()
+    session.clear_session()
+    solve.clear_reconstructions()

@@ -12,25 +12,25 @@ import bpy
 import numpy as np
 from mathutils import Vector
 
-from ..beyond_mocap.files.whole import beside, whole_folder
+from ..beyond_mocap.files.whole import atomic_path, atomic_folder
 from ..beyond_mocap.motion.motion import Motion
 from ..beyond_mocap.motion.track.ball_path import BallPath
 from .core import action, channels
-from .core.material import colour
+from .core.material import get_material
 from .core.measure import frames_per_second, whole_frames
-from .core.set_aside import scene_aside
+from .core.set_aside import use_temporary_scene
 from .rigs import armature
 from .stage import ball, body
 
 SHIRT = (0.30, 0.32, 0.35)  # linear RGB, a neutral grey
 CAMERA_FROM = (-1.1, -5.2, 0.75)  # metres from the middle of the body
-HIGH = 0.95  # metres, height of that middle above the floor
-GLIDE = 1.0  # seconds of the running mean for the camera's path
+BODY_HEIGHT = 0.95  # metres, height of that middle above the floor
+SMOOTHING_SECONDS = 1.0  # seconds of the running mean for the camera's path
 _AROUND, _TILE = 24.0, 1.0  # metres of floor around the path, and of a tile; tiles make foot slide visible
 
 
 @dataclass(frozen=True)
-class Look:
+class RenderLook:
     """How clips are rendered.
 
     Attributes:
@@ -48,7 +48,7 @@ class Look:
     movie: bool = True
 
 
-def film(path: Path, motion: Motion, ball_path: BallPath | None, look: Look) -> None:
+def render_motion(path: Path, motion: Motion, ball_path: BallPath | None, look: RenderLook) -> None:
     """Render a motion to a movie or a folder of pictures, completely or not at all; the blend file stays unchanged.
 
     Args:
@@ -57,21 +57,21 @@ def film(path: Path, motion: Motion, ball_path: BallPath | None, look: Look) -> 
         ball_path: its ball, whose first sample is at the motion's first frame, or None.
         look: how to render.
     """
-    with scene_aside("Study") as scene:
-        _settings(scene, look)
+    with use_temporary_scene("Study") as scene:
+        _apply_settings(scene, look)
         scene.frame_start, scene.frame_end = 1, 1 + int(motion.duration * look.fps + 1e-4)
-        _player(scene, motion)
+        _create_player(scene, motion)
         if ball_path is not None:
-            ball.write(ball.create(bpy.context, "Ball", scene.collection), ball_path, scene, float(scene.frame_start))
-        _floor(scene, motion)
-        _light(scene)
-        _camera(scene, motion)
-        with beside(path, path.suffix) if look.movie else whole_folder(path) as part:
-            scene.render.filepath = str(part) if look.movie else f"{part}/"
+            ball.write_trajectory(ball.create_ball(bpy.context, "Ball", scene.collection), ball_path, scene, float(scene.frame_start))
+        _create_floor(scene, motion)
+        _create_light(scene)
+        _create_camera(scene, motion)
+        with atomic_path(path, path.suffix) if look.movie else atomic_folder(path) as temporary:
+            scene.render.filepath = str(temporary) if look.movie else f"{temporary}/"
             bpy.ops.render.render(animation=True, scene=scene.name)
 
 
-def engine_here(wanted: str) -> str:
+def find_engine(requested: str) -> str:
     """Find Blender's name of an engine in this version (EEVEE has two names).
 
     AUTO is Cycles if there is no window, because EEVEE is very slow without a graphics card. If the Cycles add-on is
@@ -82,17 +82,17 @@ def engine_here(wanted: str) -> str:
     Returns:
         Blender's name.
     """
-    if wanted == "AUTO":
-        wanted = "CYCLES" if bpy.app.background else "EEVEE"
-    if wanted == "CYCLES" and not hasattr(bpy.types.Scene, "cycles"):
-        wanted = "EEVEE"
+    if requested == "AUTO":
+        requested = "CYCLES" if bpy.app.background else "EEVEE"
+    if requested == "CYCLES" and not hasattr(bpy.types.Scene, "cycles"):
+        requested = "EEVEE"
     names = {item.identifier for item in bpy.types.RenderSettings.bl_rna.properties["engine"].enum_items}
-    if wanted == "EEVEE":
+    if requested == "EEVEE":
         return "BLENDER_EEVEE" if "BLENDER_EEVEE" in names else "BLENDER_EEVEE_NEXT"
-    return {"CYCLES": "CYCLES", "WORKBENCH": "BLENDER_WORKBENCH"}[wanted]
+    return {"CYCLES": "CYCLES", "WORKBENCH": "BLENDER_WORKBENCH"}[requested]
 
 
-def _settings(scene: bpy.types.Scene, look: Look) -> None:
+def _apply_settings(scene: bpy.types.Scene, look: RenderLook) -> None:
     """Set the render settings of the scene."""
     render = scene.render
     render.engine, render.fps, render.fps_base = look.engine, look.fps, 1.0
@@ -113,14 +113,14 @@ def _settings(scene: bpy.types.Scene, look: Look) -> None:
     render.use_stamp, render.use_file_extension = False, not look.movie  # stamps would reveal files and times
 
 
-def _player(scene: bpy.types.Scene, motion: Motion) -> None:
-    player = armature.create(bpy.context, motion.skeleton, "Body", scene.collection)
-    body.create(player, "Study", SHIRT, scene.collection, scene, example=motion)
-    action.write(player, motion, scene, float(scene.frame_start))
+def _create_player(scene: bpy.types.Scene, motion: Motion) -> None:
+    player = armature.create_armature(bpy.context, motion.skeleton, "Body", scene.collection)
+    body.create_character(player, "Study", SHIRT, scene.collection, scene, example=motion)
+    action.write_motion(player, motion, scene, float(scene.frame_start))
     player.hide_render = True
 
 
-def _floor(scene: bpy.types.Scene, motion: Motion) -> None:
+def _create_floor(scene: bpy.types.Scene, motion: Motion) -> None:
     """Create a floor of tiles in two greys below the whole path."""
     low = np.floor(motion.root_positions[:, :2].min(axis=0) - _AROUND)
     high = np.ceil(motion.root_positions[:, :2].max(axis=0) + _AROUND)
@@ -131,16 +131,16 @@ def _floor(scene: bpy.types.Scene, motion: Motion) -> None:
     mesh = bpy.data.meshes.new("Floor")
     mesh.from_pydata(corners.reshape(-1, 3).tolist(), [], faces.reshape(-1, 4).tolist())
     for name, grey in (("Floor", 0.30), ("Floor tile", 0.36)):
-        mesh.materials.append(colour(name, (grey, grey, grey), 0.95))
+        mesh.materials.append(get_material(name, (grey, grey, grey), 0.95))
     tiles = np.add.outer(np.arange(len(across) - 1), np.arange(len(along) - 1)) % 2
     mesh.polygons.foreach_set("material_index", tiles.ravel().astype(np.int32))
     scene.collection.objects.link(bpy.data.objects.new("Floor", mesh))
 
 
-def _light(scene: bpy.types.Scene) -> None:
+def _create_light(scene: bpy.types.Scene) -> None:
     """Create a sun that casts shadows, and a pale sky."""
     data = bpy.data.lights.new("Sun", "SUN")
-    data.energy, data.angle = 3.0, 0.03
+    data.compute_energy, data.angle = 3.0, 0.03
     sun = bpy.data.objects.new("Sun", data)
     sun.rotation_euler = (0.75, 0.25, 0.5)
     scene.collection.objects.link(sun)
@@ -152,7 +152,7 @@ def _light(scene: bpy.types.Scene) -> None:
     scene.world = world
 
 
-def _camera(scene: bpy.types.Scene, motion: Motion) -> None:
+def _create_camera(scene: bpy.types.Scene, motion: Motion) -> None:
     """Create a camera with a constant direction that follows the body smoothly."""
     data = bpy.data.cameras.new("Camera")
     data.lens, data.clip_end = 40.0, 500.0
@@ -162,14 +162,14 @@ def _camera(scene: bpy.types.Scene, motion: Motion) -> None:
     camera.rotation_euler = Vector(-np.array(CAMERA_FROM)).to_track_quat("-Z", "Y").to_euler()
     frames = whole_frames(float(scene.frame_start), motion.duration, frames_per_second(scene))
     seconds = (frames - scene.frame_start) / frames_per_second(scene)
-    way = followed(motion.root_positions[:, :2], motion.fps)
+    path = smooth_path(motion.root_positions[:, :2], motion.fps)
     times = np.arange(len(motion)) / motion.fps
-    x, y = (np.interp(seconds, times, way[:, axis]) for axis in range(2))
-    places = np.column_stack([x, y, np.full(len(frames), HIGH)]) + CAMERA_FROM
-    channels.animate(camera, "Camera", frames, {"location": ("Object Transforms", places)})
+    x, y = (np.interp(seconds, times, path[:, axis]) for axis in range(2))
+    positions = np.column_stack([x, y, np.full(len(frames), BODY_HEIGHT)]) + CAMERA_FROM
+    channels.create_action(camera, "Camera", frames, {"location": ("Object Transforms", positions)})
 
 
-def followed(places: np.ndarray, fps: float) -> np.ndarray:
+def smooth_path(positions: np.ndarray, fps: float) -> np.ndarray:
     """Smooth a path for the camera: the running mean over GLIDE seconds.
 
     The ends are point-reflected, so that it neither lags nor starts with a jolt.
@@ -180,9 +180,9 @@ def followed(places: np.ndarray, fps: float) -> np.ndarray:
     Returns:
         (T, 2) m.
     """
-    half = min(int(0.5 * GLIDE * fps), len(places) - 1)
+    half = min(int(0.5 * SMOOTHING_SECONDS * fps), len(positions) - 1)
     if half < 1:
-        return places
-    before, after = 2.0 * places[:1] - places[half:0:-1], 2.0 * places[-1:] - places[-2 : -half - 2 : -1]
-    total = np.cumsum(np.concatenate([np.zeros((1, 2)), before, places, after]), axis=0)
+        return positions
+    before, after = 2.0 * positions[:1] - positions[half:0:-1], 2.0 * positions[-1:] - positions[-2 : -half - 2 : -1]
+    total = np.cumsum(np.concatenate([np.zeros((1, 2)), before, positions, after]), axis=0)
     return (total[2 * half + 1 :] - total[: -2 * half - 1]) / (2 * half + 1)

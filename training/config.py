@@ -11,11 +11,11 @@ from pathlib import Path
 
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.files import json_values as values
-from beyond_mocap.files.content import utf8
+from beyond_mocap.files.content import read_utf8
 from beyond_mocap.throws.networks.model import ModelSettings
 
 PAGE = "docs/throws/throws-training.md"
-LARGEST = 1_000_000
+MAX_FILE_SIZE = 1_000_000
 """Largest size of a config file, bytes."""
 LIMITS = {
     "epochs": (0, 1_000_000), "macro": (1, 10_000), "batch": (1, 65_536), "learning_rate": (1e-7, 1.0),
@@ -84,7 +84,7 @@ class TrainingConfig:
             if not low <= getattr(self, name) <= high:
                 raise InputError(f"training: {name}", f"{getattr(self, name)}", f"{low} to {high}", f"see {PAGE}")
 
-    def flat(self) -> dict:
+    def to_dict(self) -> dict:
         """Return all names of the JSON with their values."""
         own = {name: value for name, value in asdict(self).items() if name != "settings"}
         return {**asdict(self.settings), **own}
@@ -99,19 +99,19 @@ def read_config(path: str | os.PathLike | None, **changes) -> TrainingConfig:
     Raises:
         InputError: one line: no such file, no JSON, an unknown name, a value out of its range.
     """
-    told = {}
+    entries = {}
     if path is not None:
-        told = values.object_of(utf8(Path(path), "a training's config", LARGEST), str(path), PAGE)
-        values.check_object(told, str(path))
+        entries = values.parse_json(read_utf8(Path(path), "a training's config", MAX_FILE_SIZE), str(path), PAGE)
+        values.check_object(entries, str(path))
     changes = {name: value for name, value in changes.items() if value is not None}
-    return config_of({**told, **changes}, path or "config")
+    return build_config({**entries, **changes}, path or "config")
 
 
-def config_of(told: dict, where: object = "config") -> TrainingConfig:
+def build_config(entries: dict, where: object = "config") -> TrainingConfig:
     """Build a training from names and values; InputError as for `read_config`."""
-    known = TrainingConfig().flat()
-    values.check_names(told, str(where), known, ())
-    read = {name: _value(value, known[name], f"{where}: {name}") for name, value in told.items()}
+    known = TrainingConfig().to_dict()
+    values.check_names(entries, str(where), known, ())
+    read = {name: _parse_value(value, known[name], f"{where}: {name}") for name, value in entries.items()}
     of_model = {one.name for one in fields(ModelSettings)}
     start = TrainingConfig()
     try:
@@ -121,10 +121,10 @@ def config_of(told: dict, where: object = "config") -> TrainingConfig:
         raise InputError(where, str(error)) from None
 
 
-def _value(value, default, where: str):
+def _parse_value(value, default, where: str):
     """Parse a value of the same type as the default."""
     if isinstance(default, bool):
-        return values.truth(value, where)
+        return values.check_bool(value, where)
     if isinstance(default, int):
-        return values.whole_number(value, where)
-    return values.number(value, where) if isinstance(default, float) else values.text(value, where)
+        return values.check_whole_number(value, where)
+    return values.check_number(value, where) if isinstance(default, float) else values.check_text(value, where)

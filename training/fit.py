@@ -23,12 +23,12 @@ import jax.numpy as jnp
 import numpy as np
 import optax
 
-from beyond_mocap.base.errors import Cancelled, InputError
-from beyond_mocap.files.whole import beside
+from beyond_mocap.base.errors import UserCancelledError, InputError
+from beyond_mocap.files.whole import atomic_path
 
 from .config import TrainingConfig
 
-CLIP = 1.0
+MAX_GRADIENT = 1.0
 """Largest norm of a gradient; feeding a frame back many times can cause large ones."""
 VERSION = 1
 NEXT_STEP = "repeat the same command, or leave --resume out to start again"
@@ -37,7 +37,7 @@ NEXT_STEP = "repeat the same command, or leave --resume out to start again"
 # Order of the examples: stretches of some frames, shuffled again in each epoch.
 
 
-def stretches(lengths, frames: int, seed: int, epoch: int) -> np.ndarray:
+def list_stretches(lengths, frames: int, seed: int, epoch: int) -> np.ndarray:
     """List stretches (N, 2) of `frames` steps, (example, first frame), shuffled.
 
     Stretches are adjacent from a random frame on, so that within an epoch nearly every frame is predicted once;
@@ -62,7 +62,7 @@ def stretches(lengths, frames: int, seed: int, epoch: int) -> np.ndarray:
     return rows[rng.permutation(len(rows))]
 
 
-def batches(rows: np.ndarray, size: int) -> np.ndarray:
+def split_batches(rows: np.ndarray, size: int) -> np.ndarray:
     """Split rows (N, ...) into equal batches (B, size, ...); the last is filled up from the beginning."""
     count = max(1, -(-len(rows) // size))
     return rows[np.arange(count * size) % len(rows)].reshape(count, size, *rows.shape[1:])
@@ -81,18 +81,18 @@ class Problem(Protocol):
     fits: str
     data: object
 
-    def first(self, key) -> dict:
+    def build_parameters(self, key) -> dict:
         """Build the first parameters."""
 
-    def frames(self, share: float) -> int:
+    def count_frames(self, share: float) -> int:
         """Return the number of frames to feed back when `share` of the training is done; 0: single frames."""
 
-    def loss(self, params, data, rows, key, frames: int):
+    def compute_loss(self, params, data, rows, key, frames: int):
         """Compute the loss (), and its parts by name, of stretches rows (B, 2) of that many frames."""
 
 
 @dataclass(frozen=True, eq=False)
-class Trained:
+class TrainingResult:
     """Result of a training.
 
     Attributes:
@@ -114,7 +114,7 @@ def fit(
     problem: Problem, config: TrainingConfig, *, checkpoint: Path | None = None, resume: bool = False,
     minutes: float | None = None, progress: Callable[[float, str], None] = lambda fraction, text: None,
     cancelled: Callable[[], bool] = lambda: False,
-) -> Trained:
+) -> TrainingResult:
     """Train a problem.
 
     Args:
@@ -129,37 +129,37 @@ def fit(
         InputError: if no example is long enough, the checkpoint is of another training, or the loss is not finite.
         Cancelled: if `cancelled` returns True.
     """
-    adam = optax.chain(_clipped(), optax.scale_by_adam())
-    params = problem.first(jax.random.key(config.seed))
+    adam = optax.chain(_build_clipping(), optax.scale_by_adam())
+    params = problem.build_parameters(jax.random.key(config.seed))
     state = (params, adam.init(params))
-    epoch, spent, losses = 0, 0.0, ()
+    epoch, earlier_seconds, losses = 0, 0.0, ()
     if resume and checkpoint is not None:
-        old = read_checkpoint(checkpoint, state, problem.fits)
-        state, epoch, spent, losses = old.state, old.epoch, old.seconds, old.losses
-    begun = time.perf_counter() - spent
-    steps, parts = _steps(problem, adam), {}
+        previous = read_checkpoint(checkpoint, state, problem.fits)
+        state, epoch, earlier_seconds, losses = previous.state, previous.epoch, previous.seconds, previous.losses
+    start_time = time.perf_counter() - earlier_seconds
+    steps, parts = _compile_step(problem, adam), {}
 
-    def keep() -> None:
+    def save_checkpoint() -> None:
         if checkpoint is not None:
-            seconds = time.perf_counter() - begun
+            seconds = time.perf_counter() - start_time
             write_checkpoint(checkpoint, Checkpoint(state, epoch, seconds, losses, problem.fits))
 
-    while (share := _share(epoch, time.perf_counter() - begun, config, minutes)) < 1.0:
+    while (share := _compute_share(epoch, time.perf_counter() - start_time, config, minutes)) < 1.0:
         progress(share, f"epoch {epoch + 1}, loss {losses[-1]:.4f}" if losses else "compiling")
         if cancelled():
-            keep()
-            raise Cancelled(f"cancelled after {epoch} epochs" + ("; --resume continues" if checkpoint else ""))
-        state, parts = _epoch(problem, config, steps, state, epoch, problem.frames(share), rate_at(share, config))
+            save_checkpoint()
+            raise UserCancelledError(f"cancelled after {epoch} epochs" + ("; --resume continues" if checkpoint else ""))
+        state, parts = _train_epoch(problem, config, steps, state, epoch, problem.count_frames(share), compute_rate(share, config))
         losses, epoch = (*losses, parts["loss"]), epoch + 1
         if not np.isfinite(losses[-1]):
             raise InputError("training", f"the loss is not finite after {epoch} epochs", "a lower learning_rate")
         if epoch % config.macro == 0:
-            keep()
-    keep()
-    return Trained(state[0], epoch, time.perf_counter() - begun, losses, parts)
+            save_checkpoint()
+    save_checkpoint()
+    return TrainingResult(state[0], epoch, time.perf_counter() - start_time, losses, parts)
 
 
-def rate_at(share: float, config: TrainingConfig) -> float:
+def compute_rate(share: float, config: TrainingConfig) -> float:
     """Compute Adam's rate when `share` of the training is done.
 
     It follows half a cosine from learning_rate to final_rate times that, after a short rise.
@@ -168,32 +168,32 @@ def rate_at(share: float, config: TrainingConfig) -> float:
     return config.learning_rate * falling * min(1.0, 0.1 + share / 0.01)
 
 
-def _share(epoch: int, seconds: float, config: TrainingConfig, minutes: float | None) -> float:
+def _compute_share(epoch: int, seconds: float, config: TrainingConfig, minutes: float | None) -> float:
     """Compute the share of the training that is done, by epochs or by time, whichever is larger."""
     done = epoch / config.epochs if config.epochs else 1.0
     return max(done, 0.0 if minutes is None else seconds / (60.0 * minutes))
 
 
-def _clipped() -> optax.GradientTransformation:
+def _build_clipping() -> optax.GradientTransformation:
     """Build a transformation that clips the gradient of each network separately to MAX_GRADIENT.
 
     Separately trained networks stay independent that way.
     """
 
     def update(updates, state, params=None):
-        clip = optax.clip_by_global_norm(CLIP).update
+        clip = optax.clip_by_global_norm(MAX_GRADIENT).update
         return {name: clip(one, optax.EmptyState())[0] for name, one in updates.items()}, state
 
     return optax.GradientTransformation(lambda params: optax.EmptyState(), update)
 
 
-def _steps(problem: Problem, adam):
+def _compile_step(problem: Problem, adam):
     """Build the compiled step, one for each number of frames."""
 
     @partial(jax.jit, static_argnames="frames", donate_argnums=0)
     def step(state, data, rows, key, rate, frames: int):
         params, optimizer = state
-        (loss, parts), gradient = jax.value_and_grad(problem.loss, has_aux=True)(params, data, rows, key, frames)
+        (loss, parts), gradient = jax.value_and_grad(problem.compute_loss, has_aux=True)(params, data, rows, key, frames)
         updates, optimizer = adam.update(gradient, optimizer, params)
         params = jax.tree.map(lambda p, u: p - rate * u, params, updates)
         return (params, optimizer), {"loss": loss, **parts}
@@ -201,20 +201,20 @@ def _steps(problem: Problem, adam):
     return step
 
 
-def _epoch(problem, config, step, state, epoch, frames, rate):
+def _train_epoch(problem, config, step, state, epoch, frames, rate):
     """Train one epoch: the new state, and the mean of the losses."""
     length = max(1, frames)
-    rows = stretches(problem.lengths, length, config.seed, epoch)
+    rows = list_stretches(problem.lengths, length, config.seed, epoch)
     if not len(rows):
         raise InputError("training", f"no example has {length + 1} frames", "longer examples, or a shorter rollout")
     key = jax.random.fold_in(jax.random.key(config.seed + 1), epoch)
-    told = []
-    for number, batch in enumerate(batches(rows, max(1, config.batch // length))):
+    losses = []
+    for number, batch in enumerate(split_batches(rows, max(1, config.batch // length))):
         one = jax.random.fold_in(key, number)
         state, parts = step(state, problem.data, jnp.asarray(batch), one, jnp.float32(rate), frames=frames)
-        told.append(parts)
-    told = jax.device_get(told)
-    return state, {name: float(np.mean([parts[name] for parts in told])) for name in told[0]}
+        losses.append(parts)
+    losses = jax.device_get(losses)
+    return state, {name: float(np.mean([parts[name] for parts in losses])) for name in losses[0]}
 
 
 @dataclass(frozen=True, eq=False)
@@ -236,7 +236,7 @@ class Checkpoint:
     fits: str
 
 
-def checkpoint_path(out: str | os.PathLike) -> Path:
+def build_checkpoint_path(out: str | os.PathLike) -> Path:
     """Return the path of the checkpoint of the weights at `out`."""
     out = Path(out)
     return out.with_name(f"{out.stem}.checkpoint.npz")
@@ -251,9 +251,9 @@ def check_checkpoint(path: Path) -> None:
 def write_checkpoint(path: Path, checkpoint: Checkpoint) -> None:
     """Write a checkpoint completely or not at all; InputError if the folder cannot be written."""
     leaves = [np.asarray(leaf) for leaf in jax.tree.leaves(checkpoint.state)]
-    told = {"version": VERSION, "epoch": checkpoint.epoch, "seconds": checkpoint.seconds, "fits": checkpoint.fits}
-    with beside(path, ".npz") as part:
-        np.savez(part, told=np.array(json.dumps(told)), losses=np.array(checkpoint.losses, float),
+    header = {"version": VERSION, "epoch": checkpoint.epoch, "seconds": checkpoint.seconds, "fits": checkpoint.fits}
+    with atomic_path(path, ".npz") as part:
+        np.savez(part, told=np.array(json.dumps(header)), losses=np.array(checkpoint.losses, float),
                  **{f"leaf_{i:04d}": leaf for i, leaf in enumerate(leaves)})  # fmt: skip
 
 
@@ -271,17 +271,17 @@ def read_checkpoint(path: Path, like: object, fits: str) -> Checkpoint:
     check_checkpoint(path)
     try:
         with np.load(path, allow_pickle=False) as file:
-            told = json.loads(str(file["told"][()]))
+            header = json.loads(str(file["told"][()]))
             losses = tuple(float(one) for one in file["losses"])
             leaves = [file[name] for name in sorted(name for name in file.files if name.startswith("leaf_"))]
-        version, epoch, seconds, trained = (told[name] for name in ("version", "epoch", "seconds", "fits"))
+        version, epoch, seconds, trained = (header[name] for name in ("version", "epoch", "seconds", "fits"))
     except (ValueError, KeyError, TypeError, EOFError, OSError, zipfile.BadZipFile, zlib.error,
             NotImplementedError, RuntimeError, AttributeError) as error:
         raise InputError(path, f"is not a readable checkpoint ({type(error).__name__})", "", NEXT_STEP) from None
     if version != VERSION:
         raise InputError(path, f"version {version}", f"version {VERSION}", NEXT_STEP)
-    wanted, tree = jax.tree.flatten(like)
-    if trained != fits or [(a.shape, a.dtype) for a in leaves] != [(b.shape, b.dtype) for b in map(np.asarray, wanted)]:
+    expected_leaves, tree = jax.tree.flatten(like)
+    if trained != fits or [(a.shape, a.dtype) for a in leaves] != [(b.shape, b.dtype) for b in map(np.asarray, expected_leaves)]:
         raise InputError(path, "belongs to a training with other settings or recordings", "", NEXT_STEP)
     state = jax.tree.unflatten(tree, [jnp.asarray(leaf) for leaf in leaves])
     return Checkpoint(state, int(epoch), float(seconds), losses, fits)

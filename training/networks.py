@@ -20,14 +20,14 @@ RIDGES = (0.001, 0.003, 0.01, 0.03, 0.1, 0.3)
 """Ridges of the linear start, for each row of normalised inputs: smaller ones follow the examples more closely but
 diverge when frames are fed back on another body, or on noisy recordings.
 """
-GUIDE = 0.01
+GUIDE_RIDGE = 0.01
 """Relative ridge of inputs from inverse kinematics (`features.count_guides`): they are valid on any body, all others
 are partly specific to the body.
 """
 _ROWS = 2048
 
 
-class Linear(NamedTuple):
+class LinearOutput(NamedTuple):
     """A linear output at each control point.
 
     Attributes:
@@ -39,8 +39,8 @@ class Linear(NamedTuple):
     biases: np.ndarray
 
 
-def first_weights(
-    key, inputs: int, outputs: int, layers: int, units: int, points: int, linear: Linear | None = None
+def build_first_weights(
+    key, inputs: int, outputs: int, layers: int, units: int, points: int, linear: LinearOutput | None = None
 ) -> dict:
     """Build the first weights of a network.
 
@@ -63,16 +63,16 @@ def first_weights(
     weights, biases = [], []
     for layer, (width, out) in enumerate(zip(widths, widths[1:])):
         bound = np.sqrt(6.0 / (width + out)) * (0.1 if layer == layers else 1.0)
-        one = jax.random.uniform(jax.random.fold_in(key, layer), (out, width), jnp.float32, -bound, bound)
-        weight, bias = jnp.tile(one[None], (points, 1, 1)), jnp.zeros((points, out), jnp.float32)
+        initial = jax.random.uniform(jax.random.fold_in(key, layer), (out, width), jnp.float32, -bound, bound)
+        weight, bias = jnp.tile(initial[None], (points, 1, 1)), jnp.zeros((points, out), jnp.float32)
         if linear is not None and 2 * outputs <= units:
-            weight, bias = _passing(weight, bias, linear, layer, layers)
+            weight, bias = _set_linear_units(weight, bias, linear, layer, layers)
         weights.append(weight)
         biases.append(bias)
     return {"weights": weights, "biases": biases}
 
 
-def _passing(weight, bias, linear: Linear, layer: int, last: int):
+def _set_linear_units(weight, bias, linear: LinearOutput, layer: int, last: int):
     """Set the first units of a layer to the linear output."""
     count = linear.weights.shape[1]
     if layer == 0:
@@ -83,7 +83,7 @@ def _passing(weight, bias, linear: Linear, layer: int, last: int):
     return weight, bias.at[:, :count].set(-LIFT)
 
 
-class Sums(NamedTuple):
+class RegressionSums(NamedTuple):
     """Sums over rows for regression.
 
     Attributes:
@@ -100,43 +100,43 @@ class Sums(NamedTuple):
     points: int
     guides: int = 0
 
-    def plus(self, other: "Sums") -> "Sums":
+    def add_sums(self, other: "RegressionSums") -> "RegressionSums":
         """Add the sums of two sets of rows."""
         squares, products = self.squares + other.squares, self.products + other.products
-        return Sums(squares, products, self.rows + other.rows, self.points, self.guides)
+        return RegressionSums(squares, products, self.rows + other.rows, self.points, self.guides)
 
 
-def sums(x: np.ndarray, y: np.ndarray, theta: np.ndarray, guides: int = 0) -> Sums:
+def compute_sums(x: np.ndarray, y: np.ndarray, theta: np.ndarray, guides: int = 0) -> RegressionSums:
     """Compute the sums of normalised inputs x (N, in) and outputs y (N, out); theta: (N, K) control point weights."""
     points = theta.shape[1]
     count = (x.shape[1] + 1) * (1 if points == 1 else points + 1)
     squares, products = np.zeros((count, count)), np.zeros((count, y.shape[1]))
     for first in range(0, len(x), _ROWS):
         rows = slice(first, first + _ROWS)
-        columns = _columns(x[rows].astype(float), theta[rows].astype(float))
+        columns = _build_columns(x[rows].astype(float), theta[rows].astype(float))
         squares += columns.T @ columns
         products += columns.T @ y[rows].astype(float)
-    return Sums(squares, products, len(x), points, guides)
+    return RegressionSums(squares, products, len(x), points, guides)
 
 
-def linear_start(told: Sums, ridge: float) -> Linear:
+def fit_linear(sums: RegressionSums, ridge: float) -> LinearOutput:
     """Fit the linear output with weights that vary with the phase, by ridge regression.
 
     With one control point that is y = W x + b. With several it is y = sum_k theta_k ((W + D_k) x + b_k): common and
     varying parts have the same ridge, so that no control point diverges where it has few frames.
     """
-    count, out = told.products.shape
-    shares = 1 if told.points == 1 else told.points + 1
+    count, out = sums.products.shape
+    shares = 1 if sums.points == 1 else sums.points + 1
     weight = np.ones((shares, count // shares))
-    weight[:, -1 - told.guides : -1] = GUIDE
+    weight[:, -1 - sums.guides : -1] = GUIDE_RIDGE
     # columns: `shares` blocks of (inputs, 1); the first is common to all phases, the others belong to one point each
-    found = np.linalg.solve(told.squares + np.diag(ridge * told.rows * weight.ravel()), told.products)
+    found = np.linalg.solve(sums.squares + np.diag(ridge * sums.rows * weight.ravel()), sums.products)
     found = found.reshape(shares, count // shares, out)
-    every = found if told.points == 1 else found[:1] + found[1:]
-    return Linear(every[:, :-1].swapaxes(1, 2).astype(np.float32), every[:, -1].astype(np.float32))
+    every = found if sums.points == 1 else found[:1] + found[1:]
+    return LinearOutput(every[:, :-1].swapaxes(1, 2).astype(np.float32), every[:, -1].astype(np.float32))
 
 
-def _columns(x: np.ndarray, theta: np.ndarray) -> np.ndarray:
+def _build_columns(x: np.ndarray, theta: np.ndarray) -> np.ndarray:
     """Build the columns (x, 1), and with several control points also theta_k (x, 1) of each."""
     x = np.concatenate([x, np.ones((len(x), 1))], axis=1)
     if theta.shape[1] == 1:
@@ -144,19 +144,19 @@ def _columns(x: np.ndarray, theta: np.ndarray) -> np.ndarray:
     return np.concatenate([x, (theta[:, :, None] * x[:, None]).reshape(len(x), -1)], axis=1)
 
 
-def scales_of(values: np.ndarray, smallest: float = SMALLEST_SCALE) -> tuple[np.ndarray, np.ndarray]:
+def compute_scales(values: np.ndarray, smallest: float = SMALLEST_SCALE) -> tuple[np.ndarray, np.ndarray]:
     """Compute mean and standard deviation of each column, float32, the latter at least `smallest`."""
     mean, scale = values.mean(0), values.std(0)
     return mean.astype(np.float32), np.maximum(scale, smallest).astype(np.float32)
 
 
-def to_use(params: dict, scales: dict) -> PhaseNetwork:
+def to_phase_network(params: dict, scales: dict) -> PhaseNetwork:
     """Convert trained parameters to a network; scales: input_mean, input_scale, output_mean, output_scale."""
     arrays = {name: tuple(np.asarray(one) for one in params[name]) for name in ("weights", "biases")}
     return PhaseNetwork(**arrays, **{name: np.asarray(value) for name, value in scales.items()})
 
 
-class _Arrays:
+class _ArrayModule:
     """`jax.numpy` with a different `take`."""
 
     def __getattr__(self, name: str):
@@ -169,8 +169,8 @@ class _Arrays:
         indices = [int(index) for index in indices]
         starts = [i for i, index in enumerate(indices) if i == 0 or index != indices[i - 1] + 1]
         runs = [indices[first:last] for first, last in zip(starts, [*starts[1:], len(indices)])]
-        return jnp.concatenate([jax.lax.slice_in_dim(values, r[0], r[-1] + 1, axis=axis) for r in runs], axis)
+        return jnp.concatenate_motions([jax.lax.slice_in_dim(values, r[0], r[-1] + 1, axis=axis) for r in runs], axis)
 
 
-ARRAYS = _Arrays()
+ARRAYS = _ArrayModule()
 """Array module that training passes to every function with a parameter `xp`."""

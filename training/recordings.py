@@ -14,18 +14,18 @@ import numpy as np
 from beyond_mocap.base.digest import hex_digest
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.base.vectors import skew_matrix
-from beyond_mocap.throws.networks.answers import network_output
+from beyond_mocap.throws.networks.answers import build_output
 from beyond_mocap.throws.networks.chains import Chains
-from beyond_mocap.throws.networks.description import Windows, windows
-from beyond_mocap.throws.networks.example import Example, describe, poses
-from beyond_mocap.throws.networks.features import network_input, phase_of
-from beyond_mocap.throws.networks.kinematics import Pose, places_and_turns
+from beyond_mocap.throws.networks.description import Windows, build_windows
+from beyond_mocap.throws.networks.example import Example, build_description, compute_poses
+from beyond_mocap.throws.networks.features import build_input, compute_phase
+from beyond_mocap.throws.networks.kinematics import Pose, compute_world_transforms
 from beyond_mocap.throws.networks.model import ModelSettings
 from beyond_mocap.throws.networks.training_set import Steps
 
-FACING = 5.0
+HEADING_NOISE = 5.0
 """Radians by which a whole body is rotated about the vertical, for each radian of joint noise."""
-PLACE = 0.4
+POSITION_NOISE = 0.4
 """Metres of root error, for each radian of joint noise."""
 
 
@@ -42,7 +42,7 @@ class Recordings(NamedTuple):
     window: Windows
     lengths: tuple[int, ...]
 
-    def at(self, example, frame):
+    def select_frames(self, example, frame):
         """Return poses and windows (B, ...) of frames (B,) of examples (B,)."""
         return Pose(*(one[example, frame] for one in self.pose)), Windows(*(one[example, frame] for one in self.window))
 
@@ -52,7 +52,7 @@ class Recordings(NamedTuple):
         return hex_digest(repr(self.lengths), self.pose.root, self.pose.local, *self.window)
 
 
-def recordings(examples: Sequence[Example], reference: np.ndarray | None = None) -> Recordings:
+def build_recordings(examples: Sequence[Example], reference: np.ndarray | None = None) -> Recordings:
     """Build the arrays of examples.
 
     Args:
@@ -65,40 +65,40 @@ def recordings(examples: Sequence[Example], reference: np.ndarray | None = None)
         raise InputError("training", "no example", "at least one throw or kick")
     lengths = tuple(len(example.motion) for example in examples)
     longest = max(lengths)
-    pose = [poses(example) for example in examples]
-    window = [windows(describe(example), reference) for example in examples]
-    return Recordings(Pose(*_padded(pose, longest)), Windows(*_padded(window, longest)), lengths)
+    pose = [compute_poses(example) for example in examples]
+    window = [build_windows(build_description(example), reference) for example in examples]
+    return Recordings(Pose(*_pad_fields(pose, longest)), Windows(*_pad_fields(window, longest)), lengths)
 
 
-def _padded(parts: list, longest: int) -> list[np.ndarray]:
+def _pad_fields(parts: list, longest: int) -> list[np.ndarray]:
     """Pad and stack each field of tuples of arrays (T, ...) to one array (N, longest, ...), float32."""
     out = []
     for field in zip(*parts):
-        held = [np.concatenate([one, np.repeat(one[-1:], longest - len(one), axis=0)]) for one in field]
-        out.append(np.stack(held).astype(np.float32))
+        padded = [np.concatenate([one, np.repeat(one[-1:], longest - len(one), axis=0)]) for one in field]
+        out.append(np.stack(padded).astype(np.float32))
     return out
 
 
-def single_steps(recorded: Recordings) -> Steps:
+def build_single_steps(recorded: Recordings) -> Steps:
     """Build the steps (F, ...) from all frames that have a next one, example by example."""
     example = np.concatenate([np.full(length - 1, i) for i, length in enumerate(recorded.lengths)])
     frame = np.concatenate([np.arange(length - 1) for length in recorded.lengths])
-    pose, window = recorded.at(example, frame)
-    return Steps(pose, recorded.at(example, frame + 1)[0], window)
+    pose, window = recorded.select_frames(example, frame)
+    return Steps(pose, recorded.select_frames(example, frame + 1)[0], window)
 
 
-def step_arrays(name: str, chains: Chains, settings: ModelSettings, told: Steps, reach: dict):
+def build_step_arrays(name: str, chains: Chains, settings: ModelSettings, steps: Steps, reach: dict):
     """Build inputs X (F, in), outputs Y (F, out) and phases (F,) of a network over steps, float32.
 
     `reach` is the leg reach, as for `compute_phase`.
     """
-    x = network_input(name, chains, settings, *told)
-    y = network_output(name, chains, settings, told.pose, told.after)
-    phase = phase_of(name, chains, told.after, told.window, reach)
+    x = build_input(name, chains, settings, *steps)
+    y = build_output(name, chains, settings, steps.pose, steps.after)
+    phase = compute_phase(name, chains, steps.after, steps.window, reach)
     return x.astype(np.float32), y.astype(np.float32), phase.astype(np.float32)
 
 
-def drawn(chains: Chains, count: int, noise: float, seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def sample_noise(chains: Chains, count: int, noise: float, seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Sample normal noise for poses.
 
     Args:
@@ -113,10 +113,10 @@ def drawn(chains: Chains, count: int, noise: float, seed: int) -> tuple[np.ndarr
     rng = np.random.default_rng(seed)
     vectors = np.zeros((count, len(chains.skeleton), 3))
     vectors[:, list(chains.joints)] = noise * rng.normal(size=(count, len(chains.joints), 3))
-    return vectors, FACING * noise * rng.normal(size=count), PLACE * noise * rng.normal(size=(count, 3))
+    return vectors, HEADING_NOISE * noise * rng.normal(size=count), POSITION_NOISE * noise * rng.normal(size=(count, 3))
 
 
-def disturbed(chains: Chains, pose: Pose, vectors, facing, shift, xp=np) -> Pose:
+def disturb_poses(chains: Chains, pose: Pose, vectors, facing, shift, xp=np) -> Pose:
     """Disturb poses (B, ...); their displacements `moved` stay.
 
     Args:
@@ -128,15 +128,15 @@ def disturbed(chains: Chains, pose: Pose, vectors, facing, shift, xp=np) -> Pose
         xp: numpy or jax.numpy.
     """
     skeleton, hips = chains.skeleton, pose.positions[..., chains.hips, :]
-    about = small_turns(facing[..., None] * np.array([0.0, 0.0, 1.0], dtype=pose.root.dtype), xp)
-    local = xp.matmul(pose.local, small_turns(vectors, xp))
-    local = xp.concatenate([xp.matmul(about, local[..., 0, :, :])[..., None, :, :], local[..., 1:, :, :]], axis=-3)
+    about = to_rotations(facing[..., None] * np.array([0.0, 0.0, 1.0], dtype=pose.root.dtype), xp)
+    local = xp.matmul(pose.local, to_rotations(vectors, xp))
+    local = xp.concatenate_motions([xp.matmul(about, local[..., 0, :, :])[..., None, :, :], local[..., 1:, :, :]], axis=-3)
     root = hips + xp.matmul(about, (pose.root - hips)[..., None])[..., 0] + shift
-    positions, turns = places_and_turns(skeleton.offsets.astype(pose.root.dtype), skeleton.parents, root, local, xp)
+    positions, turns = compute_world_transforms(skeleton.offsets.astype(pose.root.dtype), skeleton.parents, root, local, xp)
     return Pose(root, local, positions, turns, pose.moved)
 
 
-def small_turns(vectors, xp=np):
+def to_rotations(vectors, xp=np):
     """Convert rotation vectors (..., 3) rad to rotations (..., 3, 3) (Rodrigues)."""
     angle = xp.sqrt(xp.sum(vectors**2, -1) + 1e-12)[..., None, None]
     skew = skew_matrix(vectors, xp)

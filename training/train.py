@@ -13,30 +13,30 @@ from pathlib import Path
 import jax
 import numpy as np
 
-from beyond_mocap.base.errors import Cancelled, InputError
-from beyond_mocap.cli.outputs import Told, check_outputs
+from beyond_mocap.base.errors import UserCancelledError, InputError
+from beyond_mocap.cli.outputs import ProgressReporter, check_outputs
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.motion.skeleton import Skeleton
 from beyond_mocap.throws.network_npz import write_model
-from beyond_mocap.throws.networks.chains import chains_of
-from beyond_mocap.throws.networks.example import Example, describe
-from beyond_mocap.throws.networks.generate import Options, generate
-from beyond_mocap.throws.networks.limits import JointLimits, learn
+from beyond_mocap.throws.networks.chains import find_chains
+from beyond_mocap.throws.networks.example import Example, build_description
+from beyond_mocap.throws.networks.generate import Options, generate_motion
+from beyond_mocap.throws.networks.limits import JointLimits, estimate_joint_limits
 from beyond_mocap.throws.networks.model import ThrowModel
-from beyond_mocap.throws.networks.training_set import leg_reach, reference_of, shared_chains, with_mirrors
-from beyond_mocap.throws.throw_examples import examples_in
+from beyond_mocap.throws.networks.training_set import measure_leg_reach, build_reference_curve, find_shared_chains, add_mirror_images
+from beyond_mocap.throws.throw_examples import read_examples
 
 from .config import TrainingConfig, read_config
-from .fit import Trained, check_checkpoint, checkpoint_path, fit
-from .hierarchy import Networks
-from .networks import RIDGES, to_use
-from .recordings import recordings
+from .fit import TrainingResult, check_checkpoint, build_checkpoint_path, fit
+from .hierarchy import TrainingProblem
+from .networks import RIDGES, to_phase_network
+from .recordings import build_recordings
 
 _RAW = Options(pose_iterations=0, ik=False, blend=False, limits=False)
-_FOURTH = 4  # every fourth movement of a single subject is held out
-_MOST = 8  # movements that are generated for each ridge
-_ALIKE = 1.05  # errors up to this multiple of the lowest count as equal; the largest ridge of those is the safest
-READING = 0.05
+_HOLD_OUT_STEP = 4  # every fourth movement of a single subject is held out
+_MAX_TESTED = 8  # movements that are generated for each ridge
+_TOLERANCE = 1.05  # errors up to this multiple of the lowest count as equal; the largest ridge of those is the safest
+READING_SHARE = 0.05
 """Share of the progress for reading the folder."""
 
 
@@ -59,69 +59,69 @@ def train(
         InputError: if there is no example, skeletons or rates differ, or the checkpoint is of another training.
         Cancelled: if `cancelled` returns True.
     """
-    _check(examples, config)
+    _check_rates(examples, config)
     settings = config.settings
-    chains = shared_chains(examples)
-    seen = with_mirrors(examples) if config.mirrored else list(examples)
-    reference = reference_of(seen) if settings.phase == "warped" else None
-    reach = leg_reach(seen)
-    limits = learn(np.concatenate([one.motion.rotations for one in seen]), (0, *chains.above, chains.hips))
-    held = held_out(seen)
-    problem = Networks(recordings(seen, reference), chains, config, reach, JointLimits(chains.skeleton, limits), held)
+    chains = find_shared_chains(examples)
+    training_examples = add_mirror_images(examples) if config.mirrored else list(examples)
+    reference = build_reference_curve(training_examples) if settings.phase == "warped" else None
+    reach = measure_leg_reach(training_examples)
+    limits = estimate_joint_limits(np.concatenate([one.motion.rotations for one in training_examples]), (0, *chains.above, chains.hips))
+    is_held_out = select_held_out(training_examples)
+    problem = TrainingProblem(build_recordings(training_examples, reference), chains, config, reach, JointLimits(chains.skeleton, limits), is_held_out)
 
-    def model_of(params: dict, line: str) -> ThrowModel:
+    def build_model(params: dict, line: str) -> ThrowModel:
         return ThrowModel(
             settings=settings, skeleton=chains.skeleton,
-            networks={name: to_use(params[name], problem.scales[name]) for name in settings.networks}, leg_reach=reach,
-            examples=spread_over(examples, config.examples),
+            networks={name: to_phase_network(params[name], problem.scales[name]) for name in settings.networks}, leg_reach=reach,
+            examples=select_spread(examples, config.examples),
             stature=float(np.mean([example.stature for example in examples])), joint_limits=limits, reference=reference,
             trained_on=line,
         )
 
     if config.linear_start and not config.ridge:
         progress(0.0, "choosing the start")
-        problem.ridge = least_astray(problem, [one for one, out in zip(seen, held) if out], model_of, cancelled)
+        problem.ridge = choose_ridge(problem, [one for one, out in zip(training_examples, is_held_out) if out], build_model, cancelled)
     trained = fit(
         problem, config, checkpoint=checkpoint, resume=resume, minutes=minutes, progress=progress, cancelled=cancelled,
     )
-    return model_of(trained.params, _line(examples, trained))
+    return build_model(trained.params, _describe_training(examples, trained))
 
 
-def spread_over(examples: Sequence[Example], most: int) -> list[Example]:
+def select_spread(examples: Sequence[Example], most: int) -> list[Example]:
     """Select at most `most` examples of the first one's subject with different targets.
 
     The first, then always the one whose impact is farthest from those selected. Movements of one style blend better.
     """
     examples = [example for example in examples if example.subject == examples[0].subject]
     places = np.array([(*example.impact, 10.0 * example.limb) for example in examples])
-    taken = [0]
+    selected = [0]
     nearest = np.linalg.norm(places - places[0], axis=1)
-    while len(taken) < min(most, len(examples)):
-        nearest[taken] = -1.0
-        taken.append(int(np.argmax(nearest)))
-        nearest = np.minimum(nearest, np.linalg.norm(places - places[taken[-1]], axis=1))
-    return [examples[i] for i in sorted(taken)]
+    while len(selected) < min(most, len(examples)):
+        nearest[selected] = -1.0
+        selected.append(int(np.argmax(nearest)))
+        nearest = np.minimum(nearest, np.linalg.norm(places - places[selected[-1]], axis=1))
+    return [examples[i] for i in sorted(selected)]
 
 
-def _check(examples: Sequence[Example], config: TrainingConfig) -> None:
+def _check_rates(examples: Sequence[Example], config: TrainingConfig) -> None:
     """Raise InputError if an example has another frame rate than the config."""
-    wanted = config.settings.fps
+    rate = config.settings.fps
     for example in examples:
-        if abs(example.motion.fps - wanted) > 1e-6:
+        if abs(example.motion.fps - rate) > 1e-6:
             found = f"{example.motion.fps:g} frames per second"
-            raise InputError(f"example {example.name}", found, f"{wanted:g}, the config's rate", "read it at that rate")
+            raise InputError(f"example {example.name}", found, f"{rate:g}, the config's rate", "read it at that rate")
 
 
-def _line(examples: Sequence[Example], trained: Trained) -> str:
+def _describe_training(examples: Sequence[Example], trained: TrainingResult) -> str:
     """Describe the training in one line."""
     subjects = len({example.subject for example in examples})
     frames = sum(len(example.motion) for example in examples)
-    whom = f"{len(examples)} examples of {subjects} subject{'s' if subjects > 1 else ''}, {frames} frames"
+    data_text = f"{len(examples)} examples of {subjects} subject{'s' if subjects > 1 else ''}, {frames} frames"
     loss = f", loss {trained.losses[-1]:.4f}" if trained.losses else ""
-    return f"{whom}; {trained.epochs} epochs{loss}"
+    return f"{data_text}; {trained.epochs} epochs{loss}"
 
 
-def held_out(examples: Sequence[Example]) -> np.ndarray:
+def select_held_out(examples: Sequence[Example]) -> np.ndarray:
     """Select the examples (N,) bool to hold out while the ridge is chosen.
 
     All of the last subject, or a fourth of a single subject's; none of three examples or fewer. An example's mirror
@@ -131,14 +131,14 @@ def held_out(examples: Sequence[Example]) -> np.ndarray:
     if len(subjects) > 1:
         return np.array([example.subject == subjects[-1] for example in examples])
     groups = list(dict.fromkeys((example.name, round(example.release, 6)) for example in examples))
-    if len(groups) < _FOURTH:
+    if len(groups) < _HOLD_OUT_STEP:
         return np.zeros(len(examples), bool)
-    out = set(groups[_FOURTH - 1 :: _FOURTH])
-    return np.array([(example.name, round(example.release, 6)) in out for example in examples])
+    held_out_groups = set(groups[_HOLD_OUT_STEP - 1 :: _HOLD_OUT_STEP])
+    return np.array([(example.name, round(example.release, 6)) in held_out_groups for example in examples])
 
 
-def least_astray(
-    problem: Networks, held: Sequence[Example], model_of: Callable[[dict, str], ThrowModel],
+def choose_ridge(
+    problem: TrainingProblem, held: Sequence[Example], build_model: Callable[[dict, str], ThrowModel],
     cancelled: Callable[[], bool] = lambda: False,
 ) -> float:
     """Choose the ridge whose networks keep hands and feet nearest to their targets on held out movements.
@@ -153,79 +153,79 @@ def least_astray(
     """
     if not held:
         return RIDGES[-1]
-    asked = [held[i] for i in np.unique(np.linspace(0, len(held) - 1, _MOST).round().astype(int))]
-    off = []
+    tested = [held[i] for i in np.unique(np.linspace(0, len(held) - 1, _MAX_TESTED).round().astype(int))]
+    errors = []
     for ridge in RIDGES:
         if cancelled():
-            raise Cancelled("cancelled while choosing the start")
-        model = model_of(problem.started(jax.random.key(0), problem.linear(ridge, whole=False)), "")
-        off.append(np.mean([_off(model, example) for example in asked]))
-    good = [ridge for ridge, one in zip(RIDGES, off) if one <= _ALIKE * min(off)]
+            raise UserCancelledError("cancelled while choosing the start")
+        model = build_model(problem.build_weights(jax.random.key(0), problem.fit_linear(ridge, use_held_out=False)), "")
+        errors.append(np.mean([_measure_error(model, example) for example in tested]))
+    good = [ridge for ridge, one in zip(RIDGES, errors) if one <= _TOLERANCE * min(errors)]
     return good[-1] if good else RIDGES[-1]
 
 
-def _off(model: ThrowModel, example: Example) -> float:
+def _measure_error(model: ThrowModel, example: Example) -> float:
     """Measure the mean error (m) of the networks over frames, hands and feet; infinite if the body is invalid."""
     try:
         with np.errstate(all="ignore"):
-            made = generate(model, describe(example), options=_RAW)
+            generated = generate_motion(model, build_description(example), options=_RAW)
     except InputError:
         return np.inf
-    return float(np.mean(made.raw))
+    return float(np.mean(generated.network_deviation))
 
 
-def train_folder(options, told: Told) -> None:
+def train_folder(options, report: ProgressReporter) -> None:
     """Read the folder, train, and write the model and its checkpoint; options: of `throw train`."""
-    begun = time.perf_counter()
+    start_time = time.perf_counter()
     config = read_config(options.config, seed=options.seed, epochs=options.epochs, action=options.action)
-    kept = checkpoint_path(options.out)
-    check_outputs(options.out, kept, never=(options.config, options.skeleton))
+    checkpoint = build_checkpoint_path(options.out)
+    check_outputs(options.out, checkpoint, reserved=(options.config, options.skeleton))
     if options.resume:
-        check_checkpoint(kept)
-    examples = _examples(options, config, told)
+        check_checkpoint(checkpoint)
+    examples = _read_examples(options, config, report)
 
     def progress(share: float, text: str) -> None:
-        told.progress(READING + (1.0 - READING) * share, text)
+        report.show_progress(READING_SHARE + (1.0 - READING_SHARE) * share, text)
 
     model = train(
-        examples, config, checkpoint=kept, resume=options.resume, minutes=options.minutes,
-        progress=progress, cancelled=told.cancelled,
+        examples, config, checkpoint=checkpoint, resume=options.resume, minutes=options.minutes,
+        progress=progress, cancelled=report.is_cancelled,
     )
     write_model(model, options.out, half=options.half)
-    told.end()
+    report.finish()
     weights = sum(network.parameters for network in model.networks.values())
-    seconds = time.perf_counter() - begun
+    seconds = time.perf_counter() - start_time
     print(f"{options.out}: {model.trained_on}; {len(model.networks)} networks, {weights} weights, {seconds:.0f} s")
 
 
-def _examples(options, config: TrainingConfig, told: Told) -> list[Example]:
+def _read_examples(options, config: TrainingConfig, report: ProgressReporter) -> list[Example]:
     """Read the folder's examples of the requested subjects, on the given skeleton or the first one's."""
-    skeleton = _skeleton(options.skeleton) if options.skeleton else None
-    found = _read(options, config, told, skeleton)
+    skeleton = _read_skeleton(options.skeleton) if options.skeleton else None
+    found = _read_selected(options, config, report, skeleton)
     first = found[0].motion.skeleton
-    if skeleton is None and not all(example.motion.skeleton.same_bones(first) for example in found):
-        found = _read(options, config, told, first)
+    if skeleton is None and not all(example.motion.skeleton.has_same_bones(first) for example in found):
+        found = _read_selected(options, config, report, first)
     return found
 
 
-def _skeleton(path: Path) -> Skeleton:
+def _read_skeleton(path: Path) -> Skeleton:
     """Read the skeleton of the model; InputError with the file's name if it lacks hands or feet."""
-    skeleton = bvh.read(path).motion.skeleton
+    skeleton = bvh.read_bvh(path).motion.skeleton
     try:
-        chains_of(skeleton)
+        find_chains(skeleton)
     except InputError as error:
         raise InputError(path, str(error)) from None
     return skeleton
 
 
-def _read(options, config: TrainingConfig, told: Told, skeleton) -> list[Example]:
+def _read_selected(options, config: TrainingConfig, report: ProgressReporter, skeleton) -> list[Example]:
     """Read the examples and select the requested subjects."""
     def progress(share: float, text: str) -> None:
-        told.progress(READING * share, text)
+        report.show_progress(READING_SHARE * share, text)
 
     settings = config.settings
-    found = examples_in(
-        options.folder, settings.action, settings.fps, skeleton, told.note, progress=progress, cancelled=told.cancelled,
+    found = read_examples(
+        options.folder, settings.action, settings.fps, skeleton, report.show_note, progress=progress, cancelled=report.is_cancelled,
     )
     chosen = [example for example in found if not options.subject or example.subject in options.subject]
     there = sorted({example.subject for example in found})

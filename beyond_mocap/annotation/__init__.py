@@ -17,41 +17,41 @@
     filled = fill_timeline(timeline, sampled.times, [(LOCOMOTION[g],) for g in gaits])
 """
 
-from .clips import ClipAnnotation, clip_annotations, read_annotation_csv, read_clip_annotations
-from .gaits import LOCOMOTION, LOCOMOTION_WORDS, STANDING_SPEED, automatic_gaits, gait_thresholds, recorded_thresholds
+from .clips import ClipAnnotation, build_clip_annotations, read_annotation_csv, read_clip_annotations
+from .gaits import LOCOMOTION, LOCOMOTION_LABELS, STANDING_SPEED, choose_gaits, compute_gait_thresholds, estimate_gait_thresholds
 from .text import format_timeline, parse_timeline, read_text, read_timeline
 from .timeline import (
-    MUST_NOT,
+    AVOID_PREFIX,
     KeyMoment,
     Span,
     Timeline,
-    avoided_per_frame,
-    fill,
-    missing_keys,
-    problems,
-    spelled,
-    validate,
-    words_per_frame,
+    avoided_labels_per_frame,
+    fill_timeline,
+    find_missing_keys,
+    find_problems,
+    format_labels,
+    check_timeline,
+    labels_per_frame,
 )
 from .vocabulary import (
     CONTINUOUS,
     DISCRETE,
     TRANSITION,
     VOCABULARY,
-    nearest,
-    relatives,
-    similar_words,
-    spoken,
+    find_nearest_labels,
+    find_relatives,
+    find_similar_labels,
+    sort_labels,
     swap_sides,
-    vocabulary_words,
-    words_below,
+    list_vocabulary,
+    list_labels_below,
 )
 
 __all__ = [
-    "CONTINUOUS", "DISCRETE", "LOCOMOTION", "LOCOMOTION_WORDS", "MUST_NOT", "STANDING_SPEED", "TRANSITION",
-    "VOCABULARY", "ClipAnnotation", "KeyMoment", "Span", "Timeline", "automatic_gaits", "avoided_per_frame",
-    "clip_annotations", "fill", "format_timeline", "gait_thresholds", "missing_keys", "nearest", "parse_timeline",
-    "problems", "recorded_thresholds", "read_annotation_csv", "read_clip_annotations", "read_text", "read_timeline",
-    "relatives", "similar_words", "spelled", "spoken", "swap_sides", "validate", "vocabulary_words", "words_below",
-    "words_per_frame",
+    "CONTINUOUS", "DISCRETE", "LOCOMOTION", "LOCOMOTION_LABELS", "AVOID_PREFIX", "STANDING_SPEED", "TRANSITION",
+    "VOCABULARY", "ClipAnnotation", "KeyMoment", "Span", "Timeline", "choose_gaits", "avoided_labels_per_frame",
+    "build_clip_annotations", "fill_timeline", "format_timeline", "compute_gait_thresholds", "find_missing_keys", "find_nearest_labels", "parse_timeline",
+    "find_problems", "estimate_gait_thresholds", "read_annotation_csv", "read_clip_annotations", "read_text", "read_timeline",
+    "find_relatives", "find_similar_labels", "format_labels", "sort_labels", "swap_sides", "check_timeline", "list_vocabulary", "list_labels_below",
+    "labels_per_frame",
 ]

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from .decision import Held, Option, Walk, can_skip, choose, options, pages, skip
+from .decision import LibraryCombinations, Option, TreeChoices, can_skip, choose_label, list_options, count_pages, skip_level
 from .vocabulary import swap_sides
 
 DIGITS = tuple("123456789")
@@ -68,7 +68,7 @@ class AddSpan:
 
 
 @dataclass(frozen=True)
-class AtPlayhead:
+class ChangeAtPlayhead:
     """Change the moment or span at the playhead.
 
     Attributes:
@@ -79,7 +79,7 @@ class AtPlayhead:
 
 
 @dataclass(frozen=True)
-class Go:
+class GoToNeighbour:
     """Go to a neighbour.
 
     Attributes:
@@ -92,12 +92,12 @@ class Go:
 
 
 @dataclass(frozen=True)
-class Leave:
+class StopAnnotating:
     """Stop annotating."""
 
 
 @dataclass(frozen=True)
-class Tell:
+class ShowMessage:
     """Show a message to the user.
 
     Attributes:
@@ -107,11 +107,11 @@ class Tell:
     line: str
 
 
-Command = AddMoment | AddSpan | AtPlayhead | Go | Leave | Tell
+Command = AddMoment | AddSpan | ChangeAtPlayhead | GoToNeighbour | StopAnnotating | ShowMessage
 
 
 @dataclass(frozen=True)
-class Now:
+class Playhead:
     """The playhead.
 
     Attributes:
@@ -121,12 +121,12 @@ class Now:
     """
 
     time: float
-    frame: float = 1.0 / 30.0
-    before: float | None = None
+    frame_duration: float = 1.0 / 30.0
+    previous_end: float | None = None
 
 
 @dataclass(frozen=True)
-class State:
+class AnnotationState:
     """The state of annotating.
 
     Attributes:
@@ -138,30 +138,30 @@ class State:
         page: page of the menu, from 0.
     """
 
-    held: Held | None = None
-    trail: tuple[Walk, ...] = ()
+    available: LibraryCombinations | None = None
+    trail: tuple[TreeChoices, ...] = ()
     time: float = 0.0
     start: float | None = None
     end: float | None = None
     page: int = 0
 
     @property
-    def walk(self) -> Walk:
+    def walk(self) -> TreeChoices:
         """The choices whose options are on the keys; without an open menu, the start of a key moment."""
-        return self.trail[-1] if self.trail else Walk("moment")
+        return self.trail[-1] if self.trail else TreeChoices("moment")
 
     @property
-    def shown(self) -> tuple[Option, ...]:
+    def page_options(self) -> tuple[Option, ...]:
         """The options of the displayed page."""
-        return tuple(option for option in options(self.walk, self.held) if option.page == self.page)
+        return tuple(option for option in list_options(self.walk, self.available) if option.page == self.page)
 
     @property
-    def pages(self) -> int:
+    def page_count(self) -> int:
         """The number of pages of options."""
-        return pages(self.walk, self.held)
+        return count_pages(self.walk, self.available)
 
 
-def press(state: State, key: str, now: Now) -> tuple[State, tuple[Command, ...]]:
+def handle_key(state: AnnotationState, key: str, now: Playhead) -> tuple[AnnotationState, tuple[Command, ...]]:
     """Handle one key.
 
     Args:
@@ -172,18 +172,18 @@ def press(state: State, key: str, now: Now) -> tuple[State, tuple[Command, ...]]
         The state after the key, and the commands to run.
     """
     if key in DIGITS:
-        found = next((option for option in state.shown if option.digit == int(key)), None)
-        return (state, ()) if found is None else pick(state, found.word, now)
+        chosen = next((option for option in state.page_options if option.digit == int(key)), None)
+        return (state, ()) if chosen is None else select_label(state, chosen.word, now)
     if key == "0":
-        return (_walked(state, skip(state.walk), now), ()) if can_skip(state.walk) else (state, ())
+        return (_push_choices(state, skip_level(state.walk), now), ()) if can_skip(state.walk) else (state, ())
     if key in ("NEXT_PAGE", "PREVIOUS_PAGE"):
-        return _turned(state, 1 if key == "NEXT_PAGE" else -1, now), ()
+        return _turn_page(state, 1 if key == "NEXT_PAGE" else -1, now), ()
     if state.trail:
-        return _in_the_menu(state, key, now)
-    return _outside(state, key, now)
+        return _handle_menu_key(state, key, now)
+    return _handle_timeline_key(state, key, now)
 
 
-def pick(state: State, word: str, now: Now) -> tuple[State, tuple[Command, ...]]:
+def select_label(state: AnnotationState, label: str, now: Playhead) -> tuple[AnnotationState, tuple[Command, ...]]:
     """Choose a label, by its digit or by the mouse.
 
     Args:
@@ -193,84 +193,84 @@ def pick(state: State, word: str, now: Now) -> tuple[State, tuple[Command, ...]]
     Returns:
         The state after the choice, and no commands.
     """
-    return _walked(state, choose(state.walk, word), now), ()
+    return _push_choices(state, choose_label(state.walk, label), now), ()
 
 
-def _in_the_menu(state: State, key: str, now: Now) -> tuple[State, tuple[Command, ...]]:
+def _handle_menu_key(state: AnnotationState, key: str, now: Playhead) -> tuple[AnnotationState, tuple[Command, ...]]:
     """Handle a key while the menu is open; other keys add the chosen labels first."""
     if key == "ENTER":
-        return _accepted(state)
+        return _accept_labels(state)
     if key == "BACK":
-        return (replace(state, trail=state.trail[:-1], page=0) if len(state.trail) > 1 else _closed(state)), ()
+        return (replace(state, trail=state.trail[:-1], page=0) if len(state.trail) > 1 else _close_menu(state)), ()
     if key in ("ESC", "REMOVE"):
-        return _closed(state), ()
+        return _close_menu(state), ()
     if key == "MIRROR":
-        return replace(state, trail=(*state.trail, _mirrored(state.walk))), ()
+        return replace(state, trail=(*state.trail, _mirror_choices(state.walk))), ()
     if key in ("EARLIER", "LATER"):
-        return replace(state, time=state.time + (now.frame if key == "LATER" else -now.frame)), ()
-    state, done = _accepted(state)
-    state, more = _outside(state, key, now)
-    return state, (*done, *more)
+        return replace(state, time=state.time + (now.frame_duration if key == "LATER" else -now.frame_duration)), ()
+    state, commands = _accept_labels(state)
+    state, more_commands = _handle_timeline_key(state, key, now)
+    return state, (*commands, *more_commands)
 
 
-def _outside(state: State, key: str, now: Now) -> tuple[State, tuple[Command, ...]]:
+def _handle_timeline_key(state: AnnotationState, key: str, now: Playhead) -> tuple[AnnotationState, tuple[Command, ...]]:
     """Handle a key while no menu is open."""
     if key == "ESC":
-        return (state, (Leave(),)) if state.start is None else (replace(state, start=None), ())
+        return (state, (StopAnnotating(),)) if state.start is None else (replace(state, start=None), ())
     if key == "IN":
         return replace(state, start=now.time), ()
     if key == "OUT":
-        return _out(state, now)
+        return _end_span(state, now)
     if key in ("PREVIOUS", "NEXT"):
-        return state, (Go("moment", 1 if key == "NEXT" else -1),)
+        return state, (GoToNeighbour("moment", 1 if key == "NEXT" else -1),)
     if key in ("PREVIOUS_PLAYER", "NEXT_PLAYER"):
-        return replace(state, start=None), (Go("player", 1 if key == "NEXT_PLAYER" else -1),)
+        return replace(state, start=None), (GoToNeighbour("player", 1 if key == "NEXT_PLAYER" else -1),)
     if key in ("MIRROR", "REMOVE", "EARLIER", "LATER"):
-        return state, (AtPlayhead(key.lower()),)
+        return state, (ChangeAtPlayhead(key.lower()),)
     return state, ()
 
 
-def _out(state: State, now: Now) -> tuple[State, tuple[Command, ...]]:
+def _end_span(state: AnnotationState, now: Playhead) -> tuple[AnnotationState, tuple[Command, ...]]:
     """End a span and open the menu for its labels.
 
     Without an in point the span starts where the last annotation before it ends.
     """
-    start = now.before if state.start is None else state.start
-    if start is None or abs(start - now.time) < 0.5 * now.frame:
-        return state, (Tell("Set an in point (I) before the out point (O)"),)
+    start = now.previous_end if state.start is None else state.start
+    if start is None or abs(start - now.time) < 0.5 * now.frame_duration:
+        return state, (ShowMessage("Set an in point (I) before the out point (O)"),)
     start, end = sorted((start, now.time))
-    return replace(state, trail=(Walk("span"),), time=start, start=start, end=end, page=0), ()
+    return replace(state, trail=(TreeChoices("span"),), time=start, start=start, end=end, page=0), ()
 
 
-def _accepted(state: State) -> tuple[State, tuple[Command, ...]]:
+def _accept_labels(state: AnnotationState) -> tuple[AnnotationState, tuple[Command, ...]]:
     """Add the moment or span with the chosen labels; without labels only close the menu."""
     walk = state.walk
     if not walk.words:
-        return _closed(state), ()
-    done = AddMoment(state.time, walk.words) if walk.kind == "moment" else AddSpan(state.time, state.end, walk.words)
+        return _close_menu(state), ()
+    command = AddMoment(state.time, walk.words) if walk.kind == "moment" else AddSpan(state.time, state.end, walk.words)
     start = state.start if walk.kind == "moment" else None
-    return replace(_closed(state), start=start), (done,)
+    return replace(_close_menu(state), start=start), (command,)
 
 
-def _closed(state: State) -> State:
+def _close_menu(state: AnnotationState) -> AnnotationState:
     return replace(state, trail=(), end=None, page=0)
 
 
-def _walked(state: State, walk: Walk, now: Now) -> State:
-    opened = _opened(state, now)
+def _push_choices(state: AnnotationState, walk: TreeChoices, now: Playhead) -> AnnotationState:
+    opened = _open_menu(state, now)
     return replace(opened, trail=(*opened.trail, walk), page=0)
 
 
-def _turned(state: State, step: int, now: Now) -> State:
-    page = (state.page + step) % state.pages
-    return state if page == state.page else replace(_opened(state, now), page=page)
+def _turn_page(state: AnnotationState, step: int, now: Playhead) -> AnnotationState:
+    page = (state.page + step) % state.page_count
+    return state if page == state.page else replace(_open_menu(state, now), page=page)
 
 
-def _opened(state: State, now: Now) -> State:
+def _open_menu(state: AnnotationState, now: Playhead) -> AnnotationState:
     """Open the menu at the playhead unless it is open."""
     return state if state.trail else replace(state, trail=(state.walk,), time=now.time)
 
 
-def _mirrored(walk: Walk) -> Walk:
+def _mirror_choices(walk: TreeChoices) -> TreeChoices:
     steps = tuple(step and swap_sides((step,))[0] for step in walk.steps)
-    return replace(walk, steps=steps, beside=swap_sides(walk.beside))
+    return replace(walk, steps=steps, modifiers=swap_sides(walk.modifiers))

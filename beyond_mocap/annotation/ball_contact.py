@@ -8,7 +8,7 @@ import numpy as np
 
 from ..motion.skeleton import Skeleton
 from .labels import find_label, list_labels, read_labels
-from .striking import Surface, part_surfaces, smallest_gap
+from .striking import Surface, build_part_surfaces, measure_smallest_gap
 from .vocabulary import SIDES
 
 _BY_PART = {part: frozenset(list_labels(part=part)) for part in ("head", "chest", "hand", "foot")}
@@ -26,7 +26,7 @@ _FOOT_TAKES = frozenset(list_labels(ball="takes", part="foot", is_root=True))
 _FLIGHT_SECONDS = 0.6  # from take-off to ball contact at most, in dives by hand
 
 
-def striking_part(words: Iterable[str]) -> str | None:
+def find_striking_part(labels: Iterable[str]) -> str | None:
     """Find the body part that meets the ball.
 
     A receive is taken with the foot unless a label says body or chest (Faustino, Appendix A: receive foot | body).
@@ -36,11 +36,11 @@ def striking_part(words: Iterable[str]) -> str | None:
     Returns:
         "foot", "head", "chest" or "hand"; None for labels without ball contact.
     """
-    words = set(words)
-    return next((part for part, named in _BY_PART.items() if named & words), None)
+    labels = set(labels)
+    return next((part for part, part_labels in _BY_PART.items() if part_labels & labels), None)
 
 
-def meeting_words(played: Iterable[str], asked: Iterable[str]) -> tuple[str, ...]:
+def choose_contact_labels(played: Iterable[str], requested: Iterable[str]) -> tuple[str, ...]:
     """Choose the labels that define the body part at a key moment.
 
     Args:
@@ -50,10 +50,10 @@ def meeting_words(played: Iterable[str], asked: Iterable[str]) -> tuple[str, ...
         The clip's labels if they name a part, otherwise the requested ones.
     """
     played = tuple(played)
-    return played if striking_part(played) else tuple(asked)
+    return played if find_striking_part(played) else tuple(requested)
 
 
-def met_within(words: Iterable[str]) -> float:
+def find_contact_window(labels: Iterable[str]) -> float:
     """Find how long after a key moment the ball may be met.
 
     Only dives by hand have such a window: their key moment is the ball contact or, in recordings without a ball, the
@@ -64,58 +64,58 @@ def met_within(words: Iterable[str]) -> float:
     Returns:
         Seconds, 0 for all other labels.
     """
-    words = set(words)
-    return _FLIGHT_SECONDS if _IN_FLIGHT & words and striking_part(words) == "hand" else 0.0
+    labels = set(labels)
+    return _FLIGHT_SECONDS if _IN_FLIGHT & labels and find_striking_part(labels) == "hand" else 0.0
 
 
-def by_both_hands(words: Iterable[str]) -> bool:
+def uses_both_hands(labels: Iterable[str]) -> bool:
     """Return whether the labels mean a ball between both hands, where both come near enough.
 
     Args:
         labels: the labels of a motion.
     """
-    return bool(_BOTH_HANDS & set(words))
+    return bool(_BOTH_HANDS & set(labels))
 
 
-def shows_foot_on_ball(words: frozenset[str]) -> bool:
+def shows_foot_on_ball(labels: frozenset[str]) -> bool:
     """Return whether a foot certainly meets the ball in a motion with these labels.
 
     Args:
         labels: the labels of a motion.
     """
-    return any(part <= words for part in _FOOT_ON_BALL)
+    return any(part <= labels for part in _FOOT_ON_BALL)
 
 
-def may_use_foot(words: frozenset[str]) -> bool:
+def may_use_foot(labels: frozenset[str]) -> bool:
     """Return whether a foot may meet the ball, possibly besides other parts, in a motion with these labels.
 
     Args:
         labels: the labels of a motion.
     """
-    return shows_foot_on_ball(words) or bool(_FOOT_OR_OTHER & words)
+    return shows_foot_on_ball(labels) or bool(_FOOT_OR_OTHER & labels)
 
 
-def may_use_several(words: Iterable[str], part: str) -> bool:
+def may_use_several_parts(labels: Iterable[str], part: str) -> bool:
     """Return whether a label names an action that meets the ball with several parts, including `part`.
 
     Args:
         labels: the labels of a motion.
         part: a part of `BODY_PARTS` or "tool".
     """
-    labels = (find_label(word) for word in words)
-    return any(part in label.parts and not label.part for label in labels)
+    known = (find_label(word) for word in labels)
+    return any(part in label.parts and not label.part for label in known)
 
 
-def takes_with_foot(words: Iterable[str]) -> bool:
+def takes_with_foot(labels: Iterable[str]) -> bool:
     """Return whether a label names an action in which a foot takes the ball, unless another label names another part.
 
     Args:
         labels: the labels of a motion.
     """
-    return bool(_FOOT_TAKES.intersection(words))
+    return bool(_FOOT_TAKES.intersection(labels))
 
 
-def surfaces(skeleton: Skeleton, words: Iterable[str]) -> tuple[Surface, ...]:
+def build_surfaces(skeleton: Skeleton, labels: Iterable[str]) -> tuple[Surface, ...]:
     """Build the surfaces that may meet the ball in a motion with these labels.
 
     There is one surface per limb, on the side that a label names or on both. The side of a dive is its direction, so
@@ -127,14 +127,14 @@ def surfaces(skeleton: Skeleton, words: Iterable[str]) -> tuple[Surface, ...]:
     Returns:
         The surfaces; none for labels without ball contact, or for a part that the skeleton lacks.
     """
-    words = set(words)
-    part = striking_part(words)
-    named = set() if part == "hand" and _IN_FLIGHT & words else words
-    return part_surfaces(skeleton, part, [side for side in SIDES if side in named] or SIDES) if part else ()
+    labels = set(labels)
+    part = find_striking_part(labels)
+    side_labels = set() if part == "hand" and _IN_FLIGHT & labels else labels
+    return build_part_surfaces(skeleton, part, [side for side in SIDES if side in side_labels] or SIDES) if part else ()
 
 
-def contact_gap(
-    skeleton: Skeleton, positions: np.ndarray, rotations: np.ndarray, words: Iterable[str], ball: np.ndarray
+def measure_contact_gap(
+    skeleton: Skeleton, positions: np.ndarray, rotations: np.ndarray, labels: Iterable[str], ball: np.ndarray
 ) -> np.ndarray:
     """Measure the smallest gap between the ball and the surfaces that may meet it.
 
@@ -147,4 +147,4 @@ def contact_gap(
     Returns:
         (...,) m, negative where surfaces overlap, NaN without a surface.
     """
-    return smallest_gap(surfaces(skeleton, words), positions, rotations, ball)
+    return measure_smallest_gap(build_surfaces(skeleton, labels), positions, rotations, ball)

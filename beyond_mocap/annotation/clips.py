@@ -47,10 +47,10 @@ def read_clip_annotations(path: str | os.PathLike, fps: float) -> tuple[ClipAnno
     Raises:
         InputError: if the file cannot be read or a line is invalid.
     """
-    return clip_annotations(parse_timeline(read_text(path), str(path), fps), fps)
+    return build_clip_annotations(parse_timeline(read_text(path), str(path), fps), fps)
 
 
-def clip_annotations(timeline: Timeline, fps: float) -> tuple[ClipAnnotation, ...]:
+def build_clip_annotations(timeline: Timeline, fps: float) -> tuple[ClipAnnotation, ...]:
     """Convert a clip's timeline to annotations in frames.
 
     Args:
@@ -60,14 +60,14 @@ def clip_annotations(timeline: Timeline, fps: float) -> tuple[ClipAnnotation, ..
         The annotations, ordered by start; see `read_clip_annotations`.
     """
     spans = [span for span in timeline.spans if span.words and span.words != (TRANSITION,)]
-    owners = [_owner(key, spans) for key in timeline.keys]
-    out = [_annotation(span, None, fps) for span in spans if span not in owners]
-    out += [_annotation(owner, key, fps) for key, owner in zip(timeline.keys, owners)]
+    owners = [_find_owner(key, spans) for key in timeline.keys]
+    out = [_build_annotation(span, None, fps) for span in spans if span not in owners]
+    out += [_build_annotation(owner, key, fps) for key, owner in zip(timeline.keys, owners)]
     return tuple(sorted(out, key=lambda a: (a.start, a.end, -1 if a.key is None else a.key)))
 
 
 def read_annotation_csv(
-    path: str | os.PathLike, but: Callable[[Mapping], bool] | None = None
+    path: str | os.PathLike, skip_row: Callable[[Mapping], bool] | None = None
 ) -> dict[str, tuple[ClipAnnotation, ...]]:
     """Read a table of annotations.
 
@@ -84,38 +84,38 @@ def read_annotation_csv(
         InputError: with the line, if a row is invalid.
     """
     reader = csv.DictReader(io.StringIO(read_text(path), newline=""))
-    found: dict[str, list[ClipAnnotation]] = {}
+    by_file: dict[str, list[ClipAnnotation]] = {}
     try:
         _check_columns(reader.fieldnames, path)
         for row in reader:
             place = f"{path}:{reader.line_num}"
-            words = tuple(dict.fromkeys((row["labels"] or "").lower().split()))
-            if words and not (but and but(row)):
-                found.setdefault(_file(row, place), []).append(_from_row(row, words, place))
+            labels = tuple(dict.fromkeys((row["labels"] or "").lower().split()))
+            if labels and not (skip_row and skip_row(row)):
+                by_file.setdefault(_parse_file(row, place), []).append(_parse_row(row, labels, place))
     except csv.Error as error:
         raise InputError(f"{path}:{reader.line_num}", str(error), "comma-separated values") from None
-    return {file: tuple(annotations) for file, annotations in found.items()}
+    return {file: tuple(annotations) for file, annotations in by_file.items()}
 
 
-def _owner(key: KeyMoment, spans: list[Span]) -> Span | None:
+def _find_owner(key: KeyMoment, spans: list[Span]) -> Span | None:
     """Find the shortest span around a key moment that names the same action."""
-    around = [s for s in spans if s.start <= key.time <= s.end and _actions(key) & _actions(s)]
+    around = [s for s in spans if s.start <= key.time <= s.end and _list_actions(key) & _list_actions(s)]
     return min(around, key=lambda span: span.end - span.start, default=None)
 
 
-def _actions(item: Span | KeyMoment) -> set[str]:
+def _list_actions(item: Span | KeyMoment) -> set[str]:
     """List the labels that name the action: Appendix A's discrete roots, or without any all labels ("slide", user
     labels)."""
-    words = set(item.words)
-    return words & DISCRETE or words
+    labels = set(item.words)
+    return labels & DISCRETE or labels
 
 
-def _annotation(span: Span | None, key: KeyMoment | None, fps: float) -> ClipAnnotation:
+def _build_annotation(span: Span | None, key: KeyMoment | None, fps: float) -> ClipAnnotation:
     """Build the annotation of a span, of a key moment, or of both."""
     moment = None if key is None else round(key.time * fps)
-    words = dict.fromkeys((*(span.words if span else ()), *(key.words if key else ())))
+    labels = dict.fromkeys((*(span.words if span else ()), *(key.words if key else ())))
     start, end = (span.start, span.end) if span else (key.time, key.time)
-    return ClipAnnotation(round(start * fps), round(end * fps), moment, tuple(words))
+    return ClipAnnotation(round(start * fps), round(end * fps), moment, tuple(labels))
 
 
 def _check_columns(names, path) -> None:
@@ -125,24 +125,24 @@ def _check_columns(names, path) -> None:
         raise InputError(f"{path}:1", found, f"a header with {', '.join(_COLUMNS)}")
 
 
-def _file(row: dict, place: str) -> str:
+def _parse_file(row: dict, place: str) -> str:
     name = (row["file"] or "").strip()
     if not name:
         raise InputError(place, "the file is blank", "the clip's path, relative to this table")
     return name
 
 
-def _from_row(row: dict, words: tuple[str, ...], place: str) -> ClipAnnotation:
-    start, end = (_frame(row[name], name, place) for name in ("start_frame", "end_frame"))
-    key = _frame(row["key_frame"], "key_frame", place) if (row["key_frame"] or "").strip() else None
+def _parse_row(row: dict, labels: tuple[str, ...], place: str) -> ClipAnnotation:
+    start, end = (_parse_frame(row[name], name, place) for name in ("start_frame", "end_frame"))
+    key = _parse_frame(row["key_frame"], "key_frame", place) if (row["key_frame"] or "").strip() else None
     if end < start:
         raise InputError(place, f"end_frame {end} before start_frame {start}", "start_frame <= end_frame")
     if key is not None and not start <= key <= end:
         raise InputError(place, f"key_frame {key} outside {start} .. {end}", "a key frame within its row")
-    return ClipAnnotation(start, end, key, words)
+    return ClipAnnotation(start, end, key, labels)
 
 
-def _frame(text: str | None, name: str, place: str) -> int:
+def _parse_frame(text: str | None, name: str, place: str) -> int:
     try:
         value = float(text or "")
         if not (value >= 0 and value == int(value)):

@@ -18,21 +18,21 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 from .labels import list_labels
-from .vocabulary import SIDES, TRANSITION, VOCABULARY, nearest, relatives, spoken, vocabulary_words
+from .vocabulary import SIDES, TRANSITION, VOCABULARY, find_nearest_labels, find_relatives, sort_labels, list_vocabulary
 
-PAGE = 9
+PAGE_SIZE = 9
 """Number keys on one page."""
 
 _TREES = {"moment": VOCABULARY["discrete"], "span": VOCABULARY["continuous"]}
 _LAST_TWO = {"moment": list_labels(group="pace"), "span": list_labels(group="way")}
 _MODIFIERS = tuple(word for word in VOCABULARY["modifier"] if word not in SIDES)
-_BEHIND = {kind: tuple(word for word in _MODIFIERS if word not in last) for kind, last in _LAST_TWO.items()}
-_IN_BOTH = tuple(word for word in VOCABULARY["discrete"] if word in VOCABULARY["continuous"])
+_MORE_MODIFIERS = {kind: tuple(word for word in _MODIFIERS if word not in last) for kind, last in _LAST_TWO.items()}
+_SHARED_ROOTS = tuple(word for word in VOCABULARY["discrete"] if word in VOCABULARY["continuous"])
 _EXCLUSIVE = (frozenset(SIDES), frozenset(_LAST_TWO["moment"]), frozenset(_LAST_TWO["span"]))
 
 
 @dataclass(frozen=True)
-class Walk:
+class TreeChoices:
     """The labels chosen so far, as a path down the tree.
 
     Attributes:
@@ -43,16 +43,16 @@ class Walk:
 
     kind: str
     steps: tuple[str | None, ...] = ()
-    beside: tuple[str, ...] = ()
+    modifiers: tuple[str, ...] = ()
 
     @property
     def words(self) -> tuple[str, ...]:
         """All chosen labels, in their usual order."""
-        return spoken(word for word in (*self.steps, *self.beside) if word)
+        return sort_labels(word for word in (*self.steps, *self.modifiers) if word)
 
 
 @dataclass(frozen=True)
-class Held:
+class LibraryCombinations:
     """The label combinations of a library, mirrored ones included.
 
     Attributes:
@@ -63,7 +63,7 @@ class Held:
     moments: tuple[frozenset[str], ...]
     spans: tuple[frozenset[str], ...]
 
-    def of(self, kind: str) -> tuple[frozenset[str], ...]:
+    def list_combinations(self, kind: str) -> tuple[frozenset[str], ...]:
         """Return the combinations for key moments or spans.
 
         Args:
@@ -88,12 +88,12 @@ class Option:
     word: str
     page: int
     digit: int
-    served: bool
-    instead: tuple[str, ...] = ()
-    chosen: bool = False
+    is_available: bool
+    alternative: tuple[str, ...] = ()
+    is_chosen: bool = False
 
 
-def options(walk: Walk, held: Held | None = None) -> tuple[Option, ...]:
+def list_options(walk: TreeChoices, available: LibraryCombinations | None = None) -> tuple[Option, ...]:
     """List the options that can be chosen next.
 
     Args:
@@ -102,20 +102,20 @@ def options(walk: Walk, held: Held | None = None) -> tuple[Option, ...]:
     Returns:
         The options by page and digit.
     """
-    return tuple(_option(word, place, walk, held) for place, word in enumerate(_layout(walk, held)) if word)
+    return tuple(_build_option(label, place, walk, available) for place, label in enumerate(_place_labels(walk, available)) if label)
 
 
-def pages(walk: Walk, held: Held | None = None) -> int:
+def count_pages(walk: TreeChoices, available: LibraryCombinations | None = None) -> int:
     """Count the pages of options, at least 1.
 
     Args:
         walk: the labels chosen so far.
         available: the library's combinations, or None.
     """
-    return max(1, -(-len(_layout(walk, held)) // PAGE))
+    return max(1, -(-len(_place_labels(walk, available)) // PAGE_SIZE))
 
 
-def choose(walk: Walk, word: str) -> Walk:
+def choose_label(walk: TreeChoices, label: str) -> TreeChoices:
     """Choose one more label.
 
     A label of the tree's next level leads down. Another label becomes a modifier and replaces its opposite (left
@@ -128,24 +128,24 @@ def choose(walk: Walk, word: str) -> Walk:
     Returns:
         The new choices.
     """
-    if word in walk.beside:
-        return replace(walk, beside=tuple(other for other in walk.beside if other != word))
-    if word in _next_words(walk) or not walk.steps:
-        return replace(walk, steps=(*walk.steps, word))
-    opposites = frozenset().union(*(group for group in _EXCLUSIVE if word in group))
-    return replace(walk, beside=(*(other for other in walk.beside if other not in opposites), word))
+    if label in walk.modifiers:
+        return replace(walk, modifiers=tuple(other for other in walk.modifiers if other != label))
+    if label in _list_next_labels(walk) or not walk.steps:
+        return replace(walk, steps=(*walk.steps, label))
+    opposites = frozenset().union(*(group for group in _EXCLUSIVE if label in group))
+    return replace(walk, modifiers=(*(other for other in walk.modifiers if other not in opposites), label))
 
 
-def can_skip(walk: Walk) -> bool:
+def can_skip(walk: TreeChoices) -> bool:
     """Return whether the tree has labels below the next level.
 
     Args:
         walk: the labels chosen so far.
     """
-    return any(below for place in _places(walk) for below in place.values())
+    return any(below for place in _find_branches(walk) for below in place.values())
 
 
-def skip(walk: Walk) -> Walk:
+def skip_level(walk: TreeChoices) -> TreeChoices:
     """Go one level down the tree without a label of that level.
 
     Args:
@@ -156,17 +156,17 @@ def skip(walk: Walk) -> Walk:
     return replace(walk, steps=(*walk.steps, None)) if can_skip(walk) else walk
 
 
-def served(walk: Walk, held: Held | None) -> bool:
+def is_available(walk: TreeChoices, available: LibraryCombinations | None) -> bool:
     """Return whether the library has a motion with all chosen labels.
 
     Args:
         walk: the labels chosen so far.
         available: the library's combinations; None means True.
     """
-    return held is None or _has(held, walk.kind, walk.words)
+    return available is None or _has_combination(available, walk.kind, walk.words)
 
 
-def instead_of(words: Iterable[str], kind: str, held: Held) -> tuple[str, ...]:
+def find_alternative(labels: Iterable[str], kind: str, available: LibraryCombinations) -> tuple[str, ...]:
     """Find the library's combination nearest to some labels.
 
     Args:
@@ -176,76 +176,76 @@ def instead_of(words: Iterable[str], kind: str, held: Held) -> tuple[str, ...]:
     Returns:
         The combination; empty if the library has none with any of the labels or their relatives in the tree.
     """
-    asked = frozenset(words)
-    near = asked.union(*(relatives(word) for word in asked))
-    found = nearest(asked, [combination for combination in held.of(kind) if combination & near], 1)
-    return spoken(found[0]) if found else ()
+    requested = frozenset(labels)
+    related = requested.union(*(find_relatives(word) for word in requested))
+    found = find_nearest_labels(requested, [combination for combination in available.list_combinations(kind) if combination & related], 1)
+    return sort_labels(found[0]) if found else ()
 
 
-def _option(word: str, place: int, walk: Walk, held: Held | None) -> Option:
+def _build_option(word: str, place: int, walk: TreeChoices, available: LibraryCombinations | None) -> Option:
     """Build the option of a label at a position of the layout."""
-    page, digit = divmod(place, PAGE)
+    page, digit = divmod(place, PAGE_SIZE)
     chosen = word in walk.words
-    words = choose(walk, word).words if not chosen else walk.words
-    has = held is None or word == TRANSITION or _has(held, walk.kind, words)
-    return Option(word=word, page=page, digit=digit + 1, served=has,
-                  instead=() if has else instead_of(words, walk.kind, held), chosen=chosen)
+    words = choose_label(walk, word).words if not chosen else walk.words
+    is_held = available is None or word == TRANSITION or _has_combination(available, walk.kind, words)
+    return Option(word=word, page=page, digit=digit + 1, is_available=is_held,
+                  alternative=() if is_held else find_alternative(words, walk.kind, available), is_chosen=chosen)
 
 
-def _has(held: Held, kind: str, words: tuple[str, ...]) -> bool:
-    asked = set(words)
-    return any(asked <= combination for combination in held.of(kind))
+def _has_combination(available: LibraryCombinations, kind: str, words: tuple[str, ...]) -> bool:
+    requested = set(words)
+    return any(requested <= combination for combination in available.list_combinations(kind))
 
 
-def _layout(walk: Walk, held: Held | None) -> list[str | None]:
+def _place_labels(walk: TreeChoices, available: LibraryCombinations | None) -> list[str | None]:
     """Place the labels on pages of nine; None where a digit has no function."""
     if walk.words == (TRANSITION,):
         return []
-    own = _own_words(walk, held)
+    library_labels = _list_library_labels(walk, available)
     # First page: the roots, with those that both trees share last.
     if not walk.steps:
-        ends = _IN_BOTH if walk.kind == "moment" else (TRANSITION,)
-        return [*(word for word in _TREES[walk.kind] if word not in ends), *ends, *own]
+        ends = _SHARED_ROOTS if walk.kind == "moment" else (TRANSITION,)
+        return [*(word for word in _TREES[walk.kind] if word not in ends), *ends, *library_labels]
     # Later: sides on 1 and 2, tree labels on 3 to 7, the last two on 8 and 9; the rest on further pages.
     last = _LAST_TWO[walk.kind]
-    below = [word for word in _next_words(walk) if word not in (*SIDES, *last)]
-    room = PAGE - len(SIDES) - len(last)
-    first = [*SIDES, *below[:room], *[None] * (room - len(below)), *last]
-    behind = dict.fromkeys((*below[room:], *_BEHIND[walk.kind], *_elsewhere(walk), *own))
-    return [*first, *(word for word in behind if word not in first)]
+    next_labels = [word for word in _list_next_labels(walk) if word not in (*SIDES, *last)]
+    room = PAGE_SIZE - len(SIDES) - len(last)
+    first = [*SIDES, *next_labels[:room], *[None] * (room - len(next_labels)), *last]
+    more = dict.fromkeys((*next_labels[room:], *_MORE_MODIFIERS[walk.kind], *_list_branch_labels(walk), *library_labels))
+    return [*first, *(word for word in more if word not in first)]
 
 
-def _elsewhere(walk: Walk) -> list[str]:
+def _list_branch_labels(walk: TreeChoices) -> list[str]:
     """List all labels of the root's branches, because users also combine across branches ("receive body high")."""
     tree = _TREES[walk.kind]
     roots = tree.values() if walk.steps[0] is None else [tree.get(walk.steps[0], {})]
-    gone = {word for word in walk.steps if word}
-    return [word for branch in roots for word in _words_of(branch) if word not in gone]
+    used = {word for word in walk.steps if word}
+    return [word for branch in roots for word in _collect_labels(branch) if word not in used]
 
 
-def _words_of(branch: Mapping[str, dict]) -> list[str]:
+def _collect_labels(branch: Mapping[str, dict]) -> list[str]:
     """Collect all labels of a branch, each once."""
-    return list(dict.fromkeys(word for name, below in branch.items() for word in (name, *_words_of(below))))
+    return list(dict.fromkeys(word for name, below in branch.items() for word in (name, *_collect_labels(below))))
 
 
-def _own_words(walk: Walk, held: Held | None) -> list[str]:
+def _list_library_labels(walk: TreeChoices, available: LibraryCombinations | None) -> list[str]:
     """List the library's labels that are not in the tree, from the combinations with the chosen root."""
-    if held is None:
+    if available is None:
         return []
     root = {walk.steps[0]} - {None} if walk.steps else set()
-    words = frozenset().union(*(combination for combination in held.of(walk.kind) if root <= combination))
-    return sorted(words - vocabulary_words() - root)
+    labels = frozenset().union(*(combination for combination in available.list_combinations(walk.kind) if root <= combination))
+    return sorted(labels - list_vocabulary() - root)
 
 
-def _next_words(walk: Walk) -> tuple[str, ...]:
+def _list_next_labels(walk: TreeChoices) -> tuple[str, ...]:
     """List the tree's labels below the branches that the choices reach, in the tree's order."""
-    return tuple(dict.fromkeys(word for place in _places(walk) for word in place))
+    return tuple(dict.fromkeys(word for place in _find_branches(walk) for word in place))
 
 
-def _places(walk: Walk) -> list[Mapping[str, dict]]:
+def _find_branches(walk: TreeChoices) -> list[Mapping[str, dict]]:
     """Find the branches of the tree that the chosen steps lead to; none after a label outside the tree."""
-    places: list[Mapping[str, dict]] = [_TREES[walk.kind]]
+    branches: list[Mapping[str, dict]] = [_TREES[walk.kind]]
     for step in walk.steps:
-        below = (place.items() for place in places)
-        places = [branch for items in below for word, branch in items if step in (None, word)]
-    return places
+        below = (place.items() for place in branches)
+        branches = [branch for items in below for word, branch in items if step in (None, word)]
+    return branches

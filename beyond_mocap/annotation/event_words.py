@@ -13,8 +13,8 @@ from ..base.errors import InputError
 from .labels import list_labels
 from .striking import BODY_PARTS
 from .text import read_text
-from .timeline import checked_words
-from .vocabulary import SIDES, similar_words, vocabulary_words
+from .timeline import check_labels
+from .vocabulary import SIDES, find_similar_labels, list_vocabulary
 
 
 @dataclass(frozen=True)
@@ -45,14 +45,14 @@ EVENT_KINDS = (
 
 KINDS = tuple(kind.name for kind in EVENT_KINDS)
 
-FILLED_IN = {"side": SIDES, "height": list_labels(group="height"), "gait": list_labels(group="pace"), "jump": ("jump",)}
+PLACEHOLDERS = {"side": SIDES, "height": list_labels(group="height"), "gait": list_labels(group="pace"), "jump": ("jump",)}
 """Placeholders allowed in braces in a row's labels, and the labels that replace each."""
 
 TABLE = Path(__file__).with_name("event_words.csv")
 """The table supplied with the project."""
 
 _COLUMNS = ("kind", "part", "detail", "words")
-_STEP = "see docs/match/match-input.md"
+_NEXT_STEP = "see docs/match/match-input.md"
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ class EventRow:
 
 
 @dataclass(frozen=True)
-class EventWords:
+class EventLabelTable:
     """The table.
 
     Attributes:
@@ -82,8 +82,8 @@ class EventWords:
 
     rows: tuple[EventRow, ...]
 
-    def words(
-        self, kind: str, part: str = "", details: Collection[str] = (), filled_in: Mapping[str, str] | None = None
+    def find_labels(
+        self, kind: str, part: str = "", details: Collection[str] = (), placeholders: Mapping[str, str] | None = None
     ) -> tuple[str, ...]:
         """Find the labels for an event.
 
@@ -99,17 +99,17 @@ class EventWords:
         Returns:
             The labels; () if the event makes no key moment.
         """
-        fitting = [row for row in self.rows if row.kind == kind and row.part in ("", part)]
-        fitting = [row for row in fitting if not row.detail or row.detail in details]
-        if not fitting:
+        matching = [row for row in self.rows if row.kind == kind and row.part in ("", part)]
+        matching = [row for row in matching if not row.detail or row.detail in details]
+        if not matching:
             return ()
-        row = max(fitting, key=lambda row: (bool(row.detail), bool(row.part)))
-        known = {f"{{{name}}}": word for name, word in (filled_in or {}).items()}
-        words = (known.get(word, "") if word.startswith("{") else word for word in row.words)
-        return tuple(dict.fromkeys(word for word in words if word))
+        row = max(matching, key=lambda row: (bool(row.detail), bool(row.part)))
+        replacements = {f"{{{name}}}": word for name, word in (placeholders or {}).items()}
+        labels = (replacements.get(word, "") if word.startswith("{") else word for word in row.words)
+        return tuple(dict.fromkeys(word for word in labels if word))
 
 
-def read_event_words(path: str | os.PathLike | None = None, known_words: Iterable[str] = ()) -> EventWords:
+def read_event_labels(path: str | os.PathLike | None = None, known_labels: Iterable[str] = ()) -> EventLabelTable:
     """Read the table from a CSV file with the columns kind, part, detail and words.
 
     Lines that begin with # are comments.
@@ -123,10 +123,10 @@ def read_event_words(path: str | os.PathLike | None = None, known_words: Iterabl
         InputError: with the line, for an unknown kind, part or label, or a duplicate row.
     """
     path = TABLE if path is None else path
-    known, rows, seen = vocabulary_words(known_words), [], {}
+    known, rows, first_places = list_vocabulary(known_labels), [], {}
     lines = read_text(path).splitlines()
-    bare = "\n".join("" if line.lstrip().startswith("#") else line for line in lines)
-    reader = csv.reader(io.StringIO(bare, newline=""))
+    without_comments = "\n".join("" if line.lstrip().startswith("#") else line for line in lines)
+    reader = csv.reader(io.StringIO(without_comments, newline=""))
     header = None
     try:
         for cells in reader:
@@ -134,42 +134,42 @@ def read_event_words(path: str | os.PathLike | None = None, known_words: Iterabl
             if not any(cells):
                 continue
             if header is None:
-                header = _checked_header(cells, place)
+                header = _check_header(cells, place)
                 continue
-            row = _row(cells, known, place)
-            if (same := seen.setdefault(row[:3], place)) != place:
-                said = ", ".join(row[:3])
-                raise InputError(place, f"{said} is also in line {same.rpartition(':')[2]}", "each row once", _STEP)
+            row = _parse_row(cells, known, place)
+            if (same := first_places.setdefault(row[:3], place)) != place:
+                description = ", ".join(row[:3])
+                raise InputError(place, f"{description} is also in line {same.rpartition(':')[2]}", "each row once", _NEXT_STEP)
             rows.append(EventRow(*row))
     except csv.Error as error:
         raise InputError(f"{path}:{reader.line_num}", str(error), "comma-separated values") from None
     if not rows:
-        raise InputError(path, "the table is empty", ",".join(_COLUMNS), _STEP)
-    return EventWords(tuple(rows))
+        raise InputError(path, "the table is empty", ",".join(_COLUMNS), _NEXT_STEP)
+    return EventLabelTable(tuple(rows))
 
 
-def _checked_header(cells: list[str], place: str) -> list[str]:
+def _check_header(cells: list[str], place: str) -> list[str]:
     if tuple(cells) != _COLUMNS:
-        raise InputError(place, f"columns {','.join(cells)[:60]!r}", ",".join(_COLUMNS), _STEP)
+        raise InputError(place, f"columns {','.join(cells)[:60]!r}", ",".join(_COLUMNS), _NEXT_STEP)
     return cells
 
 
-def _row(cells: list[str], known: frozenset[str], place: str) -> tuple[str, str, str, tuple[str, ...]]:
+def _parse_row(cells: list[str], known: frozenset[str], place: str) -> tuple[str, str, str, tuple[str, ...]]:
     """Check one row's cells; return kind, part, detail and labels."""
     if len(cells) != len(_COLUMNS):
-        raise InputError(place, f"{len(cells)} cells", f"{len(_COLUMNS)}: {','.join(_COLUMNS)}", _STEP)
-    kind, part, detail, said = cells
+        raise InputError(place, f"{len(cells)} cells", f"{len(_COLUMNS)}: {','.join(_COLUMNS)}", _NEXT_STEP)
+    kind, part, detail, text = cells
     if kind not in KINDS:
-        raise InputError(place, f"kind {kind!r}", f"one of {', '.join(KINDS)}", _STEP)
+        raise InputError(place, f"kind {kind!r}", f"one of {', '.join(KINDS)}", _NEXT_STEP)
     if part and part not in BODY_PARTS:
-        raise InputError(place, f"part {part!r}", f"one of {', '.join(BODY_PARTS)}, or blank", _STEP)
-    words = said.split()
-    for word in words:
-        if word.startswith("{"):
-            if word[1:-1] not in FILLED_IN or not word.endswith("}"):
-                raise InputError(place, f"{word}", "one of " + " ".join(f"{{{name}}}" for name in FILLED_IN), _STEP)
-        elif word not in known:
-            offers = ", ".join(similar_words(word, known)) or "a label of the vocabulary"
-            raise InputError(place, f"the label {word!r} is not in the vocabulary", f"one like {offers}", _STEP)
-    checked_words((word for word in words if not word.startswith("{")), place)
-    return kind, part, detail, tuple(words)
+        raise InputError(place, f"part {part!r}", f"one of {', '.join(BODY_PARTS)}, or blank", _NEXT_STEP)
+    labels = text.split()
+    for label in labels:
+        if label.startswith("{"):
+            if label[1:-1] not in PLACEHOLDERS or not label.endswith("}"):
+                raise InputError(place, f"{label}", "one of " + " ".join(f"{{{name}}}" for name in PLACEHOLDERS), _NEXT_STEP)
+        elif label not in known:
+            offers = ", ".join(find_similar_labels(label, known)) or "a label of the vocabulary"
+            raise InputError(place, f"the label {label!r} is not in the vocabulary", f"one like {offers}", _NEXT_STEP)
+    check_labels((label for label in labels if not label.startswith("{")), place)
+    return kind, part, detail, tuple(labels)

@@ -11,10 +11,10 @@ from __future__ import annotations
 import numpy as np
 
 from ..base.errors import InputError
-from ..base.time_series import equal_runs
+from ..base.time_series import find_equal_runs
 from ..base.vectors import arctan2
 from ..motion import quaternion
-from ..motion.track import SampledTrack, zero_phase_hann
+from ..motion.track import SampledTrack, smooth_zero_phase_hann
 from .labels import list_gaits, list_labels
 from .vocabulary import DIRECTIONS
 
@@ -24,19 +24,19 @@ LOCOMOTION = list_gaits()
 STANDING = LOCOMOTION[0]
 """The gait without travel."""
 
-LOCOMOTION_WORDS = frozenset((*LOCOMOTION, *list_labels(ball="carries")))
+LOCOMOTION_LABELS = frozenset((*LOCOMOTION, *list_labels(ball="carries")))
 
 STANDING_SPEED = 0.3
 """m/s of a smoothed track; below it a player stands. Raw tracking noise alone reaches this speed; at a higher smoothed
 speed the player shuffles, and a standing body would slide."""
 
 _SPEEDS = np.array([0.8, 1.5, 2.5, 4.0, 6.0])  # m/s, with the largest heading offset in radians at each
-_MOST_TURNED = np.array([np.pi, 1.3, 0.6, 0.2, 0.0])
-_AT_FEET = (1.0, 2.5)  # m to the ball: nearer, the body does not face it; farther, it does in full
-_WINDOW, _SHORTEST = 2.0, 1.5  # seconds: smoothing window of the heading; minimum duration of a direction
+_MAX_OFFSETS = np.array([np.pi, 1.3, 0.6, 0.2, 0.0])
+_FACING_DISTANCES = (1.0, 2.5)  # m to the ball: nearer, the body does not face it; farther, it does in full
+_WINDOW, _MIN_SECONDS = 2.0, 1.5  # seconds: smoothing window of the heading; minimum duration of a direction
 
 
-def gait_thresholds(speeds: np.ndarray, omega: float = 4.0) -> np.ndarray:
+def compute_gait_thresholds(speeds: np.ndarray, omega: float = 4.0) -> np.ndarray:
     """Compute the speed thresholds from each gait to the next faster one: s_A + (s_B - s_A) / omega.
 
     Faustino prints s_A + (s_A - s_B) / omega, which lies below the slower gait's own speed. The sign is changed here so
@@ -63,7 +63,7 @@ def gait_thresholds(speeds: np.ndarray, omega: float = 4.0) -> np.ndarray:
     return np.where(from_standing, np.maximum(thresholds, STANDING_SPEED), thresholds)
 
 
-def recorded_thresholds(speeds: np.ndarray, speed: np.ndarray, gait: np.ndarray) -> np.ndarray:
+def estimate_gait_thresholds(speeds: np.ndarray, speed: np.ndarray, gait: np.ndarray) -> np.ndarray:
     """Estimate from a library's own annotations the speeds at which one gait changes to the next.
 
     Each threshold is the speed with the fewest frames of the slower gait above it and of the faster gait below it;
@@ -78,18 +78,18 @@ def recorded_thresholds(speeds: np.ndarray, speed: np.ndarray, gait: np.ndarray)
     Returns:
         (G-1,) m/s.
     """
-    found = []
+    thresholds = []
     for slow, (low, high) in enumerate(zip(speeds, speeds[1:])):
         below, above = np.sort(speed[gait == slow]), np.sort(speed[gait == slow + 1])
         tried = np.linspace(low, high, 101)
         # Count the frames on the wrong side of each tried speed; `below` and `above` are sorted.
-        wrong = len(below) - np.searchsorted(below, tried) + np.searchsorted(above, tried)
-        best = float(np.mean(tried[wrong == wrong.min()]))
-        found.append(STANDING_SPEED if low < STANDING_SPEED < high else best)
-    return np.array(found)
+        misplaced = len(below) - np.searchsorted(below, tried) + np.searchsorted(above, tried)
+        best = float(np.mean(tried[misplaced == misplaced.min()]))
+        thresholds.append(STANDING_SPEED if low < STANDING_SPEED < high else best)
+    return np.array(thresholds)
 
 
-def automatic_gaits(
+def choose_gaits(
     speed: np.ndarray, fps: float, speeds: np.typing.ArrayLike, thresholds: np.ndarray, hysteresis: float = 0.2,
     minimum: float = 0.4,
 ) -> np.ndarray:
@@ -112,12 +112,12 @@ def automatic_gaits(
     """
     speed = np.asarray(speed, dtype=float)
     margins = np.minimum(hysteresis * np.diff(np.asarray(speeds, dtype=float)), thresholds / 4.0)
-    steps = [_trigger(speed, threshold, margin) for threshold, margin in zip(thresholds, margins)]
+    steps = [_apply_hysteresis(speed, threshold, margin) for threshold, margin in zip(thresholds, margins)]
     gaits = np.sum(steps, axis=0, dtype=int) if steps else np.zeros(len(speed), dtype=int)
-    return without_short_runs(gaits, int(np.ceil(minimum * fps - 1e-9)))
+    return remove_short_runs(gaits, int(np.ceil(minimum * fps - 1e-9)))
 
 
-def wanted_offset(track: SampledTrack) -> np.ndarray:
+def compute_heading_offset(track: SampledTrack) -> np.ndarray:
     """Compute the angle from the direction of travel to the heading that the body should have.
 
     The heading is the ball's direction, limited to what legs allow at that speed: any angle below 0.8 m/s, none from 6
@@ -129,19 +129,19 @@ def wanted_offset(track: SampledTrack) -> np.ndarray:
     Returns:
         (T,) radians, counterclockwise, -pi to pi.
     """
-    away = track.ball[:, :2] - track.positions
-    known = np.isfinite(away).all(axis=1)
-    distance = np.linalg.norm(np.where(known[:, None], away, 1.0), axis=1)
-    share = np.where(known, np.clip((distance - _AT_FEET[0]) / (_AT_FEET[1] - _AT_FEET[0]), 0.0, 1.0), 0.0)
-    to_ball = arctan2(away[:, 1], away[:, 0])
-    offset = np.where(known, quaternion.wrapped(to_ball - track.direction), 0.0) * share
-    most = np.interp(track.speed, _SPEEDS, _MOST_TURNED)
-    offset = np.clip(offset, -most, most)
-    steady = zero_phase_hann(np.stack([np.cos(offset), np.sin(offset)], axis=1), track.fps, _WINDOW)
-    return arctan2(steady[:, 1], steady[:, 0])
+    ball_offset = track.ball[:, :2] - track.positions
+    known = np.isfinite(ball_offset).all(axis=1)
+    distance = np.linalg.norm(np.where(known[:, None], ball_offset, 1.0), axis=1)
+    share = np.where(known, np.clip((distance - _FACING_DISTANCES[0]) / (_FACING_DISTANCES[1] - _FACING_DISTANCES[0]), 0.0, 1.0), 0.0)
+    to_ball = arctan2(ball_offset[:, 1], ball_offset[:, 0])
+    offset = np.where(known, quaternion.wrap_angle(to_ball - track.direction), 0.0) * share
+    limit = np.interp(track.speed, _SPEEDS, _MAX_OFFSETS)
+    offset = np.clip(offset, -limit, limit)
+    smoothed = smooth_zero_phase_hann(np.stack([np.cos(offset), np.sin(offset)], axis=1), track.fps, _WINDOW)
+    return arctan2(smoothed[:, 1], smoothed[:, 0])
 
 
-def direction_words(offset: np.ndarray, fps: float) -> list[str]:
+def choose_directions(offset: np.ndarray, fps: float) -> list[str]:
     """Choose the direction label of walking at each heading offset: front, back, left or right.
 
     A body that faces left of its path walks to its right. No direction lasts less than _SHORTEST seconds.
@@ -152,11 +152,11 @@ def direction_words(offset: np.ndarray, fps: float) -> list[str]:
     Returns:
         T labels.
     """
-    quarter = np.round(quaternion.wrapped(offset) / (np.pi / 2.0)).astype(int) % 4
-    return [DIRECTIONS[-number] for number in without_short_runs(quarter, int(_SHORTEST * fps))]
+    quarter = np.round(quaternion.wrap_angle(offset) / (np.pi / 2.0)).astype(int) % 4
+    return [DIRECTIONS[-number] for number in remove_short_runs(quarter, int(_MIN_SECONDS * fps))]
 
 
-def _trigger(speed: np.ndarray, threshold: float, margin: float) -> np.ndarray:
+def _apply_hysteresis(speed: np.ndarray, threshold: float, margin: float) -> np.ndarray:
     """Compare speed to a threshold with hysteresis: only values beyond threshold +- margin change the result.
 
     Args:
@@ -165,14 +165,14 @@ def _trigger(speed: np.ndarray, threshold: float, margin: float) -> np.ndarray:
     Returns:
         (T,) bool, True above the threshold.
     """
-    decided = np.abs(speed - threshold) >= margin
-    decided[:1] = True
+    is_decided = np.abs(speed - threshold) >= margin
+    is_decided[:1] = True
     # Index of the last frame that was beyond the margin, for every frame.
-    last = np.maximum.accumulate(np.where(decided, np.arange(len(speed)), 0))
+    last = np.maximum.accumulate(np.where(is_decided, np.arange(len(speed)), 0))
     return (speed >= threshold)[last]
 
 
-def without_short_runs(gaits: np.ndarray, frames: int) -> np.ndarray:
+def remove_short_runs(gaits: np.ndarray, min_length: int) -> np.ndarray:
     """Remove short runs: each takes the value of a neighbour, the shortest first.
 
     Args:
@@ -183,23 +183,23 @@ def without_short_runs(gaits: np.ndarray, frames: int) -> np.ndarray:
     """
     if not len(gaits):
         return gaits
-    runs = [[stop - start, int(gaits[start])] for start, stop in equal_runs(gaits)]
+    runs = [[stop - start, int(gaits[start])] for start, stop in find_equal_runs(gaits)]
     while len(runs) > 1:
         short = min(range(len(runs)), key=lambda i: runs[i][0])
-        if runs[short][0] >= frames:
+        if runs[short][0] >= min_length:
             break
-        runs[short][1] = _adopting_gait(runs, short)
-        runs = _joined(runs)
+        runs[short][1] = _choose_neighbour_gait(runs, short)
+        runs = _merge_equal_runs(runs)
     return np.repeat([gait for _, gait in runs], [length for length, _ in runs])
 
 
-def _adopting_gait(runs: list[list[int]], index: int) -> int:
+def _choose_neighbour_gait(runs: list[list[int]], index: int) -> int:
     """Choose the gait of the neighbouring run that is more similar, then longer."""
     neighbours = runs[max(index - 1, 0) : index] + runs[index + 1 : index + 2]
     return min(neighbours, key=lambda run: (abs(run[1] - runs[index][1]), -run[0]))[1]
 
 
-def _joined(runs: list[list[int]]) -> list[list[int]]:
+def _merge_equal_runs(runs: list[list[int]]) -> list[list[int]]:
     """Merge neighbouring runs of the same gait."""
     out: list[list[int]] = []
     for length, gait in runs:

@@ -25,7 +25,7 @@ KINDS = ("continuous", "discrete", "modifier")
 GROUPS = ("side", "height", "surface", "pace", "way")
 ACTIONS = ("throw", "kick")
 
-_CLOSED = {
+_ALLOWED_VALUES = {
     "kind": KINDS, "group": GROUPS, "part": (*BODY_PARTS, "hands", "tool"), "flight": ("yes",),
     "ball": ("sends", "takes", "carries", "never"), "height": ("low", "middle", "high"), "action": ACTIONS,
 }  # fmt: skip
@@ -90,13 +90,13 @@ def read_labels() -> dict[str, Label]:
     """
     lines = TABLE.read_text(encoding="utf-8").splitlines()
     first = next(number for number, line in enumerate(lines) if not line.startswith("#"))
-    found: dict[str, Label] = {}
+    labels: dict[str, Label] = {}
     for number, cells in enumerate(csv.DictReader(lines[first:]), first + 2):
-        label = _read_label(cells, f"{TABLE}:{number}")
-        if label.name in found:
+        label = _parse_label(cells, f"{TABLE}:{number}")
+        if label.name in labels:
             raise InputError(f"{TABLE}:{number}", f"the label {label.name!r} is repeated", "each label once")
-        found[label.name] = label
-    return found
+        labels[label.name] = label
+    return labels
 
 
 def find_label(name: str) -> Label:
@@ -111,7 +111,7 @@ def find_label(name: str) -> Label:
 
 
 @lru_cache(maxsize=64)
-def list_labels(**wanted: object) -> tuple[str, ...]:
+def list_labels(**required: object) -> tuple[str, ...]:
     """List the labels with certain attributes.
 
     Args:
@@ -119,46 +119,46 @@ def list_labels(**wanted: object) -> tuple[str, ...]:
     Returns:
         Their names in the table's order.
     """
-    same = ((label.name, all(getattr(label, key) == value for key, value in wanted.items())) for label in _rows())
-    return tuple(name for name, fits in same if fits)
+    matches = ((label.name, all(getattr(label, key) == value for key, value in required.items())) for label in _list_rows())
+    return tuple(name for name, is_match in matches if is_match)
 
 
 def list_gaits() -> tuple[str, ...]:
     """List the names of all gaits, slow to fast."""
-    gaits = [label for label in _rows() if label.gait is not None]
+    gaits = [label for label in _list_rows() if label.gait is not None]
     return tuple(label.name for label in sorted(gaits, key=lambda label: label.gait))
 
 
-def _rows() -> tuple[Label, ...]:
+def _list_rows() -> tuple[Label, ...]:
     return tuple(read_labels().values())
 
 
-def _read_label(cells: dict[str, str], place: str) -> Label:
+def _parse_label(cells: dict[str, str], place: str) -> Label:
     """Check one row's cells and build its label."""
     if tuple(cells) != _COLUMNS or None in cells.values():
         raise InputError(place, "wrong columns", ",".join(_COLUMNS))
-    said = {column: tuple(text.split()) for column, text in cells.items()}
-    for column, known in _CLOSED.items():
-        if not set(known).issuperset(said[column]):
-            raise InputError(place, f"{column} {cells[column]!r}", f"one of {', '.join(known)}, or blank")
+    values = {column: tuple(text.split()) for column, text in cells.items()}
+    for column, allowed in _ALLOWED_VALUES.items():
+        if not set(allowed).issuperset(values[column]):
+            raise InputError(place, f"{column} {cells[column]!r}", f"one of {', '.join(allowed)}, or blank")
     return Label(
-        name=cells["label"], title=cells["title"], kinds=said["kind"], group=cells["group"],
-        parts=tuple("hand" if part == "hands" else part for part in said["part"]), both_hands="hands" in said["part"],
-        part_with=said["part_with"], ball=cells["ball"], gait=float(cells["gait_m_s"]) if cells["gait_m_s"] else None,
-        height=cells["height"], in_flight=bool(cells["flight"]), action=cells["action"], below=_tree_of(cells["below"]),
+        name=cells["label"], title=cells["title"], kinds=values["kind"], group=cells["group"],
+        parts=tuple("hand" if part == "hands" else part for part in values["part"]), both_hands="hands" in values["part"],
+        part_with=values["part_with"], ball=cells["ball"], gait=float(cells["gait_m_s"]) if cells["gait_m_s"] else None,
+        height=cells["height"], in_flight=bool(cells["flight"]), action=cells["action"], below=_parse_tree(cells["below"]),
     )  # fmt: skip
 
 
-def _tree_of(text: str) -> dict[str, dict]:
+def _parse_tree(text: str) -> dict[str, dict]:
     """Parse the nested labels of a text such as "low(inside outside) high"."""
     # Stack of open branches; `last` is the branch of the label read last, which "(" opens.
-    places: list[dict[str, dict]] = [{}]
-    last: dict[str, dict] = places[0]
+    branches: list[dict[str, dict]] = [{}]
+    last: dict[str, dict] = branches[0]
     for sign in re.findall(r"[^\s()]+|[()]", text):
         if sign == "(":
-            places.append(last)
+            branches.append(last)
         elif sign == ")":
-            places.pop()
+            branches.pop()
         else:
-            last = places[-1][sign] = {}
-    return places[0]
+            last = branches[-1][sign] = {}
+    return branches[0]

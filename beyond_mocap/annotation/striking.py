@@ -13,15 +13,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..motion import quaternion
-from ..motion.humanoid import Humanoid, Limb, identify
+from ..motion.humanoid import Humanoid, Limb, identify_joints
 from ..motion.skeleton import Skeleton
 from ..motion.track import BALL_RADIUS
 
 BODY_PARTS = ("foot", "head", "chest", "hand")
 # Metres.
 FOOT_RADIUS, HEAD_RADIUS, CHEST_RADIUS, HAND_RADIUS = 0.05, 0.10, 0.12, 0.05
-_HERE = np.zeros(3)
-_HERE.setflags(write=False)
+_ORIGIN = np.zeros(3)
+_ORIGIN.setflags(write=False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +41,7 @@ class Surface:
     start: tuple[int, np.ndarray]
     end: tuple[int, np.ndarray]
 
-    def line(self, positions: np.ndarray, rotations: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def compute_line(self, positions: np.ndarray, rotations: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Compute both ends of the surface's line.
 
         Args:
@@ -56,7 +56,7 @@ class Surface:
         )
 
 
-def part_surfaces(skeleton: Skeleton, part: str, sides: Iterable[str] = ("left", "right")) -> tuple[Surface, ...]:
+def build_part_surfaces(skeleton: Skeleton, part: str, sides: Iterable[str] = ("left", "right")) -> tuple[Surface, ...]:
     """Build the surfaces of a body part.
 
     Args:
@@ -66,19 +66,19 @@ def part_surfaces(skeleton: Skeleton, part: str, sides: Iterable[str] = ("left",
     Returns:
         The surfaces; none if the skeleton lacks the part.
     """
-    body = identify(skeleton)
+    body = identify_joints(skeleton)
     if part == "foot":
-        return tuple(_foot(skeleton, side, getattr(body, side)) for side in sides)
+        return tuple(_build_foot(skeleton, side, getattr(body, side)) for side in sides)
     if part == "hand":
         hands = [(side, getattr(body, side).hand) for side in sides if getattr(body, side).hand is not None]
-        return tuple(Surface("hand", side, HAND_RADIUS, (hand, _HERE), (hand, _HERE)) for side, hand in hands)
+        return tuple(Surface("hand", side, HAND_RADIUS, (hand, _ORIGIN), (hand, _ORIGIN)) for side, hand in hands)
     if part == "head" and body.head is not None:
-        return (_head(skeleton, body),)
-    chest = (body.chest, _HERE)
+        return (_build_head(skeleton, body),)
+    chest = (body.chest, _ORIGIN)
     return (Surface("chest", "", CHEST_RADIUS, chest, chest),) if part == "chest" else ()
 
 
-def faster_middle(found: Sequence[Surface], places: np.ndarray, rotations: np.ndarray) -> np.ndarray:
+def trace_fastest_surface(surfaces: Sequence[Surface], positions: np.ndarray, rotations: np.ndarray) -> np.ndarray:
     """Trace the middle of the surface that moves farthest from the first frame to the last.
 
     Args:
@@ -88,11 +88,11 @@ def faster_middle(found: Sequence[Surface], places: np.ndarray, rotations: np.nd
     Returns:
         (T, 3) m, world frame.
     """
-    middles = [np.mean(surface.line(places, rotations), axis=0) for surface in found]
-    return max(middles, key=lambda way: float(np.linalg.norm(way[-1] - way[0])))
+    middles = [np.mean(surface.compute_line(positions, rotations), axis=0) for surface in surfaces]
+    return max(middles, key=lambda trajectory: float(np.linalg.norm(trajectory[-1] - trajectory[0])))
 
 
-def ball_gap(
+def measure_ball_gap(
     line: tuple[np.ndarray, np.ndarray], radius: float, ball: np.ndarray, ball_radius: float = BALL_RADIUS
 ) -> np.ndarray:
     """Measure the signed gap between a surface and the ball's, negative where they overlap.
@@ -105,10 +105,10 @@ def ball_gap(
     Returns:
         (...,) m.
     """
-    return np.linalg.norm(ball - nearest_on(line, ball), axis=-1) - radius - ball_radius
+    return np.linalg.norm(ball - find_nearest_point(line, ball), axis=-1) - radius - ball_radius
 
 
-def nearest_on(line: Sequence[np.ndarray], place: np.ndarray) -> np.ndarray:
+def find_nearest_point(line: Sequence[np.ndarray], position: np.ndarray) -> np.ndarray:
     """Find the point of a line segment that is nearest to a position.
 
     Args:
@@ -119,12 +119,12 @@ def nearest_on(line: Sequence[np.ndarray], place: np.ndarray) -> np.ndarray:
     """
     start, end = line
     along = end - start
-    share = np.sum((place - start) * along, axis=-1) / np.maximum(np.sum(along * along, axis=-1), 1e-12)
+    share = np.sum((position - start) * along, axis=-1) / np.maximum(np.sum(along * along, axis=-1), 1e-12)
     return start + np.clip(share, 0.0, 1.0)[..., None] * along
 
 
-def smallest_gap(
-    found: Sequence[Surface], positions: np.ndarray, rotations: np.ndarray, ball: np.ndarray
+def measure_smallest_gap(
+    surfaces: Sequence[Surface], positions: np.ndarray, rotations: np.ndarray, ball: np.ndarray
 ) -> np.ndarray:
     """Measure the smallest gap between the ball and some surfaces; see `measure_ball_gap`.
 
@@ -136,17 +136,17 @@ def smallest_gap(
     Returns:
         (...,) m, NaN without a surface.
     """
-    gaps = [ball_gap(s.line(positions, rotations), s.radius, ball) for s in found]
+    gaps = [measure_ball_gap(s.compute_line(positions, rotations), s.radius, ball) for s in surfaces]
     return np.min(gaps, axis=0) if gaps else np.full(np.shape(ball)[:-1], np.nan)
 
 
-def _foot(skeleton: Skeleton, side: str, limb: Limb) -> Surface:
+def _build_foot(skeleton: Skeleton, side: str, limb: Limb) -> Surface:
     """Build the foot from the ankle to the toe joint, or to the foot's end site if there is no toe joint."""
     if limb.toe is not None:
-        return Surface("foot", side, FOOT_RADIUS, (limb.foot, _HERE), (limb.toe, _HERE))
-    return Surface("foot", side, FOOT_RADIUS, (limb.foot, _HERE), (limb.foot, skeleton.tip(limb.foot)))
+        return Surface("foot", side, FOOT_RADIUS, (limb.foot, _ORIGIN), (limb.toe, _ORIGIN))
+    return Surface("foot", side, FOOT_RADIUS, (limb.foot, _ORIGIN), (limb.foot, skeleton.tip_offset(limb.foot)))
 
 
-def _head(skeleton: Skeleton, body: Humanoid) -> Surface:
-    middle = (body.head, 0.5 * skeleton.tip(body.head))
+def _build_head(skeleton: Skeleton, body: Humanoid) -> Surface:
+    middle = (body.head, 0.5 * skeleton.tip_offset(body.head))
     return Surface("head", "", HEAD_RADIUS, middle, middle)

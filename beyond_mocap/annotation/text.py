@@ -12,10 +12,10 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from ..base.errors import InputError, told_time
-from .timeline import LONGEST_TIME, MUST_NOT, NUMBER, KeyMoment, Span, Timeline, spelled
+from ..base.errors import InputError, format_seconds
+from .timeline import LONGEST_TIME, AVOID_PREFIX, NUMBER, KeyMoment, Span, Timeline, format_labels
 
-_FORM = "'START END labels...' or 'TIME labels...'"
+_EXPECTED_FORM = "'START END labels...' or 'TIME labels...'"
 _LARGEST_FILE = 16 * 1024 * 1024
 
 
@@ -53,14 +53,14 @@ def parse_timeline(text: str, where: str = "annotations", fps: float | None = No
         if not tokens:
             continue
         if tokens[0].lower() == "unit":
-            unit = _unit(tokens, place)
+            unit = _parse_unit(tokens, place)
             continue
-        times = [_seconds(token, unit, fps, start, place) for token in _leading_numbers(tokens, place)]
-        words = tokens[len(times) :]
+        times = [_parse_seconds(token, unit, fps, start, place) for token in _list_leading_numbers(tokens, place)]
+        labels = tokens[len(times) :]
         if len(times) == 2:
-            spans.append(_span(times, words, number, place))
+            spans.append(_parse_span(times, labels, number, place))
         else:
-            keys.append(_key(times[0], words, number, place))
+            keys.append(_parse_key(times[0], labels, number, place))
     return Timeline(tuple(spans), tuple(keys))
 
 
@@ -72,8 +72,8 @@ def format_timeline(timeline: Timeline) -> str:
     Returns:
         One line per span and key moment, in seconds, by time.
     """
-    lines = [(span.start, f"{_spell(span.start)} {_spell(span.end)}", spelled(span)) for span in timeline.spans]
-    lines += [(key.time, _spell(key.time), spelled(key)) for key in timeline.keys]
+    lines = [(span.start, f"{_format_exact(span.start)} {_format_exact(span.end)}", format_labels(span)) for span in timeline.spans]
+    lines += [(key.time, _format_exact(key.time), format_labels(key)) for key in timeline.keys]
     lines.sort(key=lambda line: line[0])
     return "".join(" ".join((times, *words)) + "\n" for _, times, words in lines)
 
@@ -103,24 +103,24 @@ def read_text(path: str | os.PathLike) -> str:
         raise InputError(f"{path}:{line}", "a byte that is not UTF-8", "UTF-8 text", "save it as UTF-8") from None
 
 
-def _unit(tokens: list[str], place: str) -> str:
+def _parse_unit(tokens: list[str], place: str) -> str:
     unit = " ".join(tokens[1:]).lower()
     if unit not in ("seconds", "frames"):
         raise InputError(place, f"unit {unit!r}", "'unit seconds' or 'unit frames'")
     return unit
 
 
-def _leading_numbers(tokens: list[str], place: str) -> list[str]:
+def _list_leading_numbers(tokens: list[str], place: str) -> list[str]:
     """List the one or two numbers at the start of a line."""
     if not NUMBER.fullmatch(tokens[0]):
-        raise InputError(place, f"{tokens[0]!r} is not a time", _FORM, "put the time first")
+        raise InputError(place, f"{tokens[0]!r} is not a time", _EXPECTED_FORM, "put the time first")
     numbers = [token for token in tokens[:3] if NUMBER.fullmatch(token)]
     if len(numbers) == 3:
-        raise InputError(place, "three numbers", _FORM, "put the labels after the times")
+        raise InputError(place, "three numbers", _EXPECTED_FORM, "put the labels after the times")
     return numbers if NUMBER.fullmatch(tokens[1] if len(tokens) > 1 else "") else numbers[:1]
 
 
-def _seconds(token: str, unit: str, fps: float | None, start: float, place: str) -> float:
+def _parse_seconds(token: str, unit: str, fps: float | None, start: float, place: str) -> float:
     in_frames = token[-1] in "fF"
     value = float(token[:-1] if in_frames else token)
     if not abs(value) <= LONGEST_TIME:
@@ -132,30 +132,30 @@ def _seconds(token: str, unit: str, fps: float | None, start: float, place: str)
     return start + value / fps
 
 
-def _span(times: list[float], words: list[str], number: int, place: str) -> Span:
+def _parse_span(times: list[float], labels: list[str], number: int, place: str) -> Span:
     if times[1] <= times[0]:
-        found = f"the end {told_time(times[1])} is not after the start {told_time(times[0])}"
+        found = f"the end {format_seconds(times[1])} is not after the start {format_seconds(times[0])}"
         raise InputError(place, found, "START < END", "write one time for a key moment")
-    return _placed(Span, place, *times, words, number)
+    return _build_item(Span, place, *times, labels, number)
 
 
-def _key(time: float, words: list[str], number: int, place: str) -> KeyMoment:
-    if all(word.startswith(MUST_NOT) for word in words):
-        raise InputError(place, "one time and no labels", _FORM, "add a second time, or labels")
-    return _placed(KeyMoment, place, time, words, number)
+def _parse_key(time: float, labels: list[str], number: int, place: str) -> KeyMoment:
+    if all(word.startswith(AVOID_PREFIX) for word in labels):
+        raise InputError(place, "one time and no labels", _EXPECTED_FORM, "add a second time, or labels")
+    return _build_item(KeyMoment, place, time, labels, number)
 
 
-def _placed(kind, place: str, *values):
+def _build_item(kind, place: str, *values):
     """Build a span or key moment from times, labels and line; errors name the line."""
-    *times, words, line = values
-    asked = [word for word in words if not word.startswith(MUST_NOT)]
-    avoid = [word.removeprefix(MUST_NOT) for word in words if word.startswith(MUST_NOT)]
+    *times, labels, line = values
+    requested = [word for word in labels if not word.startswith(AVOID_PREFIX)]
+    avoided = [word.removeprefix(AVOID_PREFIX) for word in labels if word.startswith(AVOID_PREFIX)]
     try:
-        return kind(*times, asked, line, avoid)
+        return kind(*times, requested, line, avoided)
     except InputError as error:
-        raise InputError(place, str(error), _FORM) from None
+        raise InputError(place, str(error), _EXPECTED_FORM) from None
 
 
-def _spell(seconds: float) -> str:
+def _format_exact(seconds: float) -> str:
     """Format seconds as the shortest decimal text that reads back to the same number."""
     return repr(seconds).removesuffix(".0")

@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..base.errors import InputError, told_time
-from .vocabulary import CONTINUOUS, DISCRETE, TRANSITION, nearest, similar_words, vocabulary_words, words_below
+from ..base.errors import InputError, format_seconds
+from .vocabulary import CONTINUOUS, DISCRETE, TRANSITION, find_nearest_labels, find_similar_labels, list_vocabulary, list_labels_below
 
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?f?", re.IGNORECASE)
 """What the text form reads as a time; no label may look like one."""
@@ -24,11 +24,11 @@ LONGEST_TIME = 1e11
 _SAME_TIME = 1e-6  # seconds up to which two times count as equal
 
 
-MUST_NOT = "-"
+AVOID_PREFIX = "-"
 """Prefix of a label in the text form that the motion must not have."""
 
 
-def checked_words(words: Iterable[str], where: str) -> tuple[str, ...]:
+def check_labels(labels: Iterable[str], where: str) -> tuple[str, ...]:
     """Check labels and normalize them: lower case, each once.
 
     Args:
@@ -39,18 +39,18 @@ def checked_words(words: Iterable[str], where: str) -> tuple[str, ...]:
     Raises:
         InputError: for a text that cannot be written as a label.
     """
-    out = tuple(dict.fromkeys(str(word).lower() for word in words))
-    for word in out:
-        if not word or "#" in word or word.startswith(MUST_NOT) or word.split() != [word] or NUMBER.fullmatch(word):
-            expected = f"a label without blanks and '#' that is not a number and does not begin with '{MUST_NOT}'"
-            raise InputError(where, f"{word!r} is not a label", expected)
+    out = tuple(dict.fromkeys(str(label).lower() for label in labels))
+    for label in out:
+        if not label or "#" in label or label.startswith(AVOID_PREFIX) or label.split() != [label] or NUMBER.fullmatch(label):
+            expected = f"a label without blanks and '#' that is not a number and does not begin with '{AVOID_PREFIX}'"
+            raise InputError(where, f"{label!r} is not a label", expected)
     return out
 
 
-def _checked_time(value: float, where: str) -> float:
+def _check_time(value: float, where: str) -> float:
     time = float(value)
     if not abs(time) <= LONGEST_TIME:
-        raise InputError(where, f"the time {told_time(time)}", "a time within the track, in seconds")
+        raise InputError(where, f"the time {format_seconds(time)}", "a time within the track, in seconds")
     return time
 
 
@@ -74,10 +74,10 @@ class Span:
     avoid: tuple[str, ...] = ()
 
     def __post_init__(self):
-        object.__setattr__(self, "start", _checked_time(self.start, "span"))
-        object.__setattr__(self, "end", _checked_time(self.end, "span"))
-        object.__setattr__(self, "words", checked_words(self.words, "span"))
-        object.__setattr__(self, "avoid", checked_words(self.avoid, "span"))
+        object.__setattr__(self, "start", _check_time(self.start, "span"))
+        object.__setattr__(self, "end", _check_time(self.end, "span"))
+        object.__setattr__(self, "words", check_labels(self.words, "span"))
+        object.__setattr__(self, "avoid", check_labels(self.avoid, "span"))
 
 
 @dataclass(frozen=True)
@@ -99,12 +99,12 @@ class KeyMoment:
     solved: float | None = field(default=None, metadata={"later": True})
 
     def __post_init__(self):
-        object.__setattr__(self, "time", _checked_time(self.time, "key moment"))
-        object.__setattr__(self, "words", checked_words(self.words, "key moment"))
-        object.__setattr__(self, "avoid", checked_words(self.avoid, "key moment"))
+        object.__setattr__(self, "time", _check_time(self.time, "key moment"))
+        object.__setattr__(self, "words", check_labels(self.words, "key moment"))
+        object.__setattr__(self, "avoid", check_labels(self.avoid, "key moment"))
 
     @property
-    def in_force(self) -> float:
+    def resolved_time(self) -> float:
         """The second at which it is played: the solved one if there is one, else the requested one."""
         return self.time if self.solved is None else self.solved
 
@@ -126,7 +126,7 @@ class Timeline:
         object.__setattr__(self, "keys", tuple(sorted(self.keys, key=lambda key: key.time)))
 
 
-def words_per_frame(timeline: Timeline, times: np.ndarray) -> list[frozenset[str] | None]:
+def labels_per_frame(timeline: Timeline, times: np.ndarray) -> list[frozenset[str] | None]:
     """List the labels that apply at each time.
 
     A span applies from its start up to, not including, its end; one that ends with the last time includes it.
@@ -141,13 +141,13 @@ def words_per_frame(timeline: Timeline, times: np.ndarray) -> list[frozenset[str
     out: list[frozenset[str] | None] = [frozenset()] * len(times)
     for span in timeline.spans:
         if span.words:
-            held = _held(span, times)
-            words = None if span.words == (TRANSITION,) else frozenset(span.words)
-            out[held] = [words] * (held.stop - held.start)
+            frames = _find_frames(span, times)
+            labels = None if span.words == (TRANSITION,) else frozenset(span.words)
+            out[frames] = [labels] * (frames.stop - frames.start)
     return out
 
 
-def avoided_per_frame(timeline: Timeline, times: np.ndarray) -> list[frozenset[str]]:
+def avoided_labels_per_frame(timeline: Timeline, times: np.ndarray) -> list[frozenset[str]]:
     """List the labels that no motion may have at each time.
 
     Spans with only avoided labels may overlap others; a label that one span requests is not avoided because of another.
@@ -161,14 +161,14 @@ def avoided_per_frame(timeline: Timeline, times: np.ndarray) -> list[frozenset[s
     times = np.asarray(times, dtype=float)
     out: list[frozenset[str]] = [frozenset()] * len(times)
     for span in timeline.spans:
-        for frame in range(*_held(span, times).indices(len(times))) if span.avoid else ():
+        for frame in range(*_find_frames(span, times).indices(len(times))) if span.avoid else ():
             out[frame] |= frozenset(span.avoid)
     if any(out):
-        out = [avoid - (asked or frozenset()) for avoid, asked in zip(out, words_per_frame(timeline, times))]
+        out = [avoid - (requested or frozenset()) for avoid, requested in zip(out, labels_per_frame(timeline, times))]
     return out
 
 
-def _held(span: Span, times: np.ndarray) -> slice:
+def _find_frames(span: Span, times: np.ndarray) -> slice:
     """Find the frames in which a span applies, see `labels_per_frame`."""
     first, last = np.searchsorted(times, [span.start - _SAME_TIME, span.end - _SAME_TIME])
     if len(times) and abs(times[-1] - span.end) <= _SAME_TIME:
@@ -176,7 +176,7 @@ def _held(span: Span, times: np.ndarray) -> slice:
     return slice(int(first), int(last))
 
 
-def fill(timeline: Timeline, times: np.ndarray, words: Sequence[tuple[str, ...]]) -> Timeline:
+def fill_timeline(timeline: Timeline, times: np.ndarray, labels: Sequence[tuple[str, ...]]) -> Timeline:
     """Fill the timeline with automatic locomotion wherever no span with labels applies.
 
     Spans with labels and key moments stay as they are. All others are replaced by one span per run of equal automatic
@@ -193,32 +193,32 @@ def fill(timeline: Timeline, times: np.ndarray, words: Sequence[tuple[str, ...]]
     times = np.asarray(times, dtype=float)
     if not len(times):
         return timeline
-    asked = [span for span in timeline.spans if span.words]
-    automatic = [piece for start, end in _open_stretches(asked, times) for piece in _pieces(start, end, times, words)]
-    return Timeline((*asked, *automatic), timeline.keys)
+    labelled = [span for span in timeline.spans if span.words]
+    automatic = [piece for start, end in _find_unlabelled_spans(labelled, times) for piece in _build_spans(start, end, times, labels)]
+    return Timeline((*labelled, *automatic), timeline.keys)
 
 
-def _open_stretches(asked: list[Span], times: np.ndarray) -> list[tuple[float, float]]:
+def _find_unlabelled_spans(labelled: list[Span], times: np.ndarray) -> list[tuple[float, float]]:
     """Find the (start, end) seconds between the first and the last time that no labelled span covers."""
-    out, reached = [], times[0]
-    for start, end in [*((span.start, span.end) for span in asked), (times[-1], times[-1])]:
-        if min(start, times[-1]) > reached + _SAME_TIME:
-            out.append((reached, min(start, times[-1])))
-        reached = max(reached, end)
+    out, covered_until = [], times[0]
+    for start, end in [*((span.start, span.end) for span in labelled), (times[-1], times[-1])]:
+        if min(start, times[-1]) > covered_until + _SAME_TIME:
+            out.append((covered_until, min(start, times[-1])))
+        covered_until = max(covered_until, end)
     return out
 
 
-def _pieces(start: float, end: float, times: np.ndarray, words: Sequence[tuple[str, ...]]) -> list[Span]:
+def _build_spans(start: float, end: float, times: np.ndarray, labels: Sequence[tuple[str, ...]]) -> list[Span]:
     """Build spans of equal automatic labels that together cover start to end."""
     first = max(int(np.searchsorted(times, start + _SAME_TIME)) - 1, 0)
     last = int(np.searchsorted(times, end - _SAME_TIME))
-    edges = [i for i in range(first + 1, last) if tuple(words[i]) != tuple(words[i - 1])]
+    edges = [i for i in range(first + 1, last) if tuple(labels[i]) != tuple(labels[i - 1])]
     starts = [start, *(float(times[i]) for i in edges)]
-    return [Span(a, b, words[i]) for a, b, i in zip(starts, [*starts[1:], end], [first, *edges])]
+    return [Span(a, b, labels[i]) for a, b, i in zip(starts, [*starts[1:], end], [first, *edges])]
 
 
-def problems(
-    timeline: Timeline, known_words: Iterable[str] = (), start: float | None = None, end: float | None = None,
+def find_problems(
+    timeline: Timeline, known_labels: Iterable[str] = (), start: float | None = None, end: float | None = None,
     where: str = "annotations",
 ) -> list[InputError]:
     """Find everything that is wrong with a timeline.
@@ -231,17 +231,17 @@ def problems(
     Returns:
         The errors, in time order, then overlaps.
     """
-    known = vocabulary_words(known_words)
+    known = list_vocabulary(known_labels)
     found: list[InputError] = []
     items: list[Span | KeyMoment] = [*timeline.spans, *timeline.keys]
     for item in sorted(items, key=lambda item: item.start if isinstance(item, Span) else item.time):
         place = where if item.line is None else f"{where}:{item.line}"
-        found += [*_word_problems(item, known, place), *_time_problems(item, start, end, place)]
-    return found + _overlaps(timeline, where)
+        found += [*_find_label_problems(item, known, place), *_find_time_problems(item, start, end, place)]
+    return found + _find_overlaps(timeline, where)
 
 
-def validate(
-    timeline: Timeline, known_words: Iterable[str] = (), start: float | None = None, end: float | None = None,
+def check_timeline(
+    timeline: Timeline, known_labels: Iterable[str] = (), start: float | None = None, end: float | None = None,
     where: str = "annotations",
 ) -> None:
     """Check a timeline and raise the first of `find_problems(...)`.
@@ -251,12 +251,12 @@ def validate(
     Raises:
         InputError: if there is a problem.
     """
-    found = problems(timeline, known_words, start, end, where)
+    found = find_problems(timeline, known_labels, start, end, where)
     if found:
         raise found[0]
 
 
-def missing_keys(
+def find_missing_keys(
     timeline: Timeline, choices: Iterable[Iterable[str]], count: int = 3
 ) -> list[tuple[KeyMoment, tuple[tuple[str, ...], ...]]]:
     """Find the key moments that no clip of a library serves.
@@ -270,89 +270,89 @@ def missing_keys(
     Returns:
         Each such key moment with the `count` nearest combinations.
     """
-    held = [tuple(choice) for choice in choices]
-    lacking = [key for key in timeline.keys if not any(set(key.words) <= set(choice) for choice in held)]
-    return [(key, nearest(key.words, held, count)) for key in lacking]
+    combinations = [tuple(choice) for choice in choices]
+    missing = [key for key in timeline.keys if not any(set(key.words) <= set(choice) for choice in combinations)]
+    return [(key, find_nearest_labels(key.words, combinations, count)) for key in missing]
 
 
-def _word_problems(item: Span | KeyMoment, known: frozenset[str], place: str) -> list[InputError]:
+def _find_label_problems(item: Span | KeyMoment, known: frozenset[str], place: str) -> list[InputError]:
     """Find what is wrong with the labels of a span or key moment."""
     if TRANSITION in (*item.words, *item.avoid):
-        return _transition_problems(item, place)
-    out = [_unknown_word(word, item, known, place) for word in (*item.words, *item.avoid) if word not in known]
-    out += [_both_ways(word, place) for word in item.words if word in item.avoid]
+        return _find_transition_problems(item, place)
+    out = [_build_unknown_label_error(word, item, known, place) for word in (*item.words, *item.avoid) if word not in known]
+    out += [_build_contradiction_error(word, place) for word in item.words if word in item.avoid]
     if isinstance(item, KeyMoment) and not item.words:
         out.append(InputError(place, "a key moment without labels", "TIME labels...", "add labels"))
     return out
 
 
-def _transition_problems(item: Span | KeyMoment, place: str) -> list[InputError]:
+def _find_transition_problems(item: Span | KeyMoment, place: str) -> list[InputError]:
     if isinstance(item, Span) and item.words == (TRANSITION,) and TRANSITION not in item.avoid:
         return []
-    found = f"{TRANSITION!r} in {' '.join(spelled(item))!r}"
+    found = f"{TRANSITION!r} in {' '.join(format_labels(item))!r}"
     return [InputError(place, found, f"'START END {TRANSITION}'", "write it alone, on a line with two times")]
 
 
-def _both_ways(word: str, place: str) -> InputError:
-    found = f"{word!r} is both requested and avoided"
-    return InputError(place, found, f"'{word}' or '{MUST_NOT}{word}'", "remove one of them")
+def _build_contradiction_error(label: str, place: str) -> InputError:
+    found = f"{label!r} is both requested and avoided"
+    return InputError(place, found, f"'{label}' or '{AVOID_PREFIX}{label}'", "remove one of them")
 
 
-def _unknown_word(word: str, item: Span | KeyMoment, known: frozenset[str], place: str) -> InputError:
+def _build_unknown_label_error(label: str, item: Span | KeyMoment, known: frozenset[str], place: str) -> InputError:
     """Build the error of an unknown label; suggest similar labels and those that the tree has below the line's others.
     """
     others = [other for other in item.words if other in known]
-    alike = similar_words(word, known)
+    similar = find_similar_labels(label, known)
     roots = sorted(DISCRETE if isinstance(item, KeyMoment) else CONTINUOUS)
-    offers = dict.fromkeys((*alike, *(words_below(others)[:5] if others else roots * (not alike))))
+    offers = dict.fromkeys((*similar, *(list_labels_below(others)[:5] if others else roots * (not similar))))
     return InputError(
         place,
-        f"the label {word!r} is not in the vocabulary",
+        f"the label {label!r} is not in the vocabulary",
         f"one like {', '.join(offers)}" if offers else "a label of the vocabulary",
         "correct it, or add it to your own labels",
     )
 
 
-def _time_problems(item: Span | KeyMoment, start: float | None, end: float | None, place: str) -> list[InputError]:
+def _find_time_problems(item: Span | KeyMoment, start: float | None, end: float | None, place: str) -> list[InputError]:
     times = (item.start, item.end) if isinstance(item, Span) else (item.time,)
     if len(times) == 2 and times[1] <= times[0]:
-        found = f"the end {told_time(times[1])} is not after the start {told_time(times[0])}"
+        found = f"the end {format_seconds(times[1])} is not after the start {format_seconds(times[0])}"
         return [InputError(place, found, "START < END")]
     low = -math.inf if start is None else start - EDGE_TOLERANCE
     high = math.inf if end is None else end + EDGE_TOLERANCE
     if low <= times[0] and times[-1] <= high:
         return []
     outside = times[0] if times[0] < low else times[-1]
-    found = f"the time {told_time(outside)} s is outside the track"
-    return [InputError(place, found, _range(start, end), "correct the time")]
+    found = f"the time {format_seconds(outside)} s is outside the track"
+    return [InputError(place, found, _describe_range(start, end), "correct the time")]
 
 
-def _range(start: float | None, end: float | None) -> str:
-    parts = [f"{word} {told_time(value)} s" for word, value in (("from", start), ("to", end)) if value is not None]
+def _describe_range(start: float | None, end: float | None) -> str:
+    parts = [f"{word} {format_seconds(value)} s" for word, value in (("from", start), ("to", end)) if value is not None]
     return "times " + " ".join(parts)
 
 
-def _overlaps(timeline: Timeline, where: str) -> list[InputError]:
+def _find_overlaps(timeline: Timeline, where: str) -> list[InputError]:
     """Find labelled spans that overlap, and key moments at the same time: a player cannot do both."""
-    asked = [span for span in timeline.spans if span.words]
-    pairs: list[tuple] = [(a, b, "overlap") for a, b in zip(asked, asked[1:]) if b.start < a.end - _SAME_TIME]
+    labelled = [span for span in timeline.spans if span.words]
+    pairs: list[tuple] = [(a, b, "overlap") for a, b in zip(labelled, labelled[1:]) if b.start < a.end - _SAME_TIME]
     keys = timeline.keys
     pairs += [(a, b, "are at the same time") for a, b in zip(keys, keys[1:]) if b.time - a.time <= _SAME_TIME]
     return [
         InputError(
-            where if b.line is None else f"{where}:{b.line}", f"{_named(a)} and {_named(b)} {how}",
+            where if b.line is None else f"{where}:{b.line}", f"{_describe_item(a)} and {_describe_item(b)} {relation}",
             "one action at a time", "shorten one of them, or put all labels on one line",
         )
-        for a, b, how in pairs
+        for a, b, relation in pairs
     ]
 
 
-def _named(item: Span | KeyMoment) -> str:
-    times = f"{told_time(item.start)} {told_time(item.end)}" if isinstance(item, Span) else f"{told_time(item.time)}"
-    return f"'{' '.join((times, *spelled(item)))}'" + ("" if item.line is None else f" (line {item.line})")
+def _describe_item(item: Span | KeyMoment) -> str:
+    times = f"{format_seconds(item.start)} {format_seconds(item.end)}" if isinstance(item, Span) else f"{format_seconds(item.time)}"
+    return f"'{' '.join((times, *format_labels(item)))}'" + ("" if item.line is None else f" (line {item.line})")
 
 
-def spelled(item: Span | KeyMoment) -> tuple[str, ...]:
+def format_labels(item: Span | KeyMoment) -> tuple[str, ...]:
     """List the labels of a span or key moment as the text form writes them.
 
     Args:
@@ -360,4 +360,4 @@ def spelled(item: Span | KeyMoment) -> tuple[str, ...]:
     Returns:
         The requested labels, then the avoided ones, each after `AVOID_PREFIX`.
     """
-    return (*item.words, *(MUST_NOT + word for word in item.avoid))
+    return (*item.words, *(AVOID_PREFIX + word for word in item.avoid))

@@ -24,13 +24,13 @@ DIRECTIONS = ("front", "left", "back", "right")
 """Labels of the direction of a body's motion or action, in quarter turns counterclockwise from its heading."""
 
 
-def _tree_of(kind: str) -> dict[str, dict]:
+def _build_tree(kind: str) -> dict[str, dict]:
     """Build a kind's root labels with the tree below each; a root of two kinds has its tree in the discrete one."""
     roots = [label for label in read_labels().values() if kind in label.kinds]
     return {root.name: root.below if kind == root.kinds[-1] else {} for root in roots}
 
 
-VOCABULARY: dict[str, dict] = {kind: _tree_of(kind) for kind in KINDS}
+VOCABULARY: dict[str, dict] = {kind: _build_tree(kind) for kind in KINDS}
 """Faustino, Appendix A: kind -> root label -> nested labels below it, from the table (`labels`)."""
 
 TRANSITION = "transition"
@@ -45,7 +45,7 @@ DISCRETE = frozenset(VOCABULARY["discrete"]) - CONTINUOUS
 _OPPOSITE_SIDE = dict(zip(SIDES, reversed(SIDES)))
 
 
-def vocabulary_words(extra: Iterable[str] = ()) -> frozenset[str]:
+def list_vocabulary(extra: Iterable[str] = ()) -> frozenset[str]:
     """Collect every label of the tree.
 
     Args:
@@ -53,10 +53,10 @@ def vocabulary_words(extra: Iterable[str] = ()) -> frozenset[str]:
     Returns:
         All labels.
     """
-    return frozenset(word for path in _paths(VOCABULARY) for word in path[1:]) | frozenset(extra)
+    return frozenset(word for path in _iter_paths(VOCABULARY) for word in path[1:]) | frozenset(extra)
 
 
-def swap_sides(words: Iterable[str]) -> tuple[str, ...]:
+def swap_sides(labels: Iterable[str]) -> tuple[str, ...]:
     """Exchange left and right, also inside labels such as `turn_left`.
 
     Args:
@@ -65,11 +65,11 @@ def swap_sides(words: Iterable[str]) -> tuple[str, ...]:
         The labels of the mirrored motion.
     Source: Faustino 2024, section 3.1.2.
     """
-    return tuple("_".join(_OPPOSITE_SIDE.get(part, part) for part in word.split("_")) for word in words)
+    return tuple("_".join(_OPPOSITE_SIDE.get(part, part) for part in label.split("_")) for label in labels)
 
 
 @lru_cache(maxsize=1024)
-def relatives(word: str) -> frozenset[str]:
+def find_relatives(label: str) -> frozenset[str]:
     """Find the labels above or below a label anywhere in the tree.
 
     Args:
@@ -77,14 +77,14 @@ def relatives(word: str) -> frozenset[str]:
     Returns:
         Its relatives, without itself.
     """
-    found: set[str] = set()
-    for path in _paths(VOCABULARY):
-        if word in path[1:]:
-            found.update(path[1:])
-    return frozenset(found - {word})
+    related: set[str] = set()
+    for path in _iter_paths(VOCABULARY):
+        if label in path[1:]:
+            related.update(path[1:])
+    return frozenset(related - {label})
 
 
-def words_below(words: Iterable[str]) -> tuple[str, ...]:
+def list_labels_below(labels: Iterable[str]) -> tuple[str, ...]:
     """List the labels that the tree offers next: all children of the deepest positions that the labels reach.
 
     The labels reach a position if they include every label on its path: after ("kick", "low") come inside, top ....
@@ -94,14 +94,14 @@ def words_below(words: Iterable[str]) -> tuple[str, ...]:
     Returns:
         The next labels, in the tree's order.
     """
-    asked = set(words)
-    reached = [path for path in _paths(VOCABULARY) if asked.issuperset(path[1:])]
+    requested = set(labels)
+    reached = [path for path in _iter_paths(VOCABULARY) if requested.issuperset(path[1:])]
     deepest = max((len(path) for path in reached), default=0)
-    offered = dict.fromkeys(word for path in reached if len(path) == deepest for word in _at(path))
-    return tuple(word for word in offered if word not in asked)
+    next_labels = dict.fromkeys(word for path in reached if len(path) == deepest for word in _find_branch(path))
+    return tuple(word for word in next_labels if word not in requested)
 
 
-def similar_words(word: str, known: Iterable[str], count: int = 3) -> tuple[str, ...]:
+def find_similar_labels(label: str, known: Iterable[str], count: int = 3) -> tuple[str, ...]:
     """Find the labels with the most similar spelling (edit distance), at most half of the letters different.
 
     Args:
@@ -111,11 +111,11 @@ def similar_words(word: str, known: Iterable[str], count: int = 3) -> tuple[str,
     Returns:
         The labels, nearest first.
     """
-    ranked = sorted((edit_distance(word, other), other) for other in set(known))
-    return tuple(other for distance, other in ranked[:count] if distance <= max(1, (len(word) + 1) // 2))
+    ranked = sorted((compute_edit_distance(label, other), other) for other in set(known))
+    return tuple(other for distance, other in ranked[:count] if distance <= max(1, (len(label) + 1) // 2))
 
 
-def edit_distance(a: str, b: str) -> int:
+def compute_edit_distance(a: str, b: str) -> int:
     """Count the letters to insert, delete or replace at least to turn `a` into `b` (Levenshtein distance).
 
     Args:
@@ -133,7 +133,7 @@ def edit_distance(a: str, b: str) -> int:
     return row[-1]
 
 
-def nearest(words: Iterable[str], choices: Iterable[Iterable[str]], count: int = 3) -> tuple[tuple[str, ...], ...]:
+def find_nearest_labels(labels: Iterable[str], choices: Iterable[Iterable[str]], count: int = 3) -> tuple[tuple[str, ...], ...]:
     """Find the label combinations nearest to the requested labels; equal sets count once.
 
     They are ordered by the requested labels that a combination lacks (a label that names the action, like "kick",
@@ -149,22 +149,22 @@ def nearest(words: Iterable[str], choices: Iterable[Iterable[str]], count: int =
     Returns:
         The combinations, best first.
     """
-    asked = frozenset(words)
+    requested = frozenset(labels)
     unique = {frozenset(choice): tuple(choice) for choice in map(tuple, choices)}
-    ranked = sorted(unique, key=lambda choice: (*_distance(asked, choice), _in_tree_order(choice)))
+    ranked = sorted(unique, key=lambda choice: (*_compute_distance(requested, choice), _rank_in_tree(choice)))
     return tuple(unique[choice] for choice in ranked[:count])
 
 
-def _distance(asked: frozenset[str], choice: frozenset[str]) -> tuple[int, int, int]:
+def _compute_distance(requested: frozenset[str], choice: frozenset[str]) -> tuple[int, int, int]:
     """Compute the sort key of a combination: weighted missing labels, related labels (negative), extra labels."""
-    missing = asked - choice
-    actions = asked & DISCRETE or asked & CONTINUOUS
-    kin = frozenset().union(*(relatives(word) for word in missing))
-    weight = len(missing) + len(asked) * len(missing & actions)
-    return weight, -len(kin & (choice - asked)), len(choice - asked)
+    missing = requested - choice
+    actions = requested & DISCRETE or requested & CONTINUOUS
+    related = frozenset().union(*(find_relatives(word) for word in missing))
+    weight = len(missing) + len(requested) * len(missing & actions)
+    return weight, -len(related & (choice - requested)), len(choice - requested)
 
 
-def spoken(words: Iterable[str]) -> tuple[str, ...]:
+def sort_labels(labels: Iterable[str]) -> tuple[str, ...]:
     """Sort labels into their usual order: action, side, manner, gait, direction.
 
     Args:
@@ -172,36 +172,36 @@ def spoken(words: Iterable[str]) -> tuple[str, ...]:
     Returns:
         The sorted labels.
     """
-    return _spoken(frozenset(words))
+    return _sort_labels(frozenset(labels))
 
 
 @lru_cache(maxsize=1024)
-def _spoken(words: frozenset[str]) -> tuple[str, ...]:
-    sides = [word for word in SIDES if word in words]
-    ways = [word for word in list_labels(group="way") if word in words]
-    actions = [word for _, word in _in_tree_order(words & DISCRETE)]
-    rest = [word for _, word in _in_tree_order(words - DISCRETE - {*sides, *ways})]
-    return (*actions, *sides, *rest, *ways) if actions else (*rest, *ways, *sides)
+def _sort_labels(labels: frozenset[str]) -> tuple[str, ...]:
+    sides = [word for word in SIDES if word in labels]
+    directions = [word for word in list_labels(group="way") if word in labels]
+    actions = [word for _, word in _rank_in_tree(labels & DISCRETE)]
+    rest = [word for _, word in _rank_in_tree(labels - DISCRETE - {*sides, *directions})]
+    return (*actions, *sides, *rest, *directions) if actions else (*rest, *directions, *sides)
 
 
-def _in_tree_order(words: frozenset[str]) -> list[tuple[int, str]]:
-    order = _tree_order()
-    return sorted((order.get(word, len(order)), word) for word in words)
+def _rank_in_tree(labels: frozenset[str]) -> list[tuple[int, str]]:
+    order = _build_tree_order()
+    return sorted((order.get(word, len(order)), word) for word in labels)
 
 
 @lru_cache(maxsize=1)
-def _tree_order() -> dict[str, int]:
-    return {word: place for place, word in enumerate(dict.fromkeys(path[-1] for path in _paths(VOCABULARY)))}
+def _build_tree_order() -> dict[str, int]:
+    return {word: place for place, word in enumerate(dict.fromkeys(path[-1] for path in _iter_paths(VOCABULARY)))}
 
 
-def _paths(tree: Mapping[str, dict], above: tuple[str, ...] = ()) -> Iterator[tuple[str, ...]]:
+def _iter_paths(tree: Mapping[str, dict], above: tuple[str, ...] = ()) -> Iterator[tuple[str, ...]]:
     """Iterate over every position of the tree as its path (kind, root, ..., label), parents first."""
     for word, below in tree.items():
         yield (*above, word)
-        yield from _paths(below, (*above, word))
+        yield from _iter_paths(below, (*above, word))
 
 
-def _at(path: tuple[str, ...]) -> Mapping[str, dict]:
+def _find_branch(path: tuple[str, ...]) -> Mapping[str, dict]:
     """Find the branch below the position `path`."""
     branch: Mapping[str, dict] = VOCABULARY
     for word in path:

@@ -13,11 +13,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..motion import quaternion
-from ..motion.humanoid import Humanoid, Limb, identify
+from ..motion.humanoid import Humanoid, Limb, identify_joints
 from ..motion.motion import Motion
-from ..motion.retargeting.adult import LEG
-from ..motion.retargeting.neutral import Neutral, neutral_stance, rests_upright
-from ..motion.skeleton import Skeleton, frozen_array
+from ..motion.retargeting.adult import ADULT_LEG
+from ..motion.retargeting.neutral import NeutralStance, build_neutral_stance, is_rest_upright
+from ..motion.skeleton import Skeleton, freeze_array
 
 MATERIALS = ("skin", "shirt", "shorts", "socks", "boots", "hair")
 SKIN, SHIRT, SHORTS, SOCKS, BOOTS, HAIR = range(6)
@@ -42,7 +42,7 @@ class BodyMesh:
     material: np.ndarray
 
 
-def low_poly_body(skeleton: Skeleton, height: float | None = None, example: Motion | None = None) -> BodyMesh:
+def build_body(skeleton: Skeleton, height: float | None = None, example: Motion | None = None) -> BodyMesh:
     """Build a player's body for a skeleton.
 
     The face looks ahead as in the rest pose if that stands upright.
@@ -58,30 +58,30 @@ def low_poly_body(skeleton: Skeleton, height: float | None = None, example: Moti
     Raises:
         InputError: if the skeleton has no hips or legs.
     """
-    neutral = neutral_stance(skeleton, example)
-    if example is not None and rests_upright(skeleton):
-        neutral = _level_head(neutral, neutral_stance(skeleton))
-    build = _Build(neutral, identify(skeleton), neutral.leg / LEG if height is None else height / 1.80)
-    build.torso()
-    build.head()
-    for side, limb in ((1.0, build.body.left), (-1.0, build.body.right)):
-        build.leg(limb)
-        build.boot(limb, side)
+    neutral = build_neutral_stance(skeleton, example)
+    if example is not None and is_rest_upright(skeleton):
+        neutral = _level_head(neutral, build_neutral_stance(skeleton))
+    builder = _BodyBuilder(neutral, identify_joints(skeleton), neutral.leg / ADULT_LEG if height is None else height / 1.80)
+    builder.add_torso()
+    builder.add_head()
+    for side, limb in ((1.0, builder.body.left), (-1.0, builder.body.right)):
+        builder.add_leg(limb)
+        builder.add_boot(limb, side)
         if None not in (limb.upper_arm, limb.lower_arm, limb.hand):
-            build.arm(limb)
-            build.hand(limb, side)
-    vertices, joints, weights = (np.concatenate(rows) for rows in (build.vertices, build.joints, build.weights))
+            builder.add_arm(limb)
+            builder.add_hand(limb, side)
+    vertices, joints, weights = (np.concatenate(rows) for rows in (builder.vertices, builder.joints, builder.weights))
     rest = _to_rest(neutral, vertices, joints, weights)
-    arrays = (frozen_array(rest), tuple(build.faces), frozen_array(joints, int), frozen_array(weights))
-    return BodyMesh(*arrays, frozen_array(build.material, int))
+    arrays = (freeze_array(rest), tuple(builder.faces), freeze_array(joints, int), freeze_array(weights))
+    return BodyMesh(*arrays, freeze_array(builder.material, int))
 
 
-def _level_head(neutral: Neutral, rest: Neutral) -> Neutral:
+def _level_head(neutral: NeutralStance, rest: NeutralStance) -> NeutralStance:
     """Give the stance the head of the rest pose, unless the example's people would then look up.
 
     A player who kicks or walks looks down at the ground ahead, but some suits have a bowed head in the rest pose.
     """
-    carrier = identify(neutral.skeleton).head_or_neck
+    carrier = identify_joints(neutral.skeleton).head_or_neck
     ahead = quaternion.multiply(neutral.rotations[carrier], quaternion.inverse(rest.rotations[carrier]))
     if quaternion.rotate(ahead, np.array([1.0, 0.0, 0.0]))[2] > 0.0:
         return neutral
@@ -90,7 +90,7 @@ def _level_head(neutral: Neutral, rest: Neutral) -> Neutral:
     return replace(neutral, rotations=rotations)
 
 
-def deformed(body: BodyMesh, skeleton: Skeleton, places: np.ndarray, world: np.ndarray) -> np.ndarray:
+def deform_body(body: BodyMesh, skeleton: Skeleton, positions: np.ndarray, rotations: np.ndarray) -> np.ndarray:
     """Deform the body by linear blend skinning, like Blender's armature modifier without volume preservation.
 
     Args:
@@ -102,28 +102,28 @@ def deformed(body: BodyMesh, skeleton: Skeleton, places: np.ndarray, world: np.n
         (..., V, 3) m, world frame.
     """
     origin = skeleton.rest_positions
-    out = np.zeros((*places.shape[:-2], len(body.vertices), 3))
+    out = np.zeros((*positions.shape[:-2], len(body.vertices), 3))
     for column in range(2):
         joint = body.joints[:, column]
-        moved = quaternion.rotate(world[..., joint, :], body.vertices - origin[joint]) + places[..., joint, :]
+        moved = quaternion.rotate(rotations[..., joint, :], body.vertices - origin[joint]) + positions[..., joint, :]
         out += body.weights[:, column, None] * moved
     return out
 
 
-def _to_rest(neutral: Neutral, vertices: np.ndarray, joints: np.ndarray, weights: np.ndarray) -> np.ndarray:
+def _to_rest(neutral: NeutralStance, vertices: np.ndarray, joints: np.ndarray, weights: np.ndarray) -> np.ndarray:
     """Compute the rest positions (V, 3) of vertices (V, 3) given in the neutral stance: inverse blend skinning."""
     origin = neutral.skeleton.rest_positions
-    turn = quaternion.to_matrix(neutral.rotations)
-    shift = neutral.positions - np.einsum("jab,jb->ja", turn, origin)
-    matrix = np.einsum("vc,vcab->vab", weights, turn[joints])
-    torn = np.abs(np.linalg.det(matrix)) < 0.2  # joints rotated in opposite directions: use the first alone
-    matrix[torn] = turn[joints[torn, 0]]
+    rotations = quaternion.to_matrix(neutral.rotations)
+    shift = neutral.positions - np.einsum("jab,jb->ja", rotations, origin)
+    matrix = np.einsum("vc,vcab->vab", weights, rotations[joints])
+    is_degenerate = np.abs(np.linalg.det(matrix)) < 0.2  # joints rotated in opposite directions: use the first alone
+    matrix[is_degenerate] = rotations[joints[is_degenerate, 0]]
     offset = np.einsum("vc,vca->va", weights, shift[joints])
-    offset[torn] = shift[joints[torn, 0]]
+    offset[is_degenerate] = shift[joints[is_degenerate, 0]]
     return np.linalg.solve(matrix, (vertices - offset)[..., None])[..., 0]
 
 
-class _Build:
+class _BodyBuilder:
     """Collects the parts of the body.
 
     Its tables are in metres for a stature of 1.80 m; `scale` adapts them to the skeleton.
@@ -136,17 +136,17 @@ class _Build:
         faces, material: faces and their materials.
     """
 
-    def __init__(self, neutral: Neutral, body: Humanoid, scale: float):
+    def __init__(self, neutral: NeutralStance, body: Humanoid, scale: float):
         self.neutral, self.body, self.scale = neutral, body, scale
         self.vertices, self.joints, self.weights = [], [], []
         self.faces: list[tuple[int, ...]] = []
         self.material: list[int] = []
 
-    def at(self, joint: int) -> np.ndarray:
+    def joint_position(self, joint: int) -> np.ndarray:
         """Return a joint's position (3,) m in the neutral stance."""
         return self.neutral.positions[joint]
 
-    def tube(self, rings, follows, materials, sides: int = 12, across=((1.0, 0, 0), (0, 1.0, 0))) -> None:
+    def add_tube(self, rings, follows, materials, sides: int = 12, across=((1.0, 0, 0), (0, 1.0, 0))) -> None:
         """Add a closed tube.
 
         Args:
@@ -170,9 +170,9 @@ class _Build:
         shares = np.array([(1.0 - f[2], f[2]) for f in follows])
         self.joints.append(np.concatenate([np.repeat(pairs, sides, axis=0), pairs[[0, -1]]]))
         self.weights.append(np.concatenate([np.repeat(shares, sides, axis=0), shares[[0, -1]]]))
-        self._skin(start, len(rings), sides, materials, np.dot(np.cross(first, second), top - bottom) > 0)
+        self._add_faces(start, len(rings), sides, materials, np.dot(np.cross(first, second), top - bottom) > 0)
 
-    def _skin(self, start: int, count: int, sides: int, materials, outward: bool) -> None:
+    def _add_faces(self, start: int, count: int, sides: int, materials, outward: bool) -> None:
         """Add the faces of a tube: quads between rings, triangles at both caps."""
         index = start + np.arange(count * sides).reshape(count, sides)
         low, high = start + count * sides, start + count * sides + 1
@@ -189,7 +189,7 @@ class _Build:
                 self.faces.append(tuple(int(v) for v in (face if outward else face[::-1])))
                 self.material.append(material)
 
-    def ball(self, centre, radii, joint: int, material: int, other: int | None = None, sides: int = 10) -> None:
+    def add_ellipsoid(self, centre, radii, joint: int, material: int, other: int | None = None, sides: int = 10) -> None:
         """Add a closed ellipsoid.
 
         Args:
@@ -205,12 +205,12 @@ class _Build:
             for a in np.radians([25, 55, 90, 125, 155])
         ]
         follow = (joint, joint, 0.0) if other is None else (joint, other, 0.5)
-        self.tube(rings, [follow] * 5, [material] * 4, sides)
+        self.add_tube(rings, [follow] * 5, [material] * 4, sides)
 
     # -- trunk and head
     # -------------------------------------------------------------------------------------------------
 
-    def spine_follow(self, height: float) -> tuple[int, int, float]:
+    def find_spine_joints(self, height: float) -> tuple[int, int, float]:
         """Find which two joints of the spine a ring follows: half and half at a joint, one joint between.
 
         Args:
@@ -220,19 +220,19 @@ class _Build:
         """
         chain = [self.body.hips]
         for joint in self.body.spine:
-            if self.at(joint)[2] > self.at(chain[-1])[2] + 0.02:
+            if self.joint_position(joint)[2] > self.joint_position(chain[-1])[2] + 0.02:
                 chain.append(joint)
-        levels = np.array([self.at(j)[2] for j in chain[1:]])
-        position = np.interp(height, *_half_way(levels)) if len(levels) else 0.0
+        levels = np.array([self.joint_position(j)[2] for j in chain[1:]])
+        position = np.interp(height, *_compute_midpoints(levels)) if len(levels) else 0.0
         low = int(np.clip(np.floor(position), 0, max(len(chain) - 2, 0)))
         high = min(low + 1, len(chain) - 1)
         return chain[low], chain[high], float(np.clip(position - low, 0.0, 1.0))
 
-    def torso(self) -> None:
+    def add_torso(self) -> None:
         """Add shirt and shorts of the trunk."""
         body, k = self.body, self.scale
-        hip = 0.5 * (self.at(body.left.upper_leg) + self.at(body.right.upper_leg))
-        top, half = self._shoulders(hip)
+        hip = 0.5 * (self.joint_position(body.left.upper_leg) + self.joint_position(body.right.upper_leg))
+        top, half = self._find_shoulders(hip)
         # share of the distance from hip joints to shoulder joints, forward shift, half depth, half width
         shirt = (
             (0.13, 0.000, 0.112, 0.158), (0.22, 0.002, 0.112, 0.156), (0.36, 0.006, 0.107, 0.146),
@@ -240,51 +240,51 @@ class _Build:
             (0.92, -0.006, 0.114, 0.182), (1.00, -0.010, 0.094, 0.180), (1.055, -0.014, 0.080, 0.150),
             (1.10, -0.016, 0.070, 0.104), (1.145, -0.016, 0.060, 0.068),
         )
-        self._trunk_rings(hip, top, shirt, SHIRT, half / (0.164 * k))
+        self._add_trunk_tube(hip, top, shirt, SHIRT, half / (0.164 * k))
         shorts = (
             (-0.17, 0.0, 0.05, 0.06), (-0.14, 0.0, 0.092, 0.118), (-0.06, -0.004, 0.116, 0.158),
             (0.03, -0.006, 0.122, 0.168), (0.12, -0.002, 0.116, 0.162), (0.205, 0.0, 0.108, 0.152),
         )
-        self._trunk_rings(hip, top, shorts, SHORTS, 1.0)
+        self._add_trunk_tube(hip, top, shorts, SHORTS, 1.0)
 
-    def _shoulders(self, hip: np.ndarray) -> tuple[np.ndarray, float]:
+    def _find_shoulders(self, hip: np.ndarray) -> tuple[np.ndarray, float]:
         """Find the middle of the shoulder joints and half their distance; estimated from the hips without arms."""
         arms = [limb.upper_arm for limb in (self.body.left, self.body.right)]
         if None in arms:
             return hip + np.array([0.0, 0.0, 0.56 * self.scale]), 0.164 * self.scale
-        left, right = self.at(arms[0]), self.at(arms[1])
+        left, right = self.joint_position(arms[0]), self.joint_position(arms[1])
         middle = 0.5 * (left + right)
         return middle, 0.5 * abs(left[1] - right[1])
 
-    def _trunk_rings(self, hip, top, table, material: int, widen: float) -> None:
+    def _add_trunk_tube(self, hip, top, table, material: int, widen: float) -> None:
         """Add a tube around the trunk; `widen` scales the upper rings to the shoulders' width."""
         rings, follows = [], []
         for share, ahead, depth, width in table:
             upper = max(share - 0.5, 0.0) / 0.5
             centre = hip + share * (top - hip) + np.array([ahead * self.scale, 0.0, 0.0])
             rings.append((centre, depth, width * (1.0 + upper * (widen - 1.0) * (share < 1.05))))
-            follows.append(self.spine_follow(centre[2]))
-        self.tube(rings, follows, [material] * (len(rings) - 1), 16)
+            follows.append(self.find_spine_joints(centre[2]))
+        self.add_tube(rings, follows, [material] * (len(rings) - 1), 16)
 
-    def head(self) -> None:
+    def add_head(self) -> None:
         """Add neck, head and face."""
         body, k = self.body, self.scale
-        hip = 0.5 * (self.at(body.left.upper_leg) + self.at(body.right.upper_leg))
-        shoulder, _ = self._shoulders(hip)
+        hip = 0.5 * (self.joint_position(body.left.upper_leg) + self.joint_position(body.right.upper_leg))
+        shoulder, _ = self._find_shoulders(hip)
         carrier = body.head_or_neck
         neck = body.neck_or_chest
-        base = self.at(carrier) if body.head is not None else shoulder + k * np.array([0.03, 0.0, 0.15])
+        base = self.joint_position(carrier) if body.head is not None else shoulder + k * np.array([0.03, 0.0, 0.15])
         low = shoulder + k * np.array([-0.012, 0.0, 0.03])
         rings = [(low, 0.066, 0.072)]
         rings += [(low + share * (base - low), *girth) for share, *girth in ((0.45, 0.056, 0.058), (0.8, 0.054, 0.054))]
         rings += [(base + k * np.array([0.0, 0.0, 0.03]), 0.052, 0.052)]
-        self.tube(
+        self.add_tube(
             rings, [(body.chest, neck, 0.2), (neck, neck, 0), (neck, carrier, 0.5), (carrier, carrier, 0)], [SKIN] * 3,
             12,
         )
-        self._face(base, carrier)
+        self._add_face_parts(base, carrier)
 
-    def _face(self, base: np.ndarray, joint: int) -> None:
+    def _add_face_parts(self, base: np.ndarray, joint: int) -> None:
         """Add skull, hair, nose, ears, eyes and brows."""
         k = self.scale
         # above the base of the skull, forward, half depth, half width
@@ -300,17 +300,17 @@ class _Build:
         )
         for table, material in ((skull, SKIN), (hair, HAIR)):
             rings = [(base + k * np.array([ahead, 0.0, up]), depth, width) for up, ahead, depth, width in table]
-            self.tube(rings, [(joint, joint, 0.0)] * len(rings), [material] * (len(rings) - 1), 14)
-        self.ball(base + k * np.array([0.112, 0.0, 0.016]), (0.017, 0.011, 0.020), joint, SKIN, sides=6)
+            self.add_tube(rings, [(joint, joint, 0.0)] * len(rings), [material] * (len(rings) - 1), 14)
+        self.add_ellipsoid(base + k * np.array([0.112, 0.0, 0.016]), (0.017, 0.011, 0.020), joint, SKIN, sides=6)
         for side in (1.0, -1.0):
-            self.ball(base + k * np.array([0.010, side * 0.073, 0.022]), (0.016, 0.009, 0.026), joint, SKIN, sides=6)
-            self.ball(base + k * np.array([0.0975, side * 0.028, 0.042]), (0.008, 0.011, 0.006), joint, HAIR, sides=6)
-            self.ball(base + k * np.array([0.0985, side * 0.029, 0.061]), (0.007, 0.017, 0.0045), joint, HAIR, sides=6)
+            self.add_ellipsoid(base + k * np.array([0.010, side * 0.073, 0.022]), (0.016, 0.009, 0.026), joint, SKIN, sides=6)
+            self.add_ellipsoid(base + k * np.array([0.0975, side * 0.028, 0.042]), (0.008, 0.011, 0.006), joint, HAIR, sides=6)
+            self.add_ellipsoid(base + k * np.array([0.0985, side * 0.029, 0.061]), (0.007, 0.017, 0.0045), joint, HAIR, sides=6)
 
     # -- limbs
     # ----------------------------------------------------------------------------------------------------------
 
-    def limb_tube(self, upper: int, lower: int, end: int, table, sides: int) -> None:
+    def add_limb_tube(self, upper: int, lower: int, end: int, table, sides: int) -> None:
         """Add a tube along two bones.
 
         Args:
@@ -320,17 +320,17 @@ class _Build:
                 1 to 2 down the lower one. Rings near the middle joint follow both bones, the last ones the lower bone.
             sides: vertices per ring.
         """
-        a, b, c = self.at(upper), self.at(lower), self.at(end)
+        a, b, c = self.joint_position(upper), self.joint_position(lower), self.joint_position(end)
         rings, follows = [], []
         for place, ahead, left, first, second, _ in table:
             centre = a + (b - a) * min(place, 1.0) + (c - b) * max(place - 1.0, 0.0)
             rings.append((centre + self.scale * np.array([ahead, left, 0.0]), first, second))
             follows.append((upper, lower, float(np.clip(0.5 + (place - 1.0) / 0.34, 0.0, 1.0))))
-        self.tube(rings, follows, [row[-1] for row in table[:-1]], sides)
+        self.add_tube(rings, follows, [row[-1] for row in table[:-1]], sides)
 
-    def leg(self, limb: Limb) -> None:
+    def add_leg(self, limb: Limb) -> None:
         """Add leg, knee, ankle and the leg of the shorts."""
-        inner = -np.sign(self.at(limb.upper_leg)[1])
+        inner = -np.sign(self.joint_position(limb.upper_leg)[1])
         bones = limb.upper_leg, limb.lower_leg, limb.foot
         table = (
             (0.16, 0.004, 0.0, 0.082, 0.076, SKIN), (0.40, 0.006, 0.0, 0.079, 0.073, SKIN),
@@ -342,23 +342,23 @@ class _Build:
             (1.65, -0.004, 0.0, 0.044, 0.041, SOCKS), (1.84, 0.0, 0.0, 0.037, 0.034, SOCKS),
             (1.96, 0.002, 0.0, 0.038, 0.034, SOCKS), (2.03, 0.002, 0.0, 0.030, 0.026, SOCKS),
         )
-        self.limb_tube(*bones, table, 12)
-        self.ball(
-            self.at(limb.lower_leg) + self.scale * np.array([0.006, 0, 0]), (0.054, 0.050, 0.056), bones[0], SKIN,
+        self.add_limb_tube(*bones, table, 12)
+        self.add_ellipsoid(
+            self.joint_position(limb.lower_leg) + self.scale * np.array([0.006, 0, 0]), (0.054, 0.050, 0.056), bones[0], SKIN,
             bones[1],
         )
-        self.ball(self.at(limb.foot), (0.039, 0.036, 0.042), limb.foot, SOCKS)
+        self.add_ellipsoid(self.joint_position(limb.foot), (0.039, 0.036, 0.042), limb.foot, SOCKS)
         shorts = (
             (-0.17, 0.0, 0.0, 0.030, 0.030, SHORTS), (-0.13, 0.0, 0.0, 0.075, 0.068, SHORTS),
             (-0.04, 0.0, 0.0, 0.100, 0.086, SHORTS), (0.10, 0.004, 0.0, 0.104, 0.088, SHORTS),
             (0.36, 0.006, 0.0, 0.103, 0.093, SHORTS), (0.52, 0.006, 0.0, 0.105, 0.098, SHORTS),
             (0.525, 0.006, 0.0, 0.088, 0.083, SHORTS), (0.44, 0.006, 0.0, 0.050, 0.050, SHORTS),
         )
-        self.limb_tube(*bones, shorts, 12)
+        self.add_limb_tube(*bones, shorts, 12)
 
-    def boot(self, limb: Limb, side: float) -> None:
+    def add_boot(self, limb: Limb, side: float) -> None:
         """Add the boot."""
-        ankle, k = self.at(limb.foot), self.scale
+        ankle, k = self.joint_position(limb.foot), self.scale
         ball = self.neutral.ball[0 if side > 0 else 1]
         floor = ankle[2] - self.neutral.ankle_height
         toe = limb.toe if limb.toe is not None else limb.foot
@@ -377,11 +377,11 @@ class _Build:
                 x = min(x, ankle[0] + 0.72 * ball[0])
             rings.append((np.array([x, ankle[1] + side * 0.004 * k, floor + k * up]), wide, high))
             follows.append((limb.foot, toe, float(share)))
-        self.tube(rings, follows, [BOOTS] * (len(rings) - 1), 10, ((0.0, 1.0, 0.0), (0.0, 0.0, 1.0)))
+        self.add_tube(rings, follows, [BOOTS] * (len(rings) - 1), 10, ((0.0, 1.0, 0.0), (0.0, 0.0, 1.0)))
 
-    def arm(self, limb: Limb) -> None:
+    def add_arm(self, limb: Limb) -> None:
         """Add arm, elbow and sleeve."""
-        inner = -np.sign(self.at(limb.upper_arm)[1])
+        inner = -np.sign(self.joint_position(limb.upper_arm)[1])
         bones = limb.upper_arm, limb.lower_arm, limb.hand
         table = (
             (0.30, 0.0, 0.0, 0.046, 0.044, SKIN), (0.55, 0.003, 0.0, 0.046, 0.043, SKIN),
@@ -391,9 +391,9 @@ class _Build:
             (1.65, 0.001, 0.0, 0.032, 0.028, SKIN), (1.90, 0.0, 0.0, 0.028, 0.022, SKIN),
             (2.04, 0.0, 0.0, 0.026, 0.020, SKIN),
         )
-        self.limb_tube(*bones, table, 10)
-        self.ball(
-            self.at(limb.lower_arm) - self.scale * np.array([0.003, 0, 0]), (0.038, 0.036, 0.04), bones[0], SKIN,
+        self.add_limb_tube(*bones, table, 10)
+        self.add_ellipsoid(
+            self.joint_position(limb.lower_arm) - self.scale * np.array([0.003, 0, 0]), (0.038, 0.036, 0.04), bones[0], SKIN,
             bones[1],
         )
         sleeve = (
@@ -402,11 +402,11 @@ class _Build:
             (0.30, 0.0, 0.0, 0.065, 0.059, SHIRT), (0.56, 0.0, 0.0, 0.066, 0.062, SHIRT),
             (0.565, 0.0, 0.0, 0.054, 0.052, SHIRT), (0.48, 0.0, 0.0, 0.030, 0.030, SHIRT),
         )
-        self.limb_tube(*bones, sleeve, 12)
+        self.add_limb_tube(*bones, sleeve, 12)
 
-    def hand(self, limb: Limb, side: float) -> None:
+    def add_hand(self, limb: Limb, side: float) -> None:
         """Add hand and thumb."""
-        wrist, k, joint = self.at(limb.hand), self.scale, limb.hand
+        wrist, k, joint = self.joint_position(limb.hand), self.scale, limb.hand
         # below the wrist, towards the palm, forward, half width of the palm, half thickness
         table = (
             (-0.022, 0.0, 0.0, 0.024, 0.019), (0.010, 0.0, 0.0, 0.031, 0.018), (0.050, 0.002, 0.002, 0.042, 0.019),
@@ -417,7 +417,7 @@ class _Build:
             (wrist + k * np.array([ahead, -side * palm, -down]), wide, thick)
             for down, palm, ahead, wide, thick in table
         ]
-        self.tube(rings, [(joint, joint, 0.0)] * len(rings), [SKIN] * (len(rings) - 1), 10)
+        self.add_tube(rings, [(joint, joint, 0.0)] * len(rings), [SKIN] * (len(rings) - 1), 10)
         thumb = (
             (0.030, 0.004, 0.026, 0.016, 0.014), (0.058, 0.012, 0.046, 0.014, 0.013),
             (0.084, 0.022, 0.054, 0.011, 0.011), (0.096, 0.026, 0.055, 0.006, 0.006),
@@ -426,10 +426,10 @@ class _Build:
             (wrist + k * np.array([ahead, -side * palm, -down]), wide, thick)
             for down, palm, ahead, wide, thick in thumb
         ]
-        self.tube(rings, [(joint, joint, 0.0)] * len(rings), [SKIN] * (len(rings) - 1), 8)
+        self.add_tube(rings, [(joint, joint, 0.0)] * len(rings), [SKIN] * (len(rings) - 1), 8)
 
 
-def _half_way(levels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _compute_midpoints(levels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Compute heights and positions in a chain such that a joint's height is half way between it and the one below it.
     """
     middles = 0.5 * (levels[1:] + levels[:-1])

@@ -9,21 +9,21 @@ from __future__ import annotations
 import numpy as np
 
 from ..base.vectors import unit_vectors
-from ..motion.humanoid import heading_from_positions
-from ..motion.motion import Motion, forward_kinematics, place
-from .body import MATERIALS, deformed, low_poly_body
+from ..motion.humanoid import compute_heading_from_positions
+from ..motion.motion import Motion, forward_kinematics, place_motion
+from .body import MATERIALS, deform_body, build_body
 
 COLOURS = {
     "skin": (0.75, 0.55, 0.43), "shirt": (0.78, 0.16, 0.14), "shorts": (0.92, 0.92, 0.90), "socks": (0.16, 0.24, 0.59),
     "boots": (0.12, 0.12, 0.13), "hair": (0.16, 0.11, 0.09),
 }
 _SUN = np.array([0.35, -0.45, 0.82])
-_ROUND, _DOWN = np.radians(-50.0), np.radians(12.0)  # angle from the body's front to the camera; downward tilt
+_AZIMUTH, _TILT = np.radians(-50.0), np.radians(12.0)  # angle from the body's front to the camera; downward tilt
 _MARGIN = 0.06  # share of the picture's side
 _SHADOW = (0.0, 0.0, 0.0, 0.30)
 
 
-def pose_picture(motion: Motion, frame: int, size: int = 256) -> np.ndarray:
+def render_pose(motion: Motion, frame: int, size: int = 256) -> np.ndarray:
     """Render the body at one frame, seen from its front right, as large as fits.
 
     Args:
@@ -35,67 +35,67 @@ def pose_picture(motion: Motion, frame: int, size: int = 256) -> np.ndarray:
     Raises:
         InputError: if the skeleton has no legs.
     """
-    one = motion.frames(frame, frame + 1)
-    one = place(one, -float(heading_from_positions(motion.skeleton, forward_kinematics(one)[0])[0]))
-    places, world = forward_kinematics(one)
-    body = low_poly_body(motion.skeleton, example=motion)
-    skin = deformed(body, motion.skeleton, places, world)[0]
-    across, up, away = _camera()
+    pose = motion.frames(frame, frame + 1)
+    pose = place_motion(pose, -float(compute_heading_from_positions(motion.skeleton, forward_kinematics(pose)[0])[0]))
+    positions, rotations = forward_kinematics(pose)
+    body = build_body(motion.skeleton, example=motion)
+    skin = deform_body(body, motion.skeleton, positions, rotations)[0]
+    across, up, to_camera = _build_camera()
     # The shadow: each vertex projected along the sun's direction to the height of the lowest one.
-    shade = skin - (skin[:, 2:] - skin[:, 2].min()) * (_SUN / _SUN[2])
-    both = np.concatenate([skin, shade])
-    flat = np.stack([both @ across, both @ up], axis=1)
-    span = float(np.ptp(flat, axis=0).max())
-    wide = 2 * size
-    flat = (flat - flat.min(axis=0) - 0.5 * np.ptp(flat, axis=0)) * (wide * (1.0 - 2.0 * _MARGIN) / span) + 0.5 * wide
+    shadow = skin - (skin[:, 2:] - skin[:, 2].min()) * (_SUN / _SUN[2])
+    both = np.concatenate([skin, shadow])
+    pixels = np.stack([both @ across, both @ up], axis=1)
+    span = float(np.ptp(pixels, axis=0).max())
+    canvas_size = 2 * size
+    pixels = (pixels - pixels.min(axis=0) - 0.5 * np.ptp(pixels, axis=0)) * (canvas_size * (1.0 - 2.0 * _MARGIN) / span) + 0.5 * canvas_size
     quads = np.array([face if len(face) == 4 else (*face, face[-1]) for face in body.faces])
-    canvas = np.zeros((wide, wide, 4))
-    _draw_faces(canvas, skin, flat, quads=quads, material=np.asarray(body.material), away=away)
-    return _averaged(canvas, size)
+    canvas = np.zeros((canvas_size, canvas_size, 4))
+    _draw_faces(canvas, skin, pixels, quads=quads, material=np.asarray(body.material), to_camera=to_camera)
+    return _downsample(canvas, size)
 
 
-def _camera() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _build_camera() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Build the picture's right, its up, and the direction from the body to the camera: unit vectors (3,)."""
-    away = np.array([np.cos(_ROUND) * np.cos(_DOWN), np.sin(_ROUND) * np.cos(_DOWN), np.sin(_DOWN)])
-    across = np.array([-np.sin(_ROUND), np.cos(_ROUND), 0.0])
+    away = np.array([np.cos(_AZIMUTH) * np.cos(_TILT), np.sin(_AZIMUTH) * np.cos(_TILT), np.sin(_TILT)])
+    across = np.array([-np.sin(_AZIMUTH), np.cos(_AZIMUTH), 0.0])
     return across, np.cross(away, across), away
 
 
-def _draw_faces(canvas, skin, flat, quads, material, away) -> None:
+def _draw_faces(canvas, skin, pixels, quads, material, to_camera) -> None:
     """Draw the shadow of the faces towards the sun, then the faces towards the camera, the farthest first.
 
     flat: (2 V, 2) pixels of the V vertices, then of their shadows.
     """
     corners = skin[quads]
     normal = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
-    normal = unit_vectors(normal, least=1e-12)
+    normal = unit_vectors(normal, min_length=1e-12)
     light = normal @ (_SUN / np.linalg.norm(_SUN))
     colour = (
         np.array([COLOURS[part] for part in MATERIALS])[material] * (0.55 + 0.45 * np.maximum(light, -0.5))[:, None]
     )
     lit = quads[light > 0.0] + len(skin)
-    _fill(canvas, flat[lit], np.tile(_SHADOW, (len(lit), 1)))
-    seen = np.flatnonzero(normal @ away > 0.0)
-    seen = seen[np.argsort((corners[seen] @ away).mean(axis=1))]
-    _fill(canvas, flat[quads[seen]], np.pad(colour[seen], ((0, 0), (0, 1)), constant_values=1.0))
+    _fill_polygons(canvas, pixels[lit], np.tile(_SHADOW, (len(lit), 1)))
+    visible = np.flatnonzero(normal @ to_camera > 0.0)
+    visible = visible[np.argsort((corners[visible] @ to_camera).mean(axis=1))]
+    _fill_polygons(canvas, pixels[quads[visible]], np.pad(colour[visible], ((0, 0), (0, 1)), constant_values=1.0))
 
 
-def _fill(canvas: np.ndarray, corners: np.ndarray, colours: np.ndarray) -> None:
+def _fill_polygons(canvas: np.ndarray, corners: np.ndarray, colours: np.ndarray) -> None:
     """Fill convex polygons (F, 4, 2) pixels one after the other with colours (F, 4), which replace the pixels below."""
     low = np.clip(np.floor(corners.min(axis=1)).astype(int), 0, len(canvas))
     high = np.clip(np.ceil(corners.max(axis=1)).astype(int) + 1, 0, len(canvas))
-    onward = np.roll(corners, -1, axis=1) - corners
-    area = np.sum(corners[..., 0] * onward[..., 1] - corners[..., 1] * onward[..., 0], axis=1)
+    edges_along = np.roll(corners, -1, axis=1) - corners
+    area = np.sum(corners[..., 0] * edges_along[..., 1] - corners[..., 1] * edges_along[..., 0], axis=1)
     # Orient all polygons the same way: a pixel is inside if it is on the inner side of every edge.
-    onward = onward * np.where(area < 0.0, -1.0, 1.0)[:, None, None]
-    ahead = onward[..., 0] * corners[..., 1] - onward[..., 1] * corners[..., 0]
+    edges_along = edges_along * np.where(area < 0.0, -1.0, 1.0)[:, None, None]
+    ahead = edges_along[..., 0] * corners[..., 1] - edges_along[..., 1] * corners[..., 0]
     pixel = np.arange(len(canvas)) + 0.5
-    for (x, y), (right, top), edges, offset, colour in zip(low.tolist(), high.tolist(), onward, ahead, colours):
+    for (x, y), (right, top), edges, offset, colour in zip(low.tolist(), high.tolist(), edges_along, ahead, colours):
         side = edges[:, :1, None] * pixel[None, y:top, None] - edges[:, 1:, None] * pixel[None, None, x:right]
         canvas[y:top, x:right][(side >= offset[:, None, None] - 1e-9).all(axis=0)] = colour
 
 
-def _averaged(canvas: np.ndarray, size: int) -> np.ndarray:
+def _downsample(canvas: np.ndarray, size: int) -> np.ndarray:
     """Average four pixels to one, colours weighted by their alpha."""
     four = canvas.reshape(size, 2, size, 2, 4)
     alpha = four[..., 3:].mean(axis=(1, 3))

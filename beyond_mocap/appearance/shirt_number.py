@@ -7,18 +7,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.errors import InputError
-from ..base.vectors import cross_level
+from ..base.vectors import cross_on_ground
 from ..motion.motion import Motion
-from ..motion.retargeting.neutral import neutral_stance
-from ..motion.skeleton import Skeleton, frozen_array
-from .body import SHIRT, BodyMesh, deformed
+from ..motion.retargeting.neutral import build_neutral_stance
+from ..motion.skeleton import Skeleton, freeze_array
+from .body import SHIRT, BodyMesh, deform_body
 
 _ABOVE = 0.004  # metres of the drawing above the cloth: more than coarse rings dip while they bend
 _MIDDLE = {"back": 0.70, "chest": 0.74}  # height of the drawing's middle as a share of the shirt's height from its hem
 
 
 @dataclass(frozen=True, eq=False)
-class OnShirt:
+class ShirtDecal:
     """Points on a shirt, in the skeleton's rest pose.
 
     Attributes:
@@ -32,9 +32,9 @@ class OnShirt:
     weights: np.ndarray
 
 
-def on_shirt(
+def place_on_shirt(
     body: BodyMesh, skeleton: Skeleton, points: np.ndarray, side: str = "back", example: Motion | None = None
-) -> OnShirt:
+) -> ShirtDecal:
     """Place the points of a drawing on a shirt.
 
     Each point takes position and weights of the triangle of cloth behind it, so it stays on the shirt in every pose.
@@ -51,27 +51,27 @@ def on_shirt(
     Raises:
         InputError: if the body has no shirt.
     """
-    neutral = neutral_stance(skeleton, example)
-    standing = deformed(body, skeleton, neutral.positions, neutral.rotations)
+    neutral = build_neutral_stance(skeleton, example)
+    standing = deform_body(body, skeleton, neutral.positions, neutral.rotations)
     outward = 1.0 if side == "chest" else -1.0
-    triangles = _cloth(body, standing, outward)
+    triangles = _find_cloth(body, standing, outward)
     if not len(triangles):
         raise InputError("body", "it has no shirt", "a body with a shirt", "build it with build_body")
     low, high = np.min(standing[triangles][..., 2]), np.max(standing[triangles][..., 2])
     across = outward * np.asarray(points)[:, 0] + np.mean(standing[triangles][..., 1])
     up = np.asarray(points)[:, 1] + low + _MIDDLE[side] * (high - low)
-    chosen, share = _behind(standing[triangles][..., 1:], np.column_stack([across, up]))
-    corners = triangles[chosen]
+    triangle_index, share = _find_triangles(standing[triangles][..., 1:], np.column_stack([across, up]))
+    corners = triangles[triangle_index]
     at_rest = np.einsum("nk,nkc->nc", share, body.vertices[corners])
     edges = body.vertices[corners[:, 1:]] - body.vertices[corners[:, :1]]
     normal = np.cross(edges[:, 0], edges[:, 1])
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     weights = (share[:, :, None] * body.weights[corners]).reshape(len(corners), -1)
     joints = body.joints[corners].reshape(len(corners), -1)
-    return OnShirt(frozen_array(at_rest + _ABOVE * normal), frozen_array(joints, int), frozen_array(weights))
+    return ShirtDecal(freeze_array(at_rest + _ABOVE * normal), freeze_array(joints, int), freeze_array(weights))
 
 
-def _cloth(body: BodyMesh, standing: np.ndarray, outward: float) -> np.ndarray:
+def _find_cloth(body: BodyMesh, standing: np.ndarray, outward: float) -> np.ndarray:
     """Find the triangles (K, 3) of the trunk's shirt that face `outward` along X.
 
     standing: (V, 3) m, the vertices in the neutral stance.
@@ -87,14 +87,14 @@ def _cloth(body: BodyMesh, standing: np.ndarray, outward: float) -> np.ndarray:
     return triangles[trunk & (outward * normal[:, 0] > 0.2 * size) & (size > 1e-9)]
 
 
-def _behind(flat: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _find_triangles(flat: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Find for points (N, 2) the triangle of (K, 3, 2) that contains each or is nearest, and barycentric weights (N,
     3)."""
     origin, first, second = flat[:, 0], flat[:, 1] - flat[:, 0], flat[:, 2] - flat[:, 0]
-    area = cross_level(first, second)
-    away = points[:, None] - origin
-    b = cross_level(away, second) / area
-    c = cross_level(first, away) / area
+    area = cross_on_ground(first, second)
+    offset = points[:, None] - origin
+    b = cross_on_ground(offset, second) / area
+    c = cross_on_ground(first, offset) / area
     shares = np.stack([1.0 - b - c, b, c], axis=-1)
     chosen = np.argmax(shares.min(axis=-1), axis=1)
     share = np.clip(shares[np.arange(len(points)), chosen], 0.0, None)

@@ -19,35 +19,35 @@ import numpy as np
 from ..base.errors import InputError
 from ..base.vectors import arctan2
 from . import batch
-from .physics import Ball, length
+from .physics import Ball, vector_length
 
-CLOSE = 0.01
+HIT_TOLERANCE = 0.01
 """m: a miss up to this counts as a hit."""
-NEARLY = 1e-3
+RETRY_TOLERANCE = 1e-3
 """m: with a larger miss the next kind of initial guess is tried."""
-EXACT = 1e-4
+CONVERGED_TOLERANCE = 1e-4
 """m: the miss at which the iteration stops."""
-ROUNDS = 14
+MAX_ITERATIONS = 14
 LONGEST_STEP = 15.0
 """m/s: the largest change of a launch in one step."""
-HEIGHTS = 20
+UPWARD_SAMPLES = 20
 """Number of upward launch speeds that are tried for a first guess."""
-TIMES = np.geomspace(0.1, 6.0, 40)
+FREE_TIMES = np.geomspace(0.1, 6.0, 40)
 """s: flight times that are tried where the time is free."""
-FASTEST_TRIED = 200.0
+MAX_INITIAL_SPEED = 200.0
 """m/s: the highest launch speed an iteration starts from."""
-ELSE = (1.06, 0.94, 1.15, 0.85)
+FALLBACK_TIME_SHARES = (1.06, 0.94, 1.15, 0.85)
 """Shares of the time with the slowest launch that are tried where the ball's own physics does not allow that time: it
 is at the limit of what is possible, where a rebound just reaches the target's height."""
-JUST_NOW = 5e-3
+REBOUND_MARGIN = 5e-3
 """s: the least time since the last bounce. Without it, a ball on the ground at its target would count its first touch
 of the ground as a bounce."""
-NUDGE = 1e-3
+DIFFERENCE_STEP = 1e-3
 """m/s: by how much a launch is varied for finite differences."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Aimed:
+class AimResult:
     """Launches for B targets.
 
     Attributes:
@@ -65,9 +65,9 @@ class Aimed:
     possible: np.ndarray
 
 
-def aim(start: np.ndarray, target: np.ndarray, ball: Ball, seconds: np.ndarray | None = None, bounces: int = 0,
-        spin: np.ndarray | None = None, fastest: float | None = None, near: np.ndarray | None = None,
-        ground: float = 0.0, loft: float | None = None, about: np.ndarray | None = None) -> Aimed:
+def solve_launches(start: np.ndarray, target: np.ndarray, ball: Ball, seconds: np.ndarray | None = None, bounces: int = 0,
+        spin: np.ndarray | None = None, fastest: float | None = None, initial_velocity: np.ndarray | None = None,
+        ground: float = 0.0, loft: float | None = None, initial_seconds: np.ndarray | None = None) -> AimResult:
     """Solve launches after which the ball's centre is at `target` after exactly `bounces` bounces.
 
     `start`, `target` and `spin` may have the shape (3,): the same for all B. Starts and targets below the height of a
@@ -92,27 +92,27 @@ def aim(start: np.ndarray, target: np.ndarray, ball: Ball, seconds: np.ndarray |
     Raises:
         InputError: if a position or spin is not finite, or times or bounces are invalid.
     """
-    problem = _Problem.of(start, target, ball, seconds=seconds, bounces=bounces, spin=spin, ground=ground)
+    problem = _Problem.from_arguments(start, target, ball, seconds=seconds, bounces=bounces, spin=spin, ground=ground)
     if seconds is None:
-        problem = problem.at_time(_chosen_times(problem, loft, about))
-    velocity, miss = _solved(problem, near)
-    for share in ELSE if seconds is None else ():
-        far = np.flatnonzero(~(miss <= CLOSE))
-        if not len(far):
+        problem = problem.with_seconds(_choose_times(problem, loft, initial_seconds))
+    velocity, miss = _solve_problem(problem, initial_velocity)
+    for share in FALLBACK_TIME_SHARES if seconds is None else ():
+        failed = np.flatnonzero(~(miss <= HIT_TOLERANCE))
+        if not len(failed):
             break
-        part = problem.only(far).at_time(problem.seconds[far] * share)
-        second, rest = _solved(part, None)
-        hit = rest <= CLOSE
-        velocity[far[hit]], miss[far[hit]] = second[hit], rest[hit]
-        problem.seconds[far[hit]] = part.seconds[hit]
-    possible = miss <= CLOSE
+        subset = problem.select_rows(failed).with_seconds(problem.seconds[failed] * share)
+        second, second_miss = _solve_problem(subset, None)
+        hit = second_miss <= HIT_TOLERANCE
+        velocity[failed[hit]], miss[failed[hit]] = second[hit], second_miss[hit]
+        problem.seconds[failed[hit]] = subset.seconds[hit]
+    possible = miss <= HIT_TOLERANCE
     if fastest is not None:
-        possible &= length(velocity) <= fastest
-    return Aimed(velocity=velocity, spin=problem.spin, seconds=problem.seconds, miss=miss, possible=possible)
+        possible &= vector_length(velocity) <= fastest
+    return AimResult(velocity=velocity, spin=problem.spin, seconds=problem.seconds, miss=miss, possible=possible)
 
 
-def along_ground(start: np.ndarray, target: np.ndarray, ball: Ball, seconds: np.ndarray | None = None,
-                 arrives: float = 2.0, fastest: float | None = None, ground: float = 0.0) -> Aimed:
+def solve_ground_launches(start: np.ndarray, target: np.ndarray, ball: Ball, seconds: np.ndarray | None = None,
+                 arrival_speed: float = 2.0, fastest: float | None = None, ground: float = 0.0) -> AimResult:
     """Solve level launches for balls that slide and roll along the ground to `target`.
 
     Args:
@@ -128,25 +128,25 @@ def along_ground(start: np.ndarray, target: np.ndarray, ball: Ball, seconds: np.
     Raises:
         InputError: as for `solve_launches`.
     """
-    problem = _Problem.of(start, target, ball, seconds=seconds, bounces=0, spin=None, ground=ground)
+    problem = _Problem.from_arguments(start, target, ball, seconds=seconds, bounces=0, spin=None, ground=ground)
     low = ground + ball.radius
     problem.start[:, 2], problem.target[:, 2] = low, low
-    way = problem.target - problem.start
-    distance = length(way)
-    along = way / np.maximum(distance, 1e-9)[:, None]
+    offset = problem.target - problem.start
+    distance = vector_length(offset)
+    along = offset / np.maximum(distance, 1e-9)[:, None]
     if seconds is None:
-        problem = problem.at_time(_ground_times(ball, distance, arrives))
-    speed = _ground_speeds(problem, distance)
+        problem = problem.with_seconds(_solve_ground_times(ball, distance, arrival_speed))
+    speed = _solve_ground_speeds(problem, distance)
     velocity = along * speed[:, None]
-    miss = length(problem.arrived(velocity)[0] - problem.target)
-    possible = miss <= CLOSE
+    miss = vector_length(problem.simulate_arrival(velocity)[0] - problem.target)
+    possible = miss <= HIT_TOLERANCE
     if fastest is not None:
         possible &= speed <= fastest
-    return Aimed(velocity=velocity, spin=problem.spin, seconds=problem.seconds, miss=miss, possible=possible)
+    return AimResult(velocity=velocity, spin=problem.spin, seconds=problem.seconds, miss=miss, possible=possible)
 
 
-def out_of_reach(start: np.ndarray, target: np.ndarray, aimed: Aimed, index: int, fastest: float,
-                 what: str) -> InputError:
+def build_reach_error(start: np.ndarray, target: np.ndarray, result: AimResult, index: int, fastest: float,
+                 subject: str) -> InputError:
     """Build the error that explains why a launch is not possible: distance, required speed and human limit.
 
     Args:
@@ -161,35 +161,35 @@ def out_of_reach(start: np.ndarray, target: np.ndarray, aimed: Aimed, index: int
     """
     start, target = np.atleast_2d(start), np.atleast_2d(target)
     far = np.linalg.norm(target[min(index, len(target) - 1)] - start[min(index, len(start) - 1)])
-    speed = float(length(aimed.velocity[index]))
-    found = f"the target is {far:.1f} m away and has to be reached in {aimed.seconds[index]:.2f} s"
-    if aimed.miss[index] > CLOSE:
-        return InputError(what, f"{found}: no launch reaches it with this number of bounces", "",
+    speed = float(vector_length(result.velocity[index]))
+    found = f"the target is {far:.1f} m away and has to be reached in {result.seconds[index]:.2f} s"
+    if result.miss[index] > HIT_TOLERANCE:
+        return InputError(subject, f"{found}: no launch reaches it with this number of bounces", "",
                           "allow more time, change the number of bounces, or move the target")
     expected = f"at most {fastest:.0f} m/s, the fastest a person can launch the ball"
-    return InputError(what, f"{found}: that takes {speed:.0f} m/s", expected, "allow more time or move the target")
+    return InputError(subject, f"{found}: that takes {speed:.0f} m/s", expected, "allow more time or move the target")
 
 
 @np.errstate(over="ignore", invalid="ignore")  # trial launches may diverge
-def _solved(problem: _Problem, near: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
+def _solve_problem(problem: _Problem, initial_velocity: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
     """Solve launch velocities (B, 3) m/s and misses (B,) m.
 
     Start from the given launches, then from first guesses, then from a search, each only for launches that still miss.
     """
     count = len(problem.start)
-    velocity = np.full((count, 3), np.nan) if near is None else np.broadcast_to(near, (count, 3)).astype(float)
+    velocity = np.full((count, 3), np.nan) if initial_velocity is None else np.broadcast_to(initial_velocity, (count, 3)).astype(float)
     miss = np.full(count, np.inf)
     known = np.flatnonzero(np.isfinite(velocity).all(axis=1))
     if len(known):
-        velocity[known], miss[known] = _newton(problem.only(known), velocity[known])
-    for guessed in (lambda part: part.guessed()[0], _Problem.searched):
-        far = np.flatnonzero(~(miss <= NEARLY))
+        velocity[known], miss[known] = _solve_newton(problem.select_rows(known), velocity[known])
+    for guess in (lambda part: part.estimate_launches()[0], _Problem.search_launches):
+        far = np.flatnonzero(~(miss <= RETRY_TOLERANCE))
         if not len(far):
             break
-        part = problem.only(far)
-        second, rest = _newton(part, guessed(part))
-        better = (rest < miss[far]) | ~np.isfinite(velocity[far]).all(axis=1)
-        velocity[far[better]], miss[far[better]] = second[better], rest[better]
+        part = problem.select_rows(far)
+        second, second_miss = _solve_newton(part, guess(part))
+        better = (second_miss < miss[far]) | ~np.isfinite(velocity[far]).all(axis=1)
+        velocity[far[better]], miss[far[better]] = second[better], second_miss[better]
     return velocity, miss
 
 
@@ -206,7 +206,7 @@ class _Problem:
     ground: float
 
     @classmethod
-    def of(cls, start, target, ball, seconds, bounces, spin, ground) -> _Problem:
+    def from_arguments(cls, start, target, ball, seconds, bounces, spin, ground) -> _Problem:
         """Check and broadcast the arguments of `solve_launches` to (B, 3) and (B,)."""
         start, target = np.asarray(start, float), np.asarray(target, float)
         spin = np.zeros(3) if spin is None else np.asarray(spin, float)
@@ -224,15 +224,15 @@ class _Problem:
         return cls(start=start, target=target, spin=spin, seconds=np.broadcast_to(timed, shape[:1]).copy(), ball=ball,
                    bounces=int(bounces), ground=ground)
 
-    def at_time(self, seconds: np.ndarray) -> _Problem:
+    def with_seconds(self, seconds: np.ndarray) -> _Problem:
         return replace(self, seconds=seconds)
 
-    def only(self, which: np.ndarray) -> _Problem:
+    def select_rows(self, rows: np.ndarray) -> _Problem:
         """Select some of the targets; an index may occur more than once."""
-        return replace(self, start=self.start[which], target=self.target[which], spin=self.spin[which],
-                       seconds=self.seconds[which])
+        return replace(self, start=self.start[rows], target=self.target[rows], spin=self.spin[rows],
+                       seconds=self.seconds[rows])
 
-    def arrived(self, velocity: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def simulate_arrival(self, velocity: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Simulate the balls to their time.
 
         More than the requested bounces are not simulated, and a bounce within REBOUND_MARGIN does not count. A ball on
@@ -244,46 +244,46 @@ class _Problem:
         Returns:
             Positions (B, 3) m and bounces (B,).
         """
-        balls = batch.launched(self.start, velocity, self.spin, self.ball, self.ground)
-        balls = batch.after(balls, self.ball, self.seconds, self.ground, self.bounces)
+        balls = batch.build_balls(self.start, velocity, self.spin, self.ball, self.ground)
+        balls = batch.simulate_balls(balls, self.ball, self.seconds, self.ground, self.bounces)
         low, rising = self.ground + self.ball.radius, balls.velocity[:, 2]
-        just = (balls.bounces > 0) & (rising > 0.0) & (balls.position[:, 2] - low < JUST_NOW * rising)
+        just = (balls.bounces > 0) & (rising > 0.0) & (balls.position[:, 2] - low < REBOUND_MARGIN * rising)
         lies = self.start[:, 2] < low + 1e-3
         return balls.position, np.where(lies & (velocity[:, 2] < 0.0), -1, balls.bounces - just)
 
-    def guessed(self) -> tuple[np.ndarray, np.ndarray]:
+    def estimate_launches(self) -> tuple[np.ndarray, np.ndarray]:
         """Estimate launches for balls with a linear drag as strong as theirs on average; exact for linear drag.
 
         Returns:
             Velocities (B, 3) m/s, and (B,) bool: a launch exists that is at the target's height in time.
         """
-        way = self.target - self.start
-        drag = self.ball.linear_drag + self.ball.drag * length(way) / self.seconds
-        level = way[:, :2] / (batch.drag_shares(drag * self.seconds)[0] * self.seconds)[:, None]
-        upward, found = self._upward(drag)
+        offset = self.target - self.start
+        drag = self.ball.linear_drag + self.ball.drag * vector_length(offset) / self.seconds
+        level = offset[:, :2] / (batch.compute_drag_factors(drag * self.seconds)[0] * self.seconds)[:, None]
+        upward, found = self._find_upward_speed(drag)
         return np.column_stack([level, upward]), found
 
-    def _upward(self, drag: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _find_upward_speed(self, drag: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Find the highest upward speed (B,) m/s with which such a ball is at the target's height in time.
 
         Returns:
             Speeds (B,) m/s and (B,) bool: one exists. Where none does, the speed that comes closest.
         """
         gravity, low = self.ball.gravity, self.ground + self.ball.radius
-        first, second = batch.drag_shares(drag * self.seconds)
+        first, second = batch.compute_drag_factors(drag * self.seconds)
         direct = (self.target[:, 2] - self.start[:, 2] + gravity * self.seconds**2 * second) / (self.seconds * first)
         if not self.bounces:
             return direct, np.ones(len(direct), bool)
         top = gravity * self.seconds * second / first + 0.5  # the highest launch that is down again in time
-        tried = top[:, None] - (top[:, None] + 40.0) * np.linspace(0.0, 1.0, HEIGHTS) ** 2
+        tried = top[:, None] - (top[:, None] + 40.0) * np.linspace(0.0, 1.0, UPWARD_SAMPLES) ** 2
 
-        def over(upward):
+        def measure_height_error(upward):
             args = (self.start[:, None, 2] - low, upward, drag[:, None], self.seconds[:, None])
-            return _height_after(*args, self.bounces, self.ball) - (self.target[:, None, 2] - low)
+            return _compute_height_after(*args, self.bounces, self.ball) - (self.target[:, None, 2] - low)
 
-        return _highest_root(over, tried)
+        return _find_highest_root(measure_height_error, tried)
 
-    def searched(self) -> np.ndarray:
+    def search_launches(self) -> np.ndarray:
         """Search launch velocities (B, 3) m/s with the ball's own physics.
 
         Of a row of upward speeds, each corrected to reach the target's distance, use the one that comes closest to its
@@ -291,25 +291,25 @@ class _Problem:
         """
         count = len(self.start)
         # Row b * UPWARD_SAMPLES + h is target b with the h-th upward speed.
-        many = self.only(np.repeat(np.arange(count), HEIGHTS))
+        many = self.select_rows(np.repeat(np.arange(count), UPWARD_SAMPLES))
         top = self.ball.gravity * self.seconds * (0.5 + 0.1 * self.seconds) + 1.0
-        upward = (top[:, None] - (top[:, None] + 40.0) * np.linspace(0.0, 1.0, HEIGHTS) ** 2).ravel()
-        way = (many.target - many.start)[:, :2]
-        level = way / many.seconds[:, None]
+        upward = (top[:, None] - (top[:, None] + 40.0) * np.linspace(0.0, 1.0, UPWARD_SAMPLES) ** 2).ravel()
+        offset = (many.target - many.start)[:, :2]
+        level = offset / many.seconds[:, None]
         # Scale the level speed until the ball covers the level distance to the target.
         for _ in range(3):
-            place, made = many.arrived(np.column_stack([level, upward]))
-            gone = np.sum((place - many.start)[:, :2] * way, axis=1) / np.maximum(np.sum(way * way, axis=1), 1e-9)
-            level = level * np.clip(1.0 / np.maximum(gone, 1e-2), 0.3, 3.0)[:, None]
-            level /= np.maximum(length(np.column_stack([level, 0.0 * upward])) / FASTEST_TRIED, 1.0)[:, None]
-        place, made = many.arrived(np.column_stack([level, upward]))
+            place, bounces = many.simulate_arrival(np.column_stack([level, upward]))
+            distance_share = np.sum((place - many.start)[:, :2] * offset, axis=1) / np.maximum(np.sum(offset * offset, axis=1), 1e-9)
+            level = level * np.clip(1.0 / np.maximum(distance_share, 1e-2), 0.3, 3.0)[:, None]
+            level /= np.maximum(vector_length(np.column_stack([level, 0.0 * upward])) / MAX_INITIAL_SPEED, 1.0)[:, None]
+        place, bounces = many.simulate_arrival(np.column_stack([level, upward]))
         # Launches with the wrong number of bounces cannot win.
-        short = np.where(made == self.bounces, length(place - many.target), np.inf).reshape(count, HEIGHTS)
-        best = np.arange(count) * HEIGHTS + np.argmin(short, axis=1)
+        short = np.where(bounces == self.bounces, vector_length(place - many.target), np.inf).reshape(count, UPWARD_SAMPLES)
+        best = np.arange(count) * UPWARD_SAMPLES + np.argmin(short, axis=1)
         return np.column_stack([level, upward])[best]
 
 
-def _newton(problem: _Problem, guess: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _solve_newton(problem: _Problem, guess: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Solve launch velocities by a damped Newton iteration.
 
     The Jacobian of eq. 7 comes from three nearby launches and is updated with the result of each step (Broyden's rule).
@@ -322,89 +322,89 @@ def _newton(problem: _Problem, guess: np.ndarray) -> tuple[np.ndarray, np.ndarra
     Returns:
         Velocities (B, 3) m/s and misses (B,) m, infinite where the number of bounces is wrong.
     """
-    velocity = guess / np.maximum(length(guess) / FASTEST_TRIED, 1.0)[:, None]
-    short, miss = _short(problem, velocity)
+    velocity = guess / np.maximum(vector_length(guess) / MAX_INITIAL_SPEED, 1.0)[:, None]
+    short, miss = _measure_shortfall(problem, velocity)
     slope = np.empty((len(guess), 3, 3))
     stale, stuck = np.ones(len(guess), bool), np.zeros(len(guess), int)
-    for _ in range(ROUNDS):
-        now = np.flatnonzero((miss > EXACT) & (stuck < 3))
+    for _ in range(MAX_ITERATIONS):
+        now = np.flatnonzero((miss > CONVERGED_TOLERANCE) & (stuck < 3))
         if not len(now):
             break
         old = now[stale[now]]
         if len(old):
-            slope[old] = _slopes(problem.only(old), velocity[old], problem.target[old] - short[old])
+            slope[old] = _compute_jacobian(problem.select_rows(old), velocity[old], problem.target[old] - short[old])
             stale[old] = False
         # Each failed attempt shortens the next step: full, 0.3, 0.1 (eq. 8).
-        step = _step(slope[now], short[now]) * np.array([1.0, 0.3, 0.1])[stuck[now]][:, None]
-        step /= np.maximum(length(step) / LONGEST_STEP, 1.0)[:, None]
-        new_short, new_miss = _short(problem.only(now), velocity[now] + step)
-        slope[now] += _learnt(slope[now], step, short[now] - new_short)
+        step = _compute_step(slope[now], short[now]) * np.array([1.0, 0.3, 0.1])[stuck[now]][:, None]
+        step /= np.maximum(vector_length(step) / LONGEST_STEP, 1.0)[:, None]
+        new_short, new_miss = _measure_shortfall(problem.select_rows(now), velocity[now] + step)
+        slope[now] += _compute_broyden_update(slope[now], step, short[now] - new_short)
         # A launch with the wrong number of bounces has an infinite miss: judge it by its distance instead.
         lost = np.isinf(miss[now])
-        better = np.where(lost, ~np.isinf(new_miss) | (length(new_short) < length(short[now])), new_miss < miss[now])
+        better = np.where(lost, ~np.isinf(new_miss) | (vector_length(new_short) < vector_length(short[now])), new_miss < miss[now])
         stale[now] = ~better | (new_miss > 0.3 * miss[now])
         stuck[now] = np.where(better & (lost | (new_miss < 0.9 * miss[now])), 0, stuck[now] + 1)
-        won = now[better]
-        velocity[won] += step[better]
-        short[won], miss[won] = new_short[better], new_miss[better]
+        improved = now[better]
+        velocity[improved] += step[better]
+        short[improved], miss[improved] = new_short[better], new_miss[better]
     return velocity, miss
 
 
-def _short(problem: _Problem, velocity: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _measure_shortfall(problem: _Problem, velocity: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Measure what is missing to the targets.
 
     Returns:
         Vectors (B, 3) m from ball to target, and their lengths (B,) m, infinite where the number of bounces is wrong.
     """
-    place, made = problem.arrived(velocity)
+    place, bounces = problem.simulate_arrival(velocity)
     short = problem.target - place
-    return short, np.where(made == problem.bounces, length(short), np.inf)
+    return short, np.where(bounces == problem.bounces, vector_length(short), np.inf)
 
 
-def _slopes(problem: _Problem, velocity: np.ndarray, place: np.ndarray) -> np.ndarray:
+def _compute_jacobian(problem: _Problem, velocity: np.ndarray, place: np.ndarray) -> np.ndarray:
     """Compute (B, 3, 3) s: how the arrival positions (B, 3) m change with the launch velocities (B, 3) m/s."""
     count = len(velocity)
-    nudged = (velocity[:, None] + NUDGE * np.eye(3)).reshape(-1, 3)
-    beside, _ = problem.only(np.repeat(np.arange(count), 3)).arrived(nudged)
-    return np.swapaxes(beside.reshape(count, 3, 3) - place[:, None], 1, 2) / NUDGE
+    nudged = (velocity[:, None] + DIFFERENCE_STEP * np.eye(3)).reshape(-1, 3)
+    beside, _ = problem.select_rows(np.repeat(np.arange(count), 3)).simulate_arrival(nudged)
+    return np.swapaxes(beside.reshape(count, 3, 3) - place[:, None], 1, 2) / DIFFERENCE_STEP
 
 
-def _step(slope: np.ndarray, short: np.ndarray) -> np.ndarray:
+def _compute_step(slope: np.ndarray, short: np.ndarray) -> np.ndarray:
     """Compute the steps (B, 3) m/s that remove `short` (B, 3) m by the Jacobians (B, 3, 3), slightly damped."""
-    turned = np.swapaxes(slope, 1, 2)
-    square = turned @ slope + 1e-9 * np.eye(3)
+    transposed = np.swapaxes(slope, 1, 2)
+    square = transposed @ slope + 1e-9 * np.eye(3)
     with np.errstate(invalid="ignore"):  # diverged launches have infinite slopes
         can = np.isfinite(square).all(axis=(1, 2)) & (np.linalg.det(square) != 0.0)
-    return np.linalg.solve(np.where(can[:, None, None], square, np.eye(3)), turned @ short[:, :, None])[:, :, 0]
+    return np.linalg.solve(np.where(can[:, None, None], square, np.eye(3)), transposed @ short[:, :, None])[:, :, 0]
 
 
-def _learnt(slope: np.ndarray, step: np.ndarray, moved: np.ndarray) -> np.ndarray:
+def _compute_broyden_update(slope: np.ndarray, step: np.ndarray, moved: np.ndarray) -> np.ndarray:
     """Compute Broyden's update (B, 3, 3) after a step (B, 3) m/s moved the arrival by `moved` (B, 3) m."""
     wrong = moved - np.einsum("bij,bj->bi", slope, step)
     return wrong[:, :, None] * step[:, None] / np.maximum(np.sum(step * step, axis=1), 1e-12)[:, None, None]
 
 
-def _chosen_times(problem: _Problem, loft: float | None, about: np.ndarray | None) -> np.ndarray:
+def _choose_times(problem: _Problem, loft: float | None, initial_seconds: np.ndarray | None) -> np.ndarray:
     """Choose flight times (B,) s with the slowest launch, or the launch closest to `loft` rad, by the first guesses.
 
     Looks at FREE_TIMES (or at `initial_seconds`) first, then at times near the best one.
     """
-    coarse = about if about is not None else _best_time(problem, np.tile(TIMES, (len(problem.start), 1)), loft)
-    return _best_time(problem, coarse[:, None] * np.linspace(0.9, 1.1, 11), loft)
+    coarse = initial_seconds if initial_seconds is not None else _choose_best_time(problem, np.tile(FREE_TIMES, (len(problem.start), 1)), loft)
+    return _choose_best_time(problem, coarse[:, None] * np.linspace(0.9, 1.1, 11), loft)
 
 
-def _best_time(problem: _Problem, times: np.ndarray, loft: float | None) -> np.ndarray:
+def _choose_best_time(problem: _Problem, times: np.ndarray, loft: float | None) -> np.ndarray:
     """Choose the best (B,) s of each row of `times` (B, N) s."""
     count, each = times.shape
-    launch, found = problem.only(np.repeat(np.arange(count), each)).at_time(times.ravel()).guessed()
-    worth = length(launch)
+    launch, found = problem.select_rows(np.repeat(np.arange(count), each)).with_seconds(times.ravel()).estimate_launches()
+    cost = vector_length(launch)
     if loft is not None:
-        worth = np.abs(arctan2(launch[:, 2], length(launch * [1.0, 1.0, 0.0])) - loft)
-    best = np.argmin(np.where(found, worth, worth + 1e6).reshape(count, each), axis=1)
+        cost = np.abs(arctan2(launch[:, 2], vector_length(launch * [1.0, 1.0, 0.0])) - loft)
+    best = np.argmin(np.where(found, cost, cost + 1e6).reshape(count, each), axis=1)
     return times[np.arange(count), best]
 
 
-def _height_after(height, upward, drag, seconds, bounces: int, ball: Ball) -> np.ndarray:
+def _compute_height_after(height, upward, drag, seconds, bounces: int, ball: Ball) -> np.ndarray:
     """Compute heights m above a ball on the ground, after `bounces` bounces under linear drag.
 
     NaN where the ball has not bounced that often by then. All arguments broadcast.
@@ -414,22 +414,22 @@ def _height_after(height, upward, drag, seconds, bounces: int, ball: Ball) -> np
         fall = (upward + np.sqrt(upward**2 + 2.0 * ball.gravity * height)) / ball.gravity
         # Newton's method for the time of landing, from the time without drag.
         for _ in range(4):
-            place, rise = _fallen(height, upward, drag, fall, ball.gravity)
+            place, rise = _compute_fall(height, upward, drag, fall, ball.gravity)
             fall = np.maximum(fall - place / np.minimum(rise, -1e-6), 1e-9)
         left = left - fall
-        upward = -ball.restitution * _fallen(height, upward, drag, fall, ball.gravity)[1]
+        upward = -ball.restitution * _compute_fall(height, upward, drag, fall, ball.gravity)[1]
         height = np.zeros_like(height)
-    return np.where(left >= 0.0, _fallen(height, upward, drag, np.maximum(left, 0.0), ball.gravity)[0], np.nan)
+    return np.where(left >= 0.0, _compute_fall(height, upward, drag, np.maximum(left, 0.0), ball.gravity)[0], np.nan)
 
 
-def _fallen(height, upward, drag, seconds, gravity: float) -> tuple[np.ndarray, np.ndarray]:
+def _compute_fall(height, upward, drag, seconds, gravity: float) -> tuple[np.ndarray, np.ndarray]:
     """Compute height m and upward speed m/s after `seconds` under linear drag."""
-    first, second = batch.drag_shares(drag * seconds)
+    first, second = batch.compute_drag_factors(drag * seconds)
     place = height + upward * seconds * first - gravity * seconds**2 * second
     return place, upward * np.exp(-drag * seconds) - gravity * seconds * first
 
 
-def _highest_root(value, tried: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _find_highest_root(value, tried: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Find the first sign change of `value` in each row of `tried` (B, N), whose values fall, by bisection.
 
     Returns:
@@ -448,37 +448,37 @@ def _highest_root(value, tried: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return np.where(found, 0.5 * (high + low), out), found
 
 
-def _ground_speeds(problem: _Problem, distance: np.ndarray) -> np.ndarray:
+def _solve_ground_speeds(problem: _Problem, distance: np.ndarray) -> np.ndarray:
     """Solve the level launch speed (B,) m/s with which the ball rolls `distance` (B,) m in time, by bisection."""
     low, high = np.zeros(len(distance)), np.full(len(distance), 120.0)
     for _ in range(24):
         speed = 0.5 * (low + high)
         level = speed[:, None] * [1.0, 0.0, 0.0]
-        place, _ = batch.states([0.0, 0.0, problem.ball.radius], level, None, problem.ball, problem.seconds)
+        place, _ = batch.simulate_states([0.0, 0.0, problem.ball.radius], level, None, problem.ball, problem.seconds)
         low, high = np.where(place[:, 0] < distance, speed, low), np.where(place[:, 0] < distance, high, speed)
     return high
 
 
-def _ground_times(ball: Ball, distance: np.ndarray, arrives: float) -> np.ndarray:
+def _solve_ground_times(ball: Ball, distance: np.ndarray, arrival_speed: float) -> np.ndarray:
     """Solve the times (B,) s after which a ball on the ground is `distance` (B,) m away with `arrival_speed` m/s
     left.
     """
-    times, gone, left = _ground_table(ball)
+    times, distances, speeds_left = _build_ground_table(ball)
     out = np.empty(len(distance))
     for i, far in enumerate(distance):
-        there = [np.interp(far, row, times, right=np.inf) for row in gone]
-        still = [np.interp(time, times, row) if np.isfinite(time) else -1.0 for time, row in zip(there, left)]
+        there = [np.interp(far, row, times, right=np.inf) for row in distances]
+        still = [np.interp(time, times, row) if np.isfinite(time) else -1.0 for time, row in zip(there, speeds_left)]
         # The first row of the table that is still fast enough; interpolate between it and the row before.
-        fast = int(np.argmax(np.array(still) >= arrives))  # the slowest launch that is fast enough at the target
-        share = np.clip((arrives - still[fast - 1]) / (still[fast] - still[fast - 1]), 0.0, 1.0) if fast else 1.0
+        fast = int(np.argmax(np.array(still) >= arrival_speed))  # the slowest launch that is fast enough at the target
+        share = np.clip((arrival_speed - still[fast - 1]) / (still[fast] - still[fast - 1]), 0.0, 1.0) if fast else 1.0
         before = there[fast - 1] if fast and np.isfinite(there[fast - 1]) else there[fast]
         out[i] = before + share * (there[fast] - before)
     return np.where(np.isfinite(out), out, times[-1])
 
 
 @lru_cache(maxsize=16)
-def _ground_table(ball: Ball) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _build_ground_table(ball: Ball) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Build times (T,) s, and distances m and remaining speeds m/s (S, T) of level launches with rising speed."""
     times, speeds = np.linspace(0.0, 10.0, 41), np.geomspace(0.3, 60.0, 28)
-    gone, left = batch.courses([0.0, 0.0, ball.radius], speeds[:, None] * [1.0, 0.0, 0.0], None, ball, times)
-    return times, gone[:, :, 0], left[:, :, 0]
+    positions, velocities = batch.simulate_trajectories([0.0, 0.0, ball.radius], speeds[:, None] * [1.0, 0.0, 0.0], None, ball, times)
+    return times, positions[:, :, 0], velocities[:, :, 0]

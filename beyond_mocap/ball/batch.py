@@ -12,14 +12,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .flight import LEAST_HOP, STANDS_STILL
-from .physics import Ball, bounced, gripped, in_air, length, rolling_spin, sliding, slip, slowing
+from .flight import MIN_HOP_SPEED, MIN_SLIP_SPEED
+from .physics import Ball, compute_bounce, compute_grip, compute_air_acceleration, vector_length, compute_rolling_spin, compute_sliding, compute_slip, compute_deceleration
 
 STEP = 0.12
 """s: the longest step of a flight without a closed form."""
 SLIDE_STEP = 0.01
 """s: the longest step of a ball that slides."""
-CLOSE = 1e-6
+LANDING_TOLERANCE = 1e-6
 """m from the ground: closer than this, Newton's method takes its last step."""
 AIR, SLIDE, ROLL, REST = range(4)
 
@@ -42,12 +42,12 @@ class Balls:
     phase: np.ndarray
     bounces: np.ndarray
 
-    def only(self, which: np.ndarray) -> Balls:
+    def select_balls(self, rows: np.ndarray) -> Balls:
         """Select balls by a mask or by indices."""
-        return Balls(*(value[which] for value in vars(self).values()))
+        return Balls(*(value[rows] for value in vars(self).values()))
 
 
-def launched(position: np.typing.ArrayLike, velocity: np.ndarray, spin: np.ndarray | None, ball: Ball,
+def build_balls(position: np.typing.ArrayLike, velocity: np.ndarray, spin: np.ndarray | None, ball: Ball,
              ground: float = 0.0) -> Balls:
     """Build balls (B) at their launch.
 
@@ -70,12 +70,12 @@ def launched(position: np.typing.ArrayLike, velocity: np.ndarray, spin: np.ndarr
     low = ground + ball.radius
     position[:, 2] = np.maximum(position[:, 2], low)
     balls = Balls(position, velocity, spin, np.zeros(shape[0], int), np.zeros(shape[0], int))
-    _meet_ground(balls, np.flatnonzero((position[:, 2] <= low) & (velocity[:, 2] <= LEAST_HOP)), ball)
+    _apply_bounce(balls, np.flatnonzero((position[:, 2] <= low) & (velocity[:, 2] <= MIN_HOP_SPEED)), ball)
     return balls
 
 
 @np.errstate(over="ignore", invalid="ignore")  # trial launches may overflow
-def after(balls: Balls, ball: Ball, seconds: float | np.ndarray, ground: float = 0.0,
+def simulate_balls(balls: Balls, ball: Ball, seconds: float | np.ndarray, ground: float = 0.0,
           most_bounces: int | None = None) -> Balls:
     """Simulate balls for some time.
 
@@ -90,19 +90,19 @@ def after(balls: Balls, ball: Ball, seconds: float | np.ndarray, ground: float =
     """
     balls = Balls(*(value.copy() for value in vars(balls).values()))
     left = np.broadcast_to(np.asarray(seconds, float), balls.phase.shape).copy()
-    most = np.iinfo(int).max if most_bounces is None else most_bounces
+    bounce_limit = np.iinfo(int).max if most_bounces is None else most_bounces
     longest = np.inf if _has_closed_form(balls, ball) else STEP
     # Every pass moves each ball by one step of its phase; `left` is what remains of its time.
-    while len(going := np.flatnonzero((left > 0.0) & (balls.phase != REST))):
-        for phase, step in ((AIR, _air), (SLIDE, _slide), (ROLL, _roll)):
-            which = going[balls.phase[going] == phase]
+    while len(moving := np.flatnonzero((left > 0.0) & (balls.phase != REST))):
+        for phase, step in ((AIR, _step_flight), (SLIDE, _step_slide), (ROLL, _step_roll)):
+            which = moving[balls.phase[moving] == phase]
             if len(which):
                 steps = np.minimum(left[which], longest)
-                left[which] -= step(balls, which, steps, ball, low=ground + ball.radius, most=most)
+                left[which] -= step(balls, which, steps, ball, low=ground + ball.radius, most=bounce_limit)
     return balls
 
 
-def states(position: np.typing.ArrayLike, velocity: np.ndarray, spin: np.ndarray | None, ball: Ball,
+def simulate_states(position: np.typing.ArrayLike, velocity: np.ndarray, spin: np.ndarray | None, ball: Ball,
            seconds: np.ndarray, ground: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
     """Simulate balls to one moment each. Every argument may be (3,) or one number: the same for all.
 
@@ -116,11 +116,11 @@ def states(position: np.typing.ArrayLike, velocity: np.ndarray, spin: np.ndarray
     Returns:
         Positions (B, 3) m and velocities (B, 3) m/s.
     """
-    balls = after(launched(position, velocity, spin, ball, ground), ball, seconds, ground)
+    balls = simulate_balls(build_balls(position, velocity, spin, ball, ground), ball, seconds, ground)
     return balls.position, balls.velocity
 
 
-def courses(position: np.typing.ArrayLike, velocity: np.ndarray, spin: np.ndarray | None, ball: Ball, times: np.ndarray,
+def simulate_trajectories(position: np.typing.ArrayLike, velocity: np.ndarray, spin: np.ndarray | None, ball: Ball, times: np.ndarray,
             ground: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
     """Simulate balls and sample their trajectories.
 
@@ -134,16 +134,16 @@ def courses(position: np.typing.ArrayLike, velocity: np.ndarray, spin: np.ndarra
     Returns:
         Positions (B, T, 3) m and velocities (B, T, 3) m/s.
     """
-    balls = launched(position, velocity, spin, ball, ground)
+    balls = build_balls(position, velocity, spin, ball, ground)
     places, velocities = [], []
     for seconds in np.diff(np.asarray(times, float), prepend=0.0):
-        balls = after(balls, ball, seconds, ground)
+        balls = simulate_balls(balls, ball, seconds, ground)
         places.append(balls.position)
         velocities.append(balls.velocity)
     return np.stack(places, axis=1), np.stack(velocities, axis=1)
 
 
-def drag_shares(drag: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def compute_drag_factors(drag: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Compute f = (1 - e^-d) / d and (1 - f) / d for d >= 0; by their series where d is small."""
     small = drag < 1e-4
     safe = np.where(small, 1.0, drag)
@@ -155,31 +155,31 @@ def _has_closed_form(balls: Balls, ball: Ball) -> bool:
     return ball.drag == 0.0 and not ball.friction and (ball.lift[0] == 0.0 or not balls.spin.any())
 
 
-def _air(balls: Balls, which: np.ndarray, steps: np.ndarray, ball: Ball, low: float, most: int) -> np.ndarray:
+def _step_flight(balls: Balls, which: np.ndarray, steps: np.ndarray, ball: Ball, low: float, most: int) -> np.ndarray:
     """Step the balls that fly, up to the ground at most; return the durations (W,) s."""
-    move = _closed if _has_closed_form(balls, ball) else _runge_kutta
-    start = _rows(balls.position, which), _rows(balls.velocity, which), _rows(balls.spin, which)
+    move = _compute_linear_flight if _has_closed_form(balls, ball) else _integrate_runge_kutta
+    start = _select_rows(balls.position, which), _select_rows(balls.velocity, which), _select_rows(balls.spin, which)
     place, velocity, spin = move(*start, steps, ball)
     landing = np.flatnonzero((place[:, 2] < low) & (velocity[:, 2] < 0.0) & (balls.bounces[which] < most))
     if len(landing):
         steps = steps.copy()
-        before = _rows(start[0], landing), _rows(start[1], landing), _rows(start[2], landing)
+        before = _select_rows(start[0], landing), _select_rows(start[1], landing), _select_rows(start[2], landing)
         under = (place[landing], velocity[landing])
         # Repeat the step of the balls that ended below the ground, up to the moment of landing.
-        steps[landing] = _until_ground(move, before, under, steps=steps[landing], ball=ball, low=low)
+        steps[landing] = _find_landing_times(move, before, under, steps=steps[landing], ball=ball, low=low)
         place[landing], velocity[landing], spin[landing] = move(*before, steps[landing], ball)
         place[landing, 2] = low
     balls.position[which], balls.velocity[which], balls.spin[which] = place, velocity, spin
-    _meet_ground(balls, which[landing], ball)
+    _apply_bounce(balls, which[landing], ball)
     return steps
 
 
-def _rows(values: np.ndarray, which: np.ndarray) -> np.ndarray:
+def _select_rows(values: np.ndarray, which: np.ndarray) -> np.ndarray:
     """Select rows of (B, 3), stored so that x, y and z are contiguous: twice as fast to compute with."""
     return values.T[:, which].T
 
 
-def _until_ground(move, start: tuple, ends: tuple, steps: np.ndarray, ball: Ball, low: float) -> np.ndarray:
+def _find_landing_times(move, start: tuple, ends: tuple, steps: np.ndarray, ball: Ball, low: float) -> np.ndarray:
     """Find when balls that end below the ground after `steps` (W,) s reach it.
 
     Newton's method, kept between a moment above the ground and one below it. It starts where a parabola through both
@@ -201,99 +201,99 @@ def _until_ground(move, start: tuple, ends: tuple, steps: np.ndarray, ball: Ball
     far = np.arange(len(steps))
     for _ in range(12):
         guess[far] = np.where((guess > above) & (guess < below), guess, 0.5 * (above + below))[far]
-        place, velocity, _ = move(*(_rows(value, far) for value in start), guess[far], ball)
+        place, velocity, _ = move(*(_select_rows(value, far) for value in start), guess[far], ball)
         over, down = place[:, 2] - low, velocity[:, 2] < 0.0
         # A ball that has just bounced and rises is above the ground, in spite of rounding errors.
         still = (over > 0.0) | ~down
         above[far[still]], below[far[~still]] = guess[far[still]], guess[far[~still]]
         guess[far] -= over / np.where(down, velocity[:, 2], -1e9)
-        far = far[np.abs(over) >= CLOSE]
+        far = far[np.abs(over) >= LANDING_TOLERANCE]
         if not len(far):
             break
     return guess
 
 
-def _meet_ground(balls: Balls, which: np.ndarray, ball: Ball) -> None:
+def _apply_bounce(balls: Balls, which: np.ndarray, ball: Ball) -> None:
     """Apply the bounce to balls on the ground; after too low a hop they slide or roll instead."""
     if not len(which):
         return
-    velocity, spin = bounced(balls.velocity[which], balls.spin[which], ball)
-    hops = velocity[:, 2] > LEAST_HOP
+    velocity, spin = compute_bounce(balls.velocity[which], balls.spin[which], ball)
+    hops = velocity[:, 2] > MIN_HOP_SPEED
     velocity[:, 2] = np.where(hops, velocity[:, 2], 0.0)
     balls.velocity[which], balls.spin[which] = velocity, spin
     balls.bounces[which] += hops
     stay = which[~hops]
     if len(stay):
-        slides = (length(slip(balls.velocity[stay], balls.spin[stay], ball)) > STANDS_STILL) & (ball.friction > 0.0)
+        slides = (vector_length(compute_slip(balls.velocity[stay], balls.spin[stay], ball)) > MIN_SLIP_SPEED) & (ball.friction > 0.0)
         balls.phase[stay] = SLIDE
-        _grip(balls, stay[~slides], ball)
+        _start_rolling(balls, stay[~slides], ball)
 
 
-def _grip(balls: Balls, which: np.ndarray, ball: Ball) -> None:
+def _start_rolling(balls: Balls, which: np.ndarray, ball: Ball) -> None:
     """Set balls rolling from now on."""
     if len(which):
-        balls.velocity[which], balls.spin[which] = gripped(balls.velocity[which], balls.spin[which], ball)
+        balls.velocity[which], balls.spin[which] = compute_grip(balls.velocity[which], balls.spin[which], ball)
         balls.phase[which] = ROLL
 
 
-def _slide(balls: Balls, which: np.ndarray, steps: np.ndarray, ball: Ball, low: float, most: int) -> np.ndarray:
+def _step_slide(balls: Balls, which: np.ndarray, steps: np.ndarray, ball: Ball, low: float, most: int) -> np.ndarray:
     """Step the balls that slide, until the lowest point has no slip; return the durations (W,) s."""
     velocity, spin = balls.velocity[which], balls.spin[which]
-    before = slip(velocity, spin, ball)
-    faster, turning = sliding(velocity, spin, ball)
+    before = compute_slip(velocity, spin, ball)
+    faster, turning = compute_sliding(velocity, spin, ball)
     # The slip shrinks at an almost constant rate: its size now gives the time until the ball rolls.
-    shrinks = -np.einsum("bi,bi->b", slip(faster, turning, ball), before) / np.maximum(length(before), 1e-12)
-    until = length(before) / np.maximum(shrinks, 1e-12)
+    shrinks = -np.einsum("bi,bi->b", compute_slip(faster, turning, ball), before) / np.maximum(vector_length(before), 1e-12)
+    until = vector_length(before) / np.maximum(shrinks, 1e-12)
     taken = np.minimum(np.minimum(steps, SLIDE_STEP), until)
     h = taken[:, None]
-    faster_then, turning_then = sliding(velocity + 0.5 * h * faster, spin + 0.5 * h * turning, ball)
+    faster_then, turning_then = compute_sliding(velocity + 0.5 * h * faster, spin + 0.5 * h * turning, ball)
     balls.position[which] += h * velocity + h * h * (faster + 2.0 * faster_then) / 6.0
     balls.velocity[which] += h * faster_then
     balls.spin[which] += h * turning_then
-    _grip(balls, which[until <= taken], ball)
+    _start_rolling(balls, which[until <= taken], ball)
     return taken
 
 
-def _roll(balls: Balls, which: np.ndarray, steps: np.ndarray, ball: Ball, low: float, most: int) -> np.ndarray:
+def _step_roll(balls: Balls, which: np.ndarray, steps: np.ndarray, ball: Ball, low: float, most: int) -> np.ndarray:
     """Step the balls that roll, at most until they rest; return the durations (W,) s."""
     velocity = balls.velocity[which]
-    speed = length(velocity)
+    speed = vector_length(velocity)
     along = velocity / np.maximum(speed, 1e-12)[:, None]
     steps = np.minimum(steps, 5.0 * STEP)
-    taken = np.minimum(steps, speed / np.maximum(slowing(0.5 * speed, ball), 1e-12))
+    taken = np.minimum(steps, speed / np.maximum(compute_deceleration(0.5 * speed, ball), 1e-12))
     # Fourth-order Runge-Kutta on the speed alone: the direction does not change.
-    one = slowing(speed, ball)
-    two = slowing(speed - 0.5 * taken * one, ball)
-    three = slowing(speed - 0.5 * taken * two, ball)
-    four = slowing(speed - taken * three, ball)
+    one = compute_deceleration(speed, ball)
+    two = compute_deceleration(speed - 0.5 * taken * one, ball)
+    three = compute_deceleration(speed - 0.5 * taken * two, ball)
+    four = compute_deceleration(speed - taken * three, ball)
     slower = np.maximum(speed - taken * (one + 2.0 * two + 2.0 * three + four) / 6.0, 0.0)
     balls.position[which] += along * (taken * speed - taken**2 * (one + two + three) / 6.0)[:, None]
     balls.velocity[which] = along * slower[:, None]
     decayed = balls.spin[which] * np.exp(-ball.spin_decay * taken)[:, None]
-    balls.spin[which] = rolling_spin(balls.velocity[which], ball) + decayed * [0, 0, 1] if ball.friction else decayed
-    stands = slower <= 1e-4
-    balls.velocity[which[stands]] = 0.0
-    balls.phase[which[stands]] = REST
+    balls.spin[which] = compute_rolling_spin(balls.velocity[which], ball) + decayed * [0, 0, 1] if ball.friction else decayed
+    stopped = slower <= 1e-4
+    balls.velocity[which[stopped]] = 0.0
+    balls.phase[which[stopped]] = REST
     return taken
 
 
-def _closed(position, velocity, spin, steps, ball: Ball) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _compute_linear_flight(position, velocity, spin, steps, ball: Ball) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Compute flight under gravity and linear drag alone, over `steps` (W,) s of any length."""
     drag = ball.linear_drag * steps
     falling = np.array([0.0, 0.0, -ball.gravity])
-    first, second = drag_shares(drag)
+    first, second = compute_drag_factors(drag)
     place = position + velocity * (steps * first)[:, None] + falling * (steps**2 * second)[:, None]
     faster = velocity * np.exp(-drag)[:, None] + falling * (steps * first)[:, None]
     return place, faster, spin * np.exp(-ball.spin_decay * steps)[:, None]
 
 
-def _runge_kutta(position, velocity, spin, steps, ball: Ball) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _integrate_runge_kutta(position, velocity, spin, steps, ball: Ball) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Integrate one step of `steps` (W,) s by the classical fourth-order method, with the exact decay of the spin."""
     h = steps[:, None]
     half, whole = (spin * np.exp(-ball.spin_decay * steps * share)[:, None] for share in (0.5, 1.0))
-    one = in_air(velocity, spin, ball)
-    two = in_air(velocity + 0.5 * h * one, half, ball)
-    three = in_air(velocity + 0.5 * h * two, half, ball)
-    four = in_air(velocity + h * three, whole, ball)
+    one = compute_air_acceleration(velocity, spin, ball)
+    two = compute_air_acceleration(velocity + 0.5 * h * one, half, ball)
+    three = compute_air_acceleration(velocity + 0.5 * h * two, half, ball)
+    four = compute_air_acceleration(velocity + h * three, whole, ball)
     place = position + h * velocity + h * h / 6.0 * (one + two + three)
     return place, velocity + h / 6.0 * (one + 2.0 * (two + three) + four), whole

@@ -10,12 +10,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..annotation.striking import BODY_PARTS, Surface, part_surfaces
+from ..annotation.striking import BODY_PARTS, Surface, build_part_surfaces
 from ..base.errors import InputError
 from ..base.vectors import unit_vector, unit_vectors
 from ..motion import quaternion
-from ..motion.humanoid import heading_from_positions, identify
-from ..motion.motion import Motion, at_frames, pose_kinematics
+from ..motion.humanoid import compute_heading_from_positions, identify_joints
+from ..motion.motion import Motion, sample_frames, compute_pose
 from ..motion.skeleton import Skeleton
 from ..motion.track import BALL_RADIUS
 
@@ -49,7 +49,7 @@ class Tool:
     def __str__(self):
         return f"{self.name}: {self.length:g} m long, strikes with {self.reach:g} m, {self.radius:g} m thick"
 
-    def for_body(self, size: float) -> Tool:
+    def scale_to_library(self, size: float) -> Tool:
         """Scale the tool to the library's body size, so that it keeps its own size on the body.
 
         Args:
@@ -60,7 +60,7 @@ class Tool:
         return replace(self, length=self.length / size, radius=self.radius / size, reach=self.reach / size)
 
 
-def striking_surface(skeleton: Skeleton, part: str, side: str = "", tool: Tool | None = None) -> Surface:
+def find_striking_surface(skeleton: Skeleton, part: str, side: str = "", tool: Tool | None = None) -> Surface:
     """Find the surface of a body that meets the ball.
 
     Args:
@@ -76,9 +76,9 @@ def striking_surface(skeleton: Skeleton, part: str, side: str = "", tool: Tool |
     if part in ("foot", "hand", "tool") and side not in ("left", "right"):
         raise InputError("part", f"{part} of side {side!r}", "left or right")
     if part == "tool":
-        return _tool(skeleton, side, tool or Tool())
+        return _build_tool_surface(skeleton, side, tool or Tool())
     if part in BODY_PARTS:
-        found = part_surfaces(skeleton, part, (side,))
+        found = build_part_surfaces(skeleton, part, (side,))
         if found:
             return found[0]
     elif part in skeleton.names:
@@ -87,8 +87,8 @@ def striking_surface(skeleton: Skeleton, part: str, side: str = "", tool: Tool |
     raise InputError("part", f"{part!r}, which the skeleton lacks", f"one of {', '.join(PARTS)}, or a joint's name")
 
 
-def _tool(skeleton: Skeleton, side: str, tool: Tool) -> Surface:
-    hand = getattr(identify(skeleton), side).hand
+def _build_tool_surface(skeleton: Skeleton, side: str, tool: Tool) -> Surface:
+    hand = getattr(identify_joints(skeleton), side).hand
     if hand is None:
         raise InputError("part", f"a tool in the {side} hand, which the skeleton lacks", "a skeleton with hands")
     along = unit_vector(skeleton.offsets[hand])
@@ -97,7 +97,7 @@ def _tool(skeleton: Skeleton, side: str, tool: Tool) -> Surface:
 
 
 @dataclass(frozen=True, eq=False)
-class StruckFrom:
+class StrikeSurface:
     """A striking surface at N frames, in the body's own frame at each.
 
     Attributes:
@@ -113,7 +113,7 @@ class StruckFrom:
     velocity: np.ndarray
 
 
-def struck_from(motion: Motion, frames: np.ndarray, surface: Surface) -> StruckFrom:
+def sample_strike_surface(motion: Motion, frames: np.ndarray, surface: Surface) -> StrikeSurface:
     """Sample a striking surface of a motion.
 
     Args:
@@ -126,23 +126,23 @@ def struck_from(motion: Motion, frames: np.ndarray, surface: Surface) -> StruckF
     frames = np.asarray(frames, dtype=float)
     step = _SECONDS * motion.fps
     (before, _, _), (lines, root, heading), (after, _, _) = (
-        _lines(motion, frames + offset, surface) for offset in (-step, 0.0, step)
+        _sample_lines(motion, frames + offset, surface) for offset in (-step, 0.0, step)
     )
-    taken = np.clip(frames + step, 0, len(motion) - 1) - np.clip(frames - step, 0, len(motion) - 1)
-    velocity = (after - before).mean(axis=0) * (motion.fps / np.maximum(taken, 1e-9))[:, None]
-    back = quaternion.about_up(-heading)
+    duration = np.clip(frames + step, 0, len(motion) - 1) - np.clip(frames - step, 0, len(motion) - 1)
+    velocity = (after - before).mean(axis=0) * (motion.fps / np.maximum(duration, 1e-9))[:, None]
+    back = quaternion.from_up_angle(-heading)
     start, end = (quaternion.rotate(back, line - root * [1.0, 1.0, 0.0]) for line in lines)
-    return StruckFrom(start, end, surface.radius, quaternion.rotate(back, velocity))
+    return StrikeSurface(start, end, surface.radius, quaternion.rotate(back, velocity))
 
 
-def _lines(motion: Motion, frames: np.ndarray, surface: Surface) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _sample_lines(motion: Motion, frames: np.ndarray, surface: Surface) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Sample the ends (2, N, 3) m of the surface's line, the root (N, 3) m and its heading (N,) rad."""
-    root, local = at_frames(motion, frames)
-    places, world = pose_kinematics(motion.skeleton, root, local)
-    return np.array(surface.line(places, world)), root, heading_from_positions(motion.skeleton, places)
+    root, local = sample_frames(motion, frames)
+    places, world = compute_pose(motion.skeleton, root, local)
+    return np.array(surface.compute_line(places, world)), root, compute_heading_from_positions(motion.skeleton, places)
 
 
-def ball_centre(struck: StruckFrom, normal: np.ndarray, ball_radius: float = BALL_RADIUS) -> np.ndarray:
+def compute_ball_centre(surface: StrikeSurface, normal: np.ndarray, ball_radius: float = BALL_RADIUS) -> np.ndarray:
     """Compute the centre of a ball that touches the surface on the ray from its middle along `normal`.
 
     Args:
@@ -152,22 +152,22 @@ def ball_centre(struck: StruckFrom, normal: np.ndarray, ball_radius: float = BAL
     Returns:
         (N, 3) m in the same frame, never lower than the ball's radius above the ground.
     """
-    along = 0.5 * (struck.end - struck.start)
+    along = 0.5 * (surface.end - surface.start)
     half = np.linalg.norm(along, axis=-1)
     unit = along / np.maximum(half, 1e-9)[:, None]
     normal = unit_vectors(normal)
     # The surface is a capsule. If the ray leaves it beside the line, the centre is at `beside` from the middle;
     # if it leaves at one of the round ends, at `beyond`.
     slope = np.abs(np.sum(normal * unit, axis=-1))
-    apart = struck.radius + ball_radius
-    beside = apart / np.maximum(np.sqrt(np.maximum(1.0 - slope**2, 0.0)), 1e-9)
-    beyond = half * slope + np.sqrt(np.maximum((half * slope) ** 2 - half**2 + apart**2, 0.0))
-    centre = 0.5 * (struck.start + struck.end) + np.where(beside * slope <= half, beside, beyond)[:, None] * normal
+    distance = surface.radius + ball_radius
+    beside = distance / np.maximum(np.sqrt(np.maximum(1.0 - slope**2, 0.0)), 1e-9)
+    beyond = half * slope + np.sqrt(np.maximum((half * slope) ** 2 - half**2 + distance**2, 0.0))
+    centre = 0.5 * (surface.start + surface.end) + np.where(beside * slope <= half, beside, beyond)[:, None] * normal
     centre[:, 2] = np.maximum(centre[:, 2], ball_radius)
     return centre
 
 
-def in_world(own: np.ndarray, place: np.ndarray, facing: np.ndarray | float) -> np.ndarray:
+def convert_to_world(points: np.ndarray, position: np.ndarray, heading: np.ndarray | float) -> np.ndarray:
     """Convert points from a body's own frame to the world.
 
     Args:
@@ -177,5 +177,5 @@ def in_world(own: np.ndarray, place: np.ndarray, facing: np.ndarray | float) -> 
     Returns:
         (N, 3) m, world frame.
     """
-    level = quaternion.turned_level(np.asarray(own)[..., :2], np.asarray(facing, dtype=float))
-    return np.concatenate([level + place, np.asarray(own)[..., 2:]], axis=-1)
+    level = quaternion.rotate_level(np.asarray(points)[..., :2], np.asarray(heading, dtype=float))
+    return np.concatenate([level + position, np.asarray(points)[..., 2:]], axis=-1)

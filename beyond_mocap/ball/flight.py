@@ -16,13 +16,13 @@ import numpy as np
 
 from ..base.errors import InputError
 from ..motion import quaternion
-from .physics import Ball, bounced, gripped, in_air, length, rolling_spin, sliding, slip, slowing
+from .physics import Ball, compute_bounce, compute_grip, compute_air_acceleration, vector_length, compute_rolling_spin, compute_sliding, compute_slip, compute_deceleration
 
-LEAST_HOP = 0.12
+MIN_HOP_SPEED = 0.12
 """m/s: a ball that leaves the ground more slowly stays on it; it would rise 0.7 mm."""
-STANDS_STILL = 1e-6
+MIN_SLIP_SPEED = 1e-6
 """m/s: below this velocity of its lowest point a ball rolls."""
-FINE = 1.0 / 480.0
+ROTATION_STEP = 1.0 / 480.0
 """s: the step in which rotations are accumulated."""
 _IMPACT_STEP = 1.0 / 480.0  # s between the positions tested before the bisection
 
@@ -48,7 +48,7 @@ class Launch:
 
 
 @dataclass(frozen=True, eq=False)
-class Piece:
+class FlightPiece:
     """A part of a flight.
 
     Attributes:
@@ -80,7 +80,7 @@ class Flight:
 
     launch: Launch
     ball: Ball
-    pieces: tuple[Piece, ...]
+    pieces: tuple[FlightPiece, ...]
     bounces: np.ndarray
     rolls_from: float | None
     rests_from: float | None
@@ -113,15 +113,15 @@ class Flight:
         The rotation is the identity at the launch; signs are continuous.
         """
         times = np.clip(np.asarray(times, float), self.launch.time, self.end)
-        steps = np.arange(self.launch.time, self.end, FINE)
+        steps = np.arange(self.launch.time, self.end, ROTATION_STEP)
         knots = np.unique(np.concatenate([steps, [piece.first for piece in self.pieces], times]))
         spins = self.spin(0.5 * (knots[1:] + knots[:-1]))
         turns = quaternion.from_rotation_vector(spins * np.diff(knots)[:, None])
-        turned = np.concatenate([quaternion.identity(1), _one_after_another(turns)])
-        return quaternion.continuous(quaternion.normalized(turned[np.searchsorted(knots, times)]))
+        accumulated = np.concatenate([quaternion.identity(1), _accumulate_rotations(turns)])
+        return quaternion.unify_signs(quaternion.normalize(accumulated[np.searchsorted(knots, times)]))
 
 
-def fly(launch: Launch, ball: Ball, seconds: float, ground: float = 0.0, landing: bool = False) -> Flight:
+def simulate_flight(launch: Launch, ball: Ball, seconds: float, ground: float = 0.0, landing: bool = False) -> Flight:
     """Simulate a ball over level ground (eq. 6).
 
     Args:
@@ -138,7 +138,7 @@ def fly(launch: Launch, ball: Ball, seconds: float, ground: float = 0.0, landing
     if not 0.0 <= seconds < np.inf:
         raise InputError("flight", f"a duration of {seconds} s", "a duration of 0 s or more")
     flight = _Integrator(launch, ball, launch.time + max(float(seconds), 1e-9), ground + ball.radius)
-    return flight.whole(landing)
+    return flight.integrate_flight(landing)
 
 
 class _Integrator:
@@ -150,109 +150,109 @@ class _Integrator:
         self.position = np.array(launch.position, float)
         self.position[2] = max(self.position[2], low)
         self.velocity, self.spin = np.array(launch.velocity, float), np.array(launch.spin, float)
-        self.pieces: list[Piece] = []
+        self.pieces: list[FlightPiece] = []
         self.bounces: list[float] = []
         self.rolls_from: float | None = None
         self.rests_from: float | None = None
 
-    def whole(self, landing: bool) -> Flight:
+    def integrate_flight(self, landing: bool) -> Flight:
         """Integrate air, slide, roll and rest in order; with `landing`, stop at the first landing."""
-        if self.position[2] <= self.low and self.velocity[2] <= LEAST_HOP:
-            self._meet_ground()
-        while self._flies() and self._left():
-            self._air()
-            if landing and self._left():
+        if self.position[2] <= self.low and self.velocity[2] <= MIN_HOP_SPEED:
+            self._apply_bounce()
+        while self._is_in_air() and self._has_time_left():
+            self._integrate_air()
+            if landing and self._has_time_left():
                 self.end = self.time
-        if self._left():
-            self._slide()
-        if self._left():
-            self._roll()
-        if self._left() or not self.pieces:
-            self._rest()
+        if self._has_time_left():
+            self._integrate_slide()
+        if self._has_time_left():
+            self._integrate_roll()
+        if self._has_time_left() or not self.pieces:
+            self._add_rest()
         return Flight(launch=self.launch, ball=self.ball, pieces=tuple(self.pieces), bounces=np.array(self.bounces),
                       rolls_from=self.rolls_from, rests_from=self.rests_from, end=self.end)
 
-    def _left(self) -> bool:
+    def _has_time_left(self) -> bool:
         return self.time < self.end
 
-    def _flies(self) -> bool:
+    def _is_in_air(self) -> bool:
         return self.position[2] > self.low or self.velocity[2] > 0.0
 
-    def _air(self) -> None:
+    def _integrate_air(self) -> None:
         """Integrate a flight up to its bounce or the end."""
-        def change(_, state):
-            faster = in_air(state[3:6], state[6:], self.ball)
+        def compute_derivative(_, state):
+            faster = compute_air_acceleration(state[3:6], state[6:], self.ball)
             return np.concatenate([state[3:6], faster, -self.ball.spin_decay * state[6:]])
 
-        def lands(_, state):  # a rising ball has not landed, even if it still touches the ground
+        def measure_height(_, state):  # a rising ball has not landed, even if it still touches the ground
             return state[2] - self.low + (state[5] > 0.0)
 
-        self._integrate("air", change, lands)
-        if self._left():
+        self._integrate_piece("air", compute_derivative, measure_height)
+        if self._has_time_left():
             self.position[2] = self.low
-            self._meet_ground()
+            self._apply_bounce()
 
-    def _meet_ground(self) -> None:
+    def _apply_bounce(self) -> None:
         """Apply the bounce; too low a hop is none."""
-        self.velocity, self.spin = bounced(self.velocity, self.spin, self.ball)
-        if self.velocity[2] > LEAST_HOP:
+        self.velocity, self.spin = compute_bounce(self.velocity, self.spin, self.ball)
+        if self.velocity[2] > MIN_HOP_SPEED:
             self.bounces.append(self.time)
         else:
             self.velocity[2] = 0.0
 
-    def _slide(self) -> None:
+    def _integrate_slide(self) -> None:
         """Integrate the slide over the ground until the lowest point has no slip."""
         self.rolls_from = self.time
-        over = slip(self.velocity, self.spin, self.ball)
-        if self.ball.friction and length(over) > STANDS_STILL:
-            def change(_, state):
-                faster, turning = sliding(state[3:6], state[6:], self.ball, over)
+        over = compute_slip(self.velocity, self.spin, self.ball)
+        if self.ball.friction and vector_length(over) > MIN_SLIP_SPEED:
+            def compute_derivative(_, state):
+                faster, turning = compute_sliding(state[3:6], state[6:], self.ball, over)
                 return np.concatenate([state[3:6], faster, turning])
 
-            def stands(_, state):
-                return slip(state[3:6], state[6:], self.ball) @ over
+            def measure_slip(_, state):
+                return compute_slip(state[3:6], state[6:], self.ball) @ over
 
-            self._integrate("slide", change, stands)
-        if self._left():
-            self.velocity, self.spin = gripped(self.velocity, self.spin, self.ball)
+            self._integrate_piece("slide", compute_derivative, measure_slip)
+        if self._has_time_left():
+            self.velocity, self.spin = compute_grip(self.velocity, self.spin, self.ball)
 
-    def _roll(self) -> None:
+    def _integrate_roll(self) -> None:
         """Integrate the roll: straight, with falling speed; a ball without friction keeps its spin."""
         self.rolls_from = self.time
-        speed = length(self.velocity)
-        if speed < STANDS_STILL:
+        speed = vector_length(self.velocity)
+        if speed < MIN_SLIP_SPEED:
             return
         along, spin = self.velocity / speed, self.spin
         about_up = np.array([0.0, 0.0, spin[2]])
         if self.ball.friction:
             spin = about_up
 
-        def change(_, state):
-            return np.concatenate([state[3:6], -along * slowing(state[3:6] @ along, self.ball),
+        def compute_derivative(_, state):
+            return np.concatenate([state[3:6], -along * compute_deceleration(state[3:6] @ along, self.ball),
                                    -self.ball.spin_decay * state[6:]])
 
-        def stands(_, state):
+        def measure_speed(_, state):
             return state[3:6] @ along
 
         self.spin = spin
-        self._integrate("roll", change, stands)
+        self._integrate_piece("roll", compute_derivative, measure_speed)
         if self.ball.friction:
             free = self.pieces[-1].state
 
             def state(times):
                 out = free(times)
-                out[:, 6:] += rolling_spin(out[:, 3:6], self.ball)
+                out[:, 6:] += compute_rolling_spin(out[:, 3:6], self.ball)
                 return out
 
-            self.pieces[-1] = Piece("roll", self.pieces[-1].first, self.pieces[-1].last, state)
-        if self._left():
+            self.pieces[-1] = FlightPiece("roll", self.pieces[-1].first, self.pieces[-1].last, state)
+        if self._has_time_left():
             self.velocity = np.zeros(3)
 
-    def _rest(self) -> None:
+    def _add_rest(self) -> None:
         """Add the piece in which the ball rests; the ground brakes the spin it has left."""
         self.rests_from = first = self.time
         position, spin = self.position.copy(), self.spin.copy()
-        size, brake = float(length(spin)), self.ball.rolling / self.ball.radius
+        size, brake = float(vector_length(spin)), self.ball.rolling / self.ball.radius
 
         def state(times):
             out = np.zeros((len(times), 9))
@@ -260,9 +260,9 @@ class _Integrator:
             out[:, 6:] = spin * (np.maximum(size - brake * (times - first), 0.0) / max(size, 1e-12))[:, None]
             return out
 
-        self._keep("rest", self.end, state)
+        self._add_piece("rest", self.end, state)
 
-    def _integrate(self, kind: str, change, event) -> None:
+    def _integrate_piece(self, kind: str, change, event) -> None:
         """Integrate one piece until the event or the end; the state is then the one at its last moment."""
         from scipy.integrate import solve_ivp
 
@@ -271,16 +271,16 @@ class _Integrator:
         found = solve_ivp(change, (self.time, self.end), start, method="DOP853", rtol=1e-9, atol=1e-10, events=event,
                           dense_output=True)
         solution, last = found.sol, float(found.t[-1])
-        self._keep(kind, last, lambda times: solution(times).T)
+        self._add_piece(kind, last, lambda times: solution(times).T)
         final = found.y[:, -1]
         self.position, self.velocity, self.spin = final[:3].copy(), final[3:6].copy(), final[6:].copy()
 
-    def _keep(self, kind: str, last: float, state) -> None:
-        self.pieces.append(Piece(kind, self.time, last, state))
+    def _add_piece(self, kind: str, last: float, state) -> None:
+        self.pieces.append(FlightPiece(kind, self.time, last, state))
         self.time = last if last < self.end else self.end
 
 
-def _one_after_another(turns: np.ndarray) -> np.ndarray:
+def _accumulate_rotations(turns: np.ndarray) -> np.ndarray:
     """Accumulate the rotations (N, 4), each applied after all before it, in log N passes."""
     out, shift = turns.copy(), 1
     # A parallel prefix product: after each pass, row i holds the product of the last 2 * shift rotations up to i.
@@ -309,8 +309,8 @@ def find_crossing(flight: Flight, target: np.ndarray) -> np.ndarray:
     if last <= flight.launch.time:  # launched along the ground
         last = flight.end
     times = np.append(np.arange(flight.launch.time, last, _IMPACT_STEP), last)
-    gone = (flight.at(times) - start) @ level
-    beyond = np.flatnonzero(gone >= far)
+    distances = (flight.at(times) - start) @ level
+    beyond = np.flatnonzero(distances >= far)
     if not len(beyond):
         return flight.at([last])[0] if last < flight.end else np.full(3, np.nan)
     low, high = times[max(beyond[0] - 1, 0)], times[beyond[0]]
@@ -320,7 +320,7 @@ def find_crossing(flight: Flight, target: np.ndarray) -> np.ndarray:
     return flight.at([high])[0]
 
 
-def meet_wall(position: np.ndarray, velocity: np.ndarray, ball: Ball, foot: np.ndarray, ahead: np.ndarray,
+def find_wall_impact(position: np.ndarray, velocity: np.ndarray, ball: Ball, foot: np.ndarray, ahead: np.ndarray,
                spin: np.ndarray | tuple[float, float, float] = (0.0, 0.0, 0.0)) -> tuple[np.ndarray, float]:
     """Find where and when a ball meets a wall, or the ground if that comes first.
 
@@ -338,8 +338,8 @@ def meet_wall(position: np.ndarray, velocity: np.ndarray, ball: Ball, foot: np.n
         Position (3,) m of the ball's centre, and seconds after the launch.
     """
     unhindered = np.hypot(*(foot - position[:2])) / max(np.hypot(*velocity[:2]), 1e-9)
-    free = position[2] > ball.radius or velocity[2] > LEAST_HOP  # otherwise it bounces at the launch
-    flight = fly(Launch(0.0, position, velocity, spin), ball, min(_LONGEST_TO_WALL, 0.5 + 4.0 * unhindered),
+    free = position[2] > ball.radius or velocity[2] > MIN_HOP_SPEED  # otherwise it bounces at the launch
+    flight = simulate_flight(Launch(0.0, position, velocity, spin), ball, min(_LONGEST_TO_WALL, 0.5 + 4.0 * unhindered),
                  landing=free)
     touches = [time for time in (*flight.bounces[:1], flight.rolls_from) if time is not None and time > _WALL_STEP]
     last = min(touches, default=flight.end)

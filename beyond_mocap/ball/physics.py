@@ -81,9 +81,9 @@ HANDBALL = Ball("handball", 0.094, 0.45, 9.81, drag=0.0093, lift=(0.0370, 2.0, 0
 """Size 3: 58 to 60 cm round, 425 to 475 g; C_D 0.25 as for other large balls above the drag crisis."""
 BALLS: dict[str, Ball] = {ball.name: ball for ball in (PAPER, FOOTBALL, VOLLEYBALL, TENNIS)}
 
-THROWN: dict[str, Ball] = {ball.name: ball for ball in (BASEBALL, TENNIS, HANDBALL, VOLLEYBALL, FOOTBALL)}
+THROWN_BALLS: dict[str, Ball] = {ball.name: ball for ball in (BASEBALL, TENNIS, HANDBALL, VOLLEYBALL, FOOTBALL)}
 """Balls that are thrown by hand."""
-FASTEST: dict[str, float] = {"foot": 38.0, "head": 23.0, "chest": 10.0, "hand": 38.0, "tool": 73.0}
+HUMAN_BALL_SPEEDS: dict[str, float] = {"foot": 38.0, "head": 23.0, "chest": 10.0, "hand": 38.0, "tool": 73.0}
 """m/s: the highest speed a person gives the ball, by body part.
 Foot: professionals' instep kicks reach 30 to 34 m/s (Kellis & Katis,
 "Biomechanical characteristics of instep soccer kick", J. Sports Sci. Med. 6 (2007)), records some more. Hand: the
@@ -91,13 +91,13 @@ fastest volleyball serves and spikes (some 137 km/h). Tool: the fastest tennis s
 best runs up and dives, rounded up."""
 
 
-def length(vectors: np.ndarray) -> np.ndarray:
+def vector_length(vectors: np.ndarray) -> np.ndarray:
     """Lengths (...,) of vectors (..., 3)."""
     x, y, z = vectors[..., 0], vectors[..., 1], vectors[..., 2]
     return np.sqrt(x * x + y * y + z * z)
 
 
-def in_air(velocity: np.ndarray, spin: np.ndarray, ball: Ball) -> np.ndarray:
+def compute_air_acceleration(velocity: np.ndarray, spin: np.ndarray, ball: Ball) -> np.ndarray:
     """Compute the acceleration of balls in the air (eq. 3).
 
     Args:
@@ -107,11 +107,11 @@ def in_air(velocity: np.ndarray, spin: np.ndarray, ball: Ball) -> np.ndarray:
     Returns:
         (..., 3) m/s^2.
     """
-    speed = length(velocity)
+    speed = vector_length(velocity)
     out = velocity * -(ball.linear_drag + ball.drag * speed)[..., None]
     scale, a, b = ball.lift
     if scale and spin.any():
-        rim = ball.radius * length(spin)
+        rim = ball.radius * vector_length(spin)
         share = scale * ball.radius * speed / np.maximum(a * rim + b * speed, 1e-9)
         wx, wy, wz = spin[..., 0], spin[..., 1], spin[..., 2]
         vx, vy, vz = velocity[..., 0], velocity[..., 1], velocity[..., 2]
@@ -122,7 +122,7 @@ def in_air(velocity: np.ndarray, spin: np.ndarray, ball: Ball) -> np.ndarray:
     return out
 
 
-def bounced(velocity: np.ndarray, spin: np.ndarray, ball: Ball) -> tuple[np.ndarray, np.ndarray]:
+def compute_bounce(velocity: np.ndarray, spin: np.ndarray, ball: Ball) -> tuple[np.ndarray, np.ndarray]:
     """Compute velocity and spin after a bounce on level ground: the impulse of eq. 5.
 
     The horizontal push also changes the spin; at most it stops the ball's lowest point.
@@ -135,22 +135,22 @@ def bounced(velocity: np.ndarray, spin: np.ndarray, ball: Ball) -> tuple[np.ndar
         Velocity (..., 3) m/s and spin (..., 3) rad/s after it.
     """
     down = np.maximum(-velocity[..., 2], 0.0)
-    push = _across(velocity, spin, ball, ball.friction * (1.0 + ball.restitution) * down)
+    push = _compute_contact_push(velocity, spin, ball, ball.friction * (1.0 + ball.restitution) * down)
     after = velocity + push
     after[..., 2] = np.where(velocity[..., 2] < 0.0, ball.restitution * down, velocity[..., 2])
-    return after, spin + _turned_by(push, ball)
+    return after, spin + _compute_spin_change(push, ball)
 
 
-def gripped(velocity: np.ndarray, spin: np.ndarray, ball: Ball) -> tuple[np.ndarray, np.ndarray]:
+def compute_grip(velocity: np.ndarray, spin: np.ndarray, ball: Ball) -> tuple[np.ndarray, np.ndarray]:
     """Compute velocity and spin (..., 3) once the lowest point has no slip and the ball rolls.
 
     A ball without friction keeps both.
     """
-    push = _across(velocity, spin, ball, np.full(velocity.shape[:-1], np.inf if ball.friction else 0.0))
-    return velocity + push, spin + _turned_by(push, ball)
+    push = _compute_contact_push(velocity, spin, ball, np.full(velocity.shape[:-1], np.inf if ball.friction else 0.0))
+    return velocity + push, spin + _compute_spin_change(push, ball)
 
 
-def slip(velocity: np.ndarray, spin: np.ndarray, ball: Ball) -> np.ndarray:
+def compute_slip(velocity: np.ndarray, spin: np.ndarray, ball: Ball) -> np.ndarray:
     """Compute the horizontal velocity (..., 3) m/s of the ball's lowest point relative to the ground."""
     out = np.zeros(np.broadcast_shapes(velocity.shape, spin.shape))
     out[..., 0] = velocity[..., 0] - ball.radius * spin[..., 1]
@@ -158,7 +158,7 @@ def slip(velocity: np.ndarray, spin: np.ndarray, ball: Ball) -> np.ndarray:
     return out
 
 
-def sliding(velocity: np.ndarray, spin: np.ndarray, ball: Ball,
+def compute_sliding(velocity: np.ndarray, spin: np.ndarray, ball: Ball,
             ahead: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
     """Compute the accelerations of balls that slide over the ground.
 
@@ -171,27 +171,27 @@ def sliding(velocity: np.ndarray, spin: np.ndarray, ball: Ball,
     Returns:
         Acceleration (..., 3) m/s^2 and angular acceleration (..., 3) rad/s^2.
     """
-    over = slip(velocity, spin, ball)
+    over = compute_slip(velocity, spin, ball)
     if ahead is not None:
         over = over * np.where(np.sum(over * ahead, axis=-1) < 0.0, -1.0, 1.0)[..., None]
-    rub = over * (-ball.friction * ball.gravity / np.maximum(length(over), 1e-12))[..., None]
-    air = velocity * -(ball.linear_drag + ball.drag * length(velocity))[..., None]
-    return rub + air, _turned_by(rub, ball) - ball.spin_decay * spin
+    rub = over * (-ball.friction * ball.gravity / np.maximum(vector_length(over), 1e-12))[..., None]
+    air = velocity * -(ball.linear_drag + ball.drag * vector_length(velocity))[..., None]
+    return rub + air, _compute_spin_change(rub, ball) - ball.spin_decay * spin
 
 
-def rolling_spin(velocity: np.ndarray, ball: Ball) -> np.ndarray:
+def compute_rolling_spin(velocity: np.ndarray, ball: Ball) -> np.ndarray:
     """Compute the horizontal spin (..., 3) rad/s of a ball that rolls at velocity (..., 3) m/s."""
     out = np.zeros(velocity.shape)
     out[..., 0], out[..., 1] = -velocity[..., 1] / ball.radius, velocity[..., 0] / ball.radius
     return out
 
 
-def slowing(speed: np.ndarray, ball: Ball) -> np.ndarray:
+def compute_deceleration(speed: np.ndarray, ball: Ball) -> np.ndarray:
     """Compute the deceleration (...,) m/s^2, by ground and air, of a ball that rolls at `speed` (...,) m/s."""
     return ball.rolling + ball.linear_drag * speed + ball.drag * speed**2
 
 
-def energy(position: np.ndarray, velocity: np.ndarray, spin: np.ndarray, ball: Ball) -> np.ndarray:
+def compute_energy(position: np.ndarray, velocity: np.ndarray, spin: np.ndarray, ball: Ball) -> np.ndarray:
     """Compute the energy of balls: translation, rotation, and height of the centre above z = 0.
 
     Args:
@@ -202,19 +202,19 @@ def energy(position: np.ndarray, velocity: np.ndarray, spin: np.ndarray, ball: B
     Returns:
         (...,) J.
     """
-    way = 0.5 * np.einsum("...i,...i->...", velocity, velocity)
-    turning = 0.5 * ball.inertia * ball.radius**2 * np.einsum("...i,...i->...", spin, spin)
-    return ball.mass * (way + turning + ball.gravity * position[..., 2])
+    translation = 0.5 * np.einsum("...i,...i->...", velocity, velocity)
+    rotation = 0.5 * ball.inertia * ball.radius**2 * np.einsum("...i,...i->...", spin, spin)
+    return ball.mass * (translation + rotation + ball.gravity * position[..., 2])
 
 
-def _across(velocity, spin, ball: Ball, most) -> np.ndarray:
+def _compute_contact_push(velocity, spin, ball: Ball, most) -> np.ndarray:
     """Compute the horizontal velocity change (..., 3) m/s that stops the lowest point, limited to `most` (...,) m/s."""
-    wanted = slip(velocity, spin, ball) * (-ball.inertia / (1.0 + ball.inertia))
-    size = length(wanted)
-    return wanted * np.minimum(1.0, most / np.maximum(size, 1e-12))[..., None]
+    push = compute_slip(velocity, spin, ball) * (-ball.inertia / (1.0 + ball.inertia))
+    size = vector_length(push)
+    return push * np.minimum(1.0, most / np.maximum(size, 1e-12))[..., None]
 
 
-def _turned_by(push: np.ndarray, ball: Ball) -> np.ndarray:
+def _compute_spin_change(push: np.ndarray, ball: Ball) -> np.ndarray:
     """Compute the spin change (..., 3) rad/s by a horizontal velocity change (..., 3) m/s at the lowest point."""
     out = np.zeros(push.shape)
     out[..., 0], out[..., 1] = push[..., 1], -push[..., 0]

@@ -12,11 +12,11 @@ ROLLING = 1.0
 """m/s^2: deceleration of a football on turf (FIFA's test of pitches: 4 to 8 m of roll from a 1 m ramp)."""
 _GRAVITY, _BOUNCE = 9.81, 0.55
 _ON_GROUND = 0.03  # m above its radius up to which a ball counts as rolling
-_LEAST_HOP = 0.02  # m; a lower hop counts as rolling
+_MIN_HOP_HEIGHT = 0.02  # m; a lower hop counts as rolling
 
 
 @dataclass(frozen=True, eq=False)
-class Speeds:
+class RollSpeeds:
     """Velocities of rolling balls on the ground.
 
     Attributes:
@@ -25,13 +25,13 @@ class Speeds:
         rolling_seconds: (...,) s before the ball rests.
     """
 
-    leaves: np.ndarray
-    arrives: np.ndarray
-    rolling: np.ndarray
+    start_velocity: np.ndarray
+    end_velocity: np.ndarray
+    rolling_seconds: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
-class Rolls:
+class RollResult:
     """P rolling balls.
 
     Attributes:
@@ -40,10 +40,10 @@ class Rolls:
     """
 
     balls: np.ndarray
-    missed: np.ndarray
+    height_error: np.ndarray
 
 
-def speeds_of(starts: np.ndarray, ends: np.ndarray, seconds: np.ndarray) -> Speeds:
+def compute_roll_speeds(starts: np.ndarray, ends: np.ndarray, seconds: np.ndarray) -> RollSpeeds:
     """Compute the speeds of a ball that rolls from `starts` to `ends` in a given time.
 
     It decelerates by ROLLING all the time, or comes to rest early if it has time.
@@ -55,16 +55,16 @@ def speeds_of(starts: np.ndarray, ends: np.ndarray, seconds: np.ndarray) -> Spee
     Returns:
         The speeds.
     """
-    way = ends[..., :2] - starts[..., :2]
-    length = np.hypot(way[..., 0], way[..., 1])
+    offset = ends[..., :2] - starts[..., :2]
+    length = np.hypot(offset[..., 0], offset[..., 1])
     rests = length < 0.5 * ROLLING * seconds**2
     fast = np.where(rests, np.sqrt(2.0 * ROLLING * length), length / seconds + 0.5 * ROLLING * seconds)
     rolling = np.where(rests, fast / ROLLING, seconds)
-    along = way / np.maximum(length, 1e-9)[..., None]
-    return Speeds(along * fast[..., None], along * (fast - ROLLING * rolling)[..., None], rolling)
+    along = offset / np.maximum(length, 1e-9)[..., None]
+    return RollSpeeds(along * fast[..., None], along * (fast - ROLLING * rolling)[..., None], rolling)
 
 
-def rolls(starts: np.ndarray, ends: np.ndarray, frames: np.ndarray, fps: float) -> Rolls:
+def simulate_rolls(starts: np.ndarray, ends: np.ndarray, frames: np.ndarray, fps: float) -> RollResult:
     """Simulate balls that roll from `starts` to `ends`.
 
     A ball that starts high falls and hops; a ball that ends high is sent upward to arrive there.
@@ -77,40 +77,40 @@ def rolls(starts: np.ndarray, ends: np.ndarray, frames: np.ndarray, fps: float) 
     Returns:
         The balls' positions and height errors.
     """
-    speeds = speeds_of(starts, ends, frames / fps)
+    speeds = compute_roll_speeds(starts, ends, frames / fps)
     at = np.arange(1, int(frames.max()) + 1) / fps
-    gone = np.minimum(at, speeds.rolling[:, None])
-    fast = np.hypot(speeds.leaves[:, 0], speeds.leaves[:, 1])
-    along = speeds.leaves / np.maximum(fast, 1e-9)[:, None]
-    done = fast[:, None] * gone - 0.5 * ROLLING * gone**2
-    height, missed = _heights(starts[:, 2], ends[:, 2], frames / fps, at)
-    level = starts[:, None, :2] + done[..., None] * along[:, None]
-    return Rolls(np.concatenate([level, height[..., None]], axis=-1), missed)
+    rolling_times = np.minimum(at, speeds.rolling_seconds[:, None])
+    fast = np.hypot(speeds.start_velocity[:, 0], speeds.start_velocity[:, 1])
+    along = speeds.start_velocity / np.maximum(fast, 1e-9)[:, None]
+    distances = fast[:, None] * rolling_times - 0.5 * ROLLING * rolling_times**2
+    height, height_error = _compute_heights(starts[:, 2], ends[:, 2], frames / fps, at)
+    level = starts[:, None, :2] + distances[..., None] * along[:, None]
+    return RollResult(np.concatenate([level, height[..., None]], axis=-1), height_error)
 
 
-def _heights(starts: np.ndarray, ends: np.ndarray, seconds, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _compute_heights(starts: np.ndarray, ends: np.ndarray, seconds, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Compute heights (P, D) m at times `at` (D,) s, and their error (P,) m against `ends` (P,) m."""
-    out, missed = np.full((len(ends), len(at)), BALL_RADIUS), np.zeros(len(ends))
+    out, height_error = np.full((len(ends), len(at)), BALL_RADIUS), np.zeros(len(ends))
     for pair in np.flatnonzero(np.maximum(starts, ends) > BALL_RADIUS + _ON_GROUND):
         start, end, until = starts[pair], ends[pair], seconds[pair]
         if end > BALL_RADIUS + _ON_GROUND:
             upward = (end - start) / until + 0.5 * _GRAVITY * until
             out[pair] = np.maximum(start + upward * at - 0.5 * _GRAVITY * at**2, BALL_RADIUS)
-            missed[pair] = max(out[pair, at < until].max(initial=0.0) - max(start, end), 0.0)
+            height_error[pair] = max(out[pair, at < until].max(initial=0.0) - max(start, end), 0.0)
         else:
-            out[pair] = _falling(start, at)
-            missed[pair] = abs(np.interp(until, at, out[pair]) - end)
-    return out, missed
+            out[pair] = _simulate_hops(start, at)
+            height_error[pair] = abs(np.interp(until, at, out[pair]) - end)
+    return out, height_error
 
 
-def _falling(start: float, at: np.ndarray) -> np.ndarray:
+def _simulate_hops(start: float, at: np.ndarray) -> np.ndarray:
     """Simulate a ball dropped at `start` m that hops until it rolls; (D,) m at times `at` (D,) s."""
     above = max(start - BALL_RADIUS, 0.0)
-    if above < _LEAST_HOP:
+    if above < _MIN_HOP_HEIGHT:
         return np.full(len(at), BALL_RADIUS)
     out = above - 0.5 * _GRAVITY * at**2
     lands, up = np.sqrt(2.0 * above / _GRAVITY), np.sqrt(2.0 * above * _GRAVITY) * _BOUNCE
-    while up**2 / (2.0 * _GRAVITY) > _LEAST_HOP:
+    while up**2 / (2.0 * _GRAVITY) > _MIN_HOP_HEIGHT:
         since = at - lands
         out = np.where(since > 0.0, up * since - 0.5 * _GRAVITY * since**2, out)
         lands, up = lands + 2.0 * up / _GRAVITY, up * _BOUNCE

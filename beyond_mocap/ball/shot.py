@@ -15,12 +15,12 @@ import numpy as np
 
 from ..annotation.striking import Surface
 from ..base.errors import InputError
-from ..base.time_series import interpolate
-from ..motion.motion import Motion, at_frames, pose_kinematics
+from ..base.time_series import interpolate_columns
+from ..motion.motion import Motion, sample_frames, compute_pose
 from . import batch
-from .aim import CLOSE, Aimed, aim, along_ground, out_of_reach
-from .contact import StruckFrom, ball_centre
-from .physics import Ball, length
+from .aim import HIT_TOLERANCE, AimResult, solve_launches, solve_ground_launches, build_reach_error
+from .contact import StrikeSurface, compute_ball_centre
+from .physics import Ball, vector_length
 
 RISE = 0.3
 """Upward share of the horizontal distance in the first guess of a launch."""
@@ -49,7 +49,7 @@ class Strikes:
     velocity: np.ndarray
 
     @classmethod
-    def of(cls, motion: Motion, surface: Surface, rows: np.ndarray, frames: np.ndarray) -> Strikes:
+    def from_motion(cls, motion: Motion, surface: Surface, rows: np.ndarray, frames: np.ndarray) -> Strikes:
         """Sample the strikes of a motion.
 
         Args:
@@ -63,16 +63,16 @@ class Strikes:
         step = 0.5
         lines = []
         for offset in (-step, 0.0, step):
-            root, local = at_frames(motion, np.clip(rows + offset, 0, len(motion) - 1))
-            lines.append(np.array(surface.line(*pose_kinematics(motion.skeleton, root, local))))
-        taken = np.clip(rows + step, 0, len(motion) - 1) - np.clip(rows - step, 0, len(motion) - 1)
-        velocity = (lines[2] - lines[0]).mean(axis=0) * (motion.fps / np.maximum(taken, 1e-9))[:, None]
+            root, local = sample_frames(motion, np.clip(rows + offset, 0, len(motion) - 1))
+            lines.append(np.array(surface.compute_line(*compute_pose(motion.skeleton, root, local))))
+        duration = np.clip(rows + step, 0, len(motion) - 1) - np.clip(rows - step, 0, len(motion) - 1)
+        velocity = (lines[2] - lines[0]).mean(axis=0) * (motion.fps / np.maximum(duration, 1e-9))[:, None]
         return cls(frames=np.asarray(frames), start=lines[1][0], end=lines[1][1], radius=surface.radius,
                    velocity=velocity)
 
-    def balls(self, towards: np.ndarray, radius: float) -> np.ndarray:
+    def place_balls(self, towards: np.ndarray, radius: float) -> np.ndarray:
         """Place balls of `radius` m that leave along `towards` (N, 3): their centres (N, 3) m."""
-        return ball_centre(StruckFrom(self.start, self.end, self.radius, self.velocity), towards, radius)
+        return compute_ball_centre(StrikeSurface(self.start, self.end, self.radius, self.velocity), towards, radius)
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,28 +88,28 @@ class Shot:
 
     frames: np.ndarray
     starts: np.ndarray
-    aimed: Aimed
-    chosen: int
+    launches: AimResult
+    chosen_index: int
 
     @property
     def start(self) -> np.ndarray:
         """(3,) m: the ball's centre at the strike."""
-        return self.starts[self.chosen]
+        return self.starts[self.chosen_index]
 
     @property
     def velocity(self) -> np.ndarray:
         """(3,) m/s at the launch."""
-        return self.aimed.velocity[self.chosen]
+        return self.launches.velocity[self.chosen_index]
 
     @property
     def seconds(self) -> float:
         """s from the strike to the target."""
-        return float(self.aimed.seconds[self.chosen])
+        return float(self.launches.seconds[self.chosen_index])
 
 
-def shoot(strikes: Strikes, target: np.ndarray, ball: Ball, seconds: np.ndarray | None = None, bounces: int = 0,
-          turns: tuple[float, float] = (0.0, 0.0), ground: bool = False, fastest: float = np.inf,
-          near: Aimed | None = None, what: str = "aim") -> Shot:
+def solve_shot(strikes: Strikes, target: np.ndarray, ball: Ball, seconds: np.ndarray | None = None, bounces: int = 0,
+          spin_turns: tuple[float, float] = (0.0, 0.0), ground: bool = False, fastest: float = np.inf,
+          previous: AimResult | None = None, subject: str = "aim") -> Shot:
     """Solve the strike that sends a ball to a target.
 
     Args:
@@ -129,30 +129,30 @@ def shoot(strikes: Strikes, target: np.ndarray, ball: Ball, seconds: np.ndarray 
         InputError: if no frame has a possible launch, or the target is where the ball is struck.
     """
     target = np.asarray(target, float)
-    way = target - 0.5 * (strikes.start + strikes.end)
-    towards = way + length(way)[:, None] * [0.0, 0.0, RISE] if near is None else near.velocity
-    launch, about = (None, None) if near is None else (near.velocity, near.seconds)
-    spin = spins(way, turns)
+    direction = target - 0.5 * (strikes.start + strikes.end)
+    towards = direction + vector_length(direction)[:, None] * [0.0, 0.0, RISE] if previous is None else previous.velocity
+    initial_velocity, initial_seconds = (None, None) if previous is None else (previous.velocity, previous.seconds)
+    spin = compute_spins(direction, spin_turns)
     # The ball's position depends on the launch direction: solve twice, the second time from the first directions.
-    for _ in range(1 if near is not None else 2):
+    for _ in range(1 if previous is not None else 2):
         if ground:
             towards = towards * [1.0, 1.0, 0.0]
-        starts = strikes.balls(towards, ball.radius)
-        if length(starts - target).min() < ball.radius:
-            raise InputError(what, "the target is where the ball is struck", "a target farther away", "move the target")
-        aimed = along_ground(starts, target, ball, seconds, fastest=fastest) if ground else \
-            aim(starts, target, ball, seconds=seconds, bounces=bounces, spin=spin, fastest=fastest, near=launch,
-                about=about)
-        towards, launch, about = aimed.velocity, aimed.velocity, aimed.seconds
+        starts = strikes.place_balls(towards, ball.radius)
+        if vector_length(starts - target).min() < ball.radius:
+            raise InputError(subject, "the target is where the ball is struck", "a target farther away", "move the target")
+        result = solve_ground_launches(starts, target, ball, seconds, fastest=fastest) if ground else \
+            solve_launches(starts, target, ball, seconds=seconds, bounces=bounces, spin=spin, fastest=fastest, initial_velocity=initial_velocity,
+                initial_seconds=initial_seconds)
+        towards, initial_velocity, initial_seconds = result.velocity, result.velocity, result.seconds
     if ground:
         starts[:, 2] = ball.radius
-    if not aimed.possible.any():
-        best = int(np.argmin(np.where(aimed.miss <= CLOSE, length(aimed.velocity), np.inf)))
-        raise out_of_reach(starts, np.broadcast_to(target, starts.shape), aimed, index=best, fastest=fastest, what=what)
-    return Shot(strikes.frames, starts, aimed, _chosen(strikes, aimed))
+    if not result.possible.any():
+        best = int(np.argmin(np.where(result.miss <= HIT_TOLERANCE, vector_length(result.velocity), np.inf)))
+        raise build_reach_error(starts, np.broadcast_to(target, starts.shape), result, index=best, fastest=fastest, subject=subject)
+    return Shot(strikes.frames, starts, result, _choose_launch(strikes, result))
 
 
-def spins(way: np.ndarray, turns: tuple[float, float]) -> np.ndarray:
+def compute_spins(direction: np.ndarray, spin_turns: tuple[float, float]) -> np.ndarray:
     """Compute the spins of balls that leave along a direction.
 
     Args:
@@ -161,15 +161,15 @@ def spins(way: np.ndarray, turns: tuple[float, float]) -> np.ndarray:
     Returns:
         (N, 3) rad/s, world frame.
     """
-    level = way * [1.0, 1.0, 0.0] / np.maximum(length(way * [1.0, 1.0, 0.0]), 1e-9)[:, None]
-    back = np.stack([level[:, 1], -level[:, 0], np.zeros(len(way))], axis=1)
-    return 2.0 * np.pi * (turns[0] * back + turns[1] * np.array([0.0, 0.0, 1.0]))
+    level = direction * [1.0, 1.0, 0.0] / np.maximum(vector_length(direction * [1.0, 1.0, 0.0]), 1e-9)[:, None]
+    back = np.stack([level[:, 1], -level[:, 0], np.zeros(len(direction))], axis=1)
+    return 2.0 * np.pi * (spin_turns[0] * back + spin_turns[1] * np.array([0.0, 0.0, 1.0]))
 
 
-def _chosen(strikes: Strikes, aimed: Aimed) -> int:
+def _choose_launch(strikes: Strikes, launches: AimResult) -> int:
     """Choose, among the possible launches, the one along which the part moves fastest."""
-    along = aimed.velocity / np.maximum(length(aimed.velocity), 1e-9)[:, None]
-    return int(np.argmax(np.where(aimed.possible, np.sum(strikes.velocity * along, axis=1), -np.inf)))
+    along = launches.velocity / np.maximum(vector_length(launches.velocity), 1e-9)[:, None]
+    return int(np.argmax(np.where(launches.possible, np.sum(strikes.velocity * along, axis=1), -np.inf)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,10 +193,10 @@ class Arcs:
 
     def at(self, speed: float) -> np.ndarray:
         """Give the launch (3,) m/s with this speed, limited to the speeds that exist."""
-        return interpolate(speed, self.speeds, self.velocities)
+        return interpolate_columns(speed, self.speeds, self.velocities)
 
 
-def arcs(start: np.ndarray, target: np.ndarray, ball: Ball, spin: np.ndarray | None = None) -> Arcs:
+def solve_arcs(start: np.ndarray, target: np.ndarray, ball: Ball, spin: np.ndarray | None = None) -> Arcs:
     """Solve the launches that reach a target directly, without a bounce.
 
     Args:
@@ -207,16 +207,16 @@ def arcs(start: np.ndarray, target: np.ndarray, ball: Ball, spin: np.ndarray | N
     Returns:
         The launches from the slowest to the flattest.
     """
-    far = float(np.linalg.norm(np.asarray(target, float) - start))
-    least = far / 60.0
-    longest = max(_LONGEST * np.sqrt(2.0 * far / ball.gravity), 2.0 * least)
+    distance = float(np.linalg.norm(np.asarray(target, float) - start))
+    least = distance / 60.0
+    longest = max(_LONGEST * np.sqrt(2.0 * distance / ball.gravity), 2.0 * least)
     seconds = np.geomspace(least, longest, _TIMES)
-    found = aim(start, target, ball, seconds, spin=spin)
-    good = np.flatnonzero(found.miss <= CLOSE)
-    speeds = length(found.velocity[good])
+    result = solve_launches(start, target, ball, seconds, spin=spin)
+    good = np.flatnonzero(result.miss <= HIT_TOLERANCE)
+    speeds = vector_length(result.velocity[good])
     # Times up to the slowest launch, longest first: the flatter of the two launches of each speed.
     flat = good[: int(np.argmin(speeds)) + 1][::-1]
-    return Arcs(length(found.velocity[flat]), found.velocity[flat], seconds[flat])
+    return Arcs(vector_length(result.velocity[flat]), result.velocity[flat], seconds[flat])
 
 
 def is_out_of_reach(start: np.ndarray, target: np.ndarray, ball: Ball, speed: float,
@@ -234,10 +234,10 @@ def is_out_of_reach(start: np.ndarray, target: np.ndarray, ball: Ball, speed: fl
     Returns:
         True if the target is out of reach.
     """
-    way = np.asarray(target, float) - start
-    level = float(np.hypot(way[0], way[1]))
-    rise = np.minimum(np.arctan2(way[2], level) + _ELEVATIONS, np.radians(89.0))
-    ahead = np.array([way[0], way[1], 0.0]) / max(level, 1e-9)
+    offset = np.asarray(target, float) - start
+    level = float(np.hypot(offset[0], offset[1]))
+    rise = np.minimum(np.arctan2(offset[2], level) + _ELEVATIONS, np.radians(89.0))
+    ahead = np.array([offset[0], offset[1], 0.0]) / max(level, 1e-9)
     velocity = _SLACK * speed * (np.cos(rise)[:, None] * ahead + np.sin(rise)[:, None] * [0.0, 0.0, 1.0])
     count = np.zeros(len(rise), int)
     spin = np.zeros(3) if spin is None else np.asarray(spin, float)
@@ -246,12 +246,12 @@ def is_out_of_reach(start: np.ndarray, target: np.ndarray, ball: Ball, speed: fl
     longest = 2.0 * speed / ball.gravity + 1.0
     for _ in range(int(np.ceil(longest / batch.STEP))):
         before = balls.position
-        balls = batch.after(balls, ball, batch.STEP, most_bounces=0)
+        balls = batch.simulate_balls(balls, ball, batch.STEP, most_bounces=0)
         here, there = (np.array([(place - start) @ ahead, place[:, 2]]) for place in (before, balls.position))
         # A flight that crosses the target's distance in this step, at or above the target, can be lowered to hit it.
         passes = (here[0] < level) & (there[0] >= level)
         share = (level - here[0]) / np.maximum(there[0] - here[0], 1e-9)
-        if np.any(passes & (here[1] + share * (there[1] - here[1]) >= target[2] - CLOSE)):
+        if np.any(passes & (here[1] + share * (there[1] - here[1]) >= target[2] - HIT_TOLERANCE)):
             return False
         if not np.any((there[0] < level) & (there[1] > min(target[2], start[2]) - 5.0)):
             break

@@ -34,7 +34,7 @@ class BandedLeastSquares:
         self.band = np.zeros((unknowns * (reach + 1), count * unknowns))
         self.right = np.zeros(count * unknowns if columns is None else (count, columns))
 
-    def add(self, terms: Mapping[int, np.ndarray | float], weight: np.ndarray, goal: np.ndarray | None = None) -> None:
+    def add_terms(self, terms: Mapping[int, np.ndarray | float], weight: np.ndarray, goal: np.ndarray | None = None) -> None:
         """Add sum_t weight_t (sum_i c_it x[i + unknowns t] - goal_t)^2.
 
         Args:
@@ -64,7 +64,7 @@ class BandedLeastSquares:
         """
         terms = {curve + self.unknowns * i: c for i, c in enumerate(_DIFFERENCES[order])}
         if self.count > order:
-            self.add(terms, np.broadcast_to(weight, self.count - order))
+            self.add_terms(terms, np.broadcast_to(weight, self.count - order))
 
     def add_smoothness(self, weight: np.ndarray, curve: int = 0) -> None:
         """Add the squares of a curve's third differences, each with the mean weight of its four frames.
@@ -100,15 +100,15 @@ class BandedLeastSquares:
             goal: (R,) or one number, in the unknowns' unit.
         """
         values = np.broadcast_to(values, index.shape)
-        carried = weight[:, None] * values
+        weighted_values = weight[:, None] * values
         size = len(self.right)
-        self.right += np.bincount(index.ravel(), (carried * np.reshape(goal, (-1, 1))).ravel(), size)
+        self.right += np.bincount(index.ravel(), (weighted_values * np.reshape(goal, (-1, 1))).ravel(), size)
         for a in range(index.shape[1]):
             # Keep the pairs on or below the diagonal. Diagonal d and column c of the band are element d * size + c of
             # the flat band, so one bincount sums repeated entries.
             lower = index[:, a, None] >= index
             rows = (index[:, a, None] - index) * size + index
-            products = (carried[:, a, None] * values)[lower]
+            products = (weighted_values[:, a, None] * values)[lower]
             self.band += np.bincount(rows[lower], products, self.band.size).reshape(self.band.shape)
 
     def copy(self) -> BandedLeastSquares:

@@ -19,7 +19,7 @@ def hex_digest(*parts: Part, digits: int = 16) -> str:
     Returns:
         The first `digits` hex digits.
     """
-    return _fed(hashlib.sha256(), parts).hexdigest()[:digits]
+    return _update_hash(hashlib.sha256(), parts).hexdigest()[:digits]
 
 
 def byte_digest(*parts: Part, size: int = 16) -> bytes:
@@ -31,13 +31,13 @@ def byte_digest(*parts: Part, size: int = 16) -> bytes:
     Returns:
         `size` bytes.
     """
-    return _fed(hashlib.blake2b(digest_size=size), parts).digest()
+    return _update_hash(hashlib.blake2b(digest_size=size), parts).digest()
 
 
-def _fed(hashed, parts: Iterable[Part]):
+def _update_hash(digest, parts: Iterable[Part]):
     """Feed all parts to a hash object and return it."""
     for part in parts:
         if isinstance(part, np.ndarray):
             part = np.ascontiguousarray(part).reshape(-1)
-        hashed.update(part.encode() if isinstance(part, str) else part)
-    return hashed
+        digest.update(part.encode() if isinstance(part, str) else part)
+    return digest

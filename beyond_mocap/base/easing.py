@@ -64,7 +64,7 @@ State = tuple
 """Time in seconds, position (2,) m and velocity (2,) m/s."""
 
 
-def quintic_between(times: np.ndarray, before: State, after: State) -> np.ndarray:
+def interpolate_quintic(times: np.ndarray, before: State, after: State) -> np.ndarray:
     """Interpolate with the quintic between two states, with zero acceleration at both ends.
 
     Args:
@@ -73,12 +73,12 @@ def quintic_between(times: np.ndarray, before: State, after: State) -> np.ndarra
     Returns:
         (N, 2) m.
     """
-    (start, place, leaves), (end, goal, comes) = before, after
+    (start, start_position, start_velocity), (end, end_position, end_velocity) = before, after
     length = max(end - start, 1e-9)
     x = ((np.asarray(times) - start) / length)[:, None]
-    h = goal - place
-    a, b = length * leaves, length * comes
+    h = end_position - start_position
+    a, b = length * start_velocity, length * end_velocity
     # x runs from 0 to 1; slopes are per unit of x. The coefficients follow from position, slope and zero curvature at x
     # = 1 (those at x = 0 fix the lower three powers).
     third, fourth, fifth = 10 * h - 6 * a - 4 * b, -15 * h + 8 * a + 7 * b, 6 * h - 3 * a - 3 * b
-    return place + a * x + third * x**3 + fourth * x**4 + fifth * x**5
+    return start_position + a * x + third * x**3 + fourth * x**4 + fifth * x**5

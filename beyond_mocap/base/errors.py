@@ -42,7 +42,7 @@ class InputError(BeyondMocapError):
         self.where = str(where)
 
 
-class NotInLibrary(BeyondMocapError):
+class NotInLibraryError(BeyondMocapError):
     """The library lacks what was requested (exit status 3).
 
     Attributes:
@@ -62,13 +62,13 @@ class NotInLibrary(BeyondMocapError):
         self.nearest = tuple(nearest)
 
 
-class Cancelled(BeyondMocapError):
+class UserCancelledError(BeyondMocapError):
     """The user cancelled the work (exit status 130)."""
 
     exit_status = 130
 
 
-class TimedLine(str):
+class TimedMessage(str):
     """One line of a report with the times it refers to, so that an interface can jump there.
 
     Attributes:
@@ -89,7 +89,7 @@ class TimedLine(str):
         return line
 
 
-def told_time(seconds: float) -> str:
+def format_seconds(seconds: float) -> str:
     """Format seconds for a message: to the microsecond, without trailing zeros.
 
     Args:
@@ -100,7 +100,7 @@ def told_time(seconds: float) -> str:
     return f"{round(float(seconds), 6):.15g}"
 
 
-def spans_of(line: str) -> tuple[tuple[float, float], ...]:
+def line_spans(line: str) -> tuple[tuple[float, float], ...]:
     """Return the times that a message refers to.
 
     Args:

@@ -47,8 +47,8 @@ def hann_smooth(values: np.ndarray, reach: int) -> np.ndarray:
     return np.convolve(np.pad(values, reach, mode="edge"), window / window.sum(), mode="valid")
 
 
-def interpolate(
-    at: float | np.ndarray, times: np.ndarray, values: np.ndarray, outside: float | None = None
+def interpolate_columns(
+    sample_times: float | np.ndarray, times: np.ndarray, values: np.ndarray, fill_value: float | None = None
 ) -> np.ndarray:
     """Interpolate values linearly at other times.
 
@@ -60,10 +60,10 @@ def interpolate(
     Returns:
         (..., K), that unit.
     """
-    return np.stack([np.interp(at, times, column, outside, outside) for column in values.T], axis=-1)
+    return np.stack([np.interp(sample_times, times, column, fill_value, fill_value) for column in values.T], axis=-1)
 
 
-def runs(flags: np.ndarray) -> list[tuple[int, int]]:
+def find_runs(flags: np.ndarray) -> list[tuple[int, int]]:
     """Find the runs of True.
 
     Args:
@@ -75,7 +75,7 @@ def runs(flags: np.ndarray) -> list[tuple[int, int]]:
     return list(zip(edges[::2].tolist(), edges[1::2].tolist()))
 
 
-def equal_runs(values: np.ndarray) -> list[tuple[int, int]]:
+def find_equal_runs(values: np.ndarray) -> list[tuple[int, int]]:
     """Find the runs of equal neighbours; each run begins where the previous one ends.
 
     Args:
@@ -87,7 +87,7 @@ def equal_runs(values: np.ndarray) -> list[tuple[int, int]]:
     return list(zip(edges[:-1], edges[1:]))
 
 
-def run_numbers(flags: np.ndarray) -> np.ndarray:
+def number_runs(flags: np.ndarray) -> np.ndarray:
     """Number the runs of True.
 
     Args:

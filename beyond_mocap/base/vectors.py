@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 
-def unit_vectors(vectors: np.ndarray, otherwise: np.ndarray | float | None = None, least: float = 1e-9) -> np.ndarray:
+def unit_vectors(vectors: np.ndarray, fallback: np.ndarray | float | None = None, min_length: float = 1e-9) -> np.ndarray:
     """Normalize vectors to length one.
 
     Args:
@@ -18,11 +18,11 @@ def unit_vectors(vectors: np.ndarray, otherwise: np.ndarray | float | None = Non
         (..., K).
     """
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    unit = vectors / np.maximum(length, least)
-    return unit if otherwise is None else np.where(length > least, unit, otherwise)
+    unit = vectors / np.maximum(length, min_length)
+    return unit if fallback is None else np.where(length > min_length, unit, fallback)
 
 
-def unit_vector(vector: np.ndarray, otherwise: np.ndarray | None = None, least: float = 1e-9) -> np.ndarray:
+def unit_vector(vector: np.ndarray, fallback: np.ndarray | None = None, min_length: float = 1e-9) -> np.ndarray:
     """Normalize one vector to length one.
 
     Like `unit_vectors`, but its length comes from a dot product, which rounds differently.
@@ -35,10 +35,10 @@ def unit_vector(vector: np.ndarray, otherwise: np.ndarray | None = None, least: 
         (K,).
     """
     length = np.linalg.norm(vector)
-    return otherwise if otherwise is not None and not length > least else vector / max(length, least)
+    return fallback if fallback is not None and not length > min_length else vector / max(length, min_length)
 
 
-def nearest_axis(vector: np.ndarray) -> np.ndarray:
+def find_nearest_axis(vector: np.ndarray) -> np.ndarray:
     """Find the signed coordinate axis nearest to a vector.
 
     Args:
@@ -50,7 +50,7 @@ def nearest_axis(vector: np.ndarray) -> np.ndarray:
     return np.eye(3)[number] * np.sign(vector[number])
 
 
-def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+def cross_product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Compute cross products, several times faster than `numpy.cross` on long arrays.
 
     Args:
@@ -63,7 +63,7 @@ def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=-1)
 
 
-def cross_level(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+def cross_on_ground(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Compute the vertical component of the cross products of ground vectors: positive where b lies to the left of a.
 
     Args:
@@ -88,7 +88,7 @@ def skew_matrix(v: np.ndarray, xp=np) -> np.ndarray:
     return xp.stack([zero, -z, y, z, zero, -x, -y, x, zero], -1).reshape(*v.shape[:-1], 3, 3)
 
 
-def distance_along(line: np.ndarray) -> np.ndarray:
+def distances_along(line: np.ndarray) -> np.ndarray:
     """Compute the distance along a polyline from its first point to each point.
 
     Args:

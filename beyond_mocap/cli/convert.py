@@ -8,7 +8,7 @@ from pathlib import Path
 
 from ..base.errors import InputError
 from ..base.settings.options import add_options
-from .outputs import Told, Writer, check_outputs, naming, writer_of
+from .outputs import ProgressReporter, Writer, check_outputs, locate_errors, choose_writer
 
 
 def add_mirror(verbs) -> argparse.ArgumentParser:
@@ -45,7 +45,7 @@ def add_retarget(verbs) -> argparse.ArgumentParser:
     return verb
 
 
-def run_mirror(options, told: Told, writers: Mapping[str, Writer]) -> None:
+def run_mirror(options, reporter: ProgressReporter, writers: Mapping[str, Writer]) -> None:
     """Run `mirror`: write the motion with left and right exchanged.
 
     Args:
@@ -57,16 +57,16 @@ def run_mirror(options, told: Told, writers: Mapping[str, Writer]) -> None:
     from ..motion.mirror import mirror
 
     check_outputs(options.output)
-    writer_of(options.output, {}, others="")
-    clip = bvh.read(options.input, options.unit)
-    with naming(options.input):
-        twin = mirror(clip.motion)
-    bvh.write(options.output, twin, clip.form)
-    told.end(clip.notes)
+    choose_writer(options.output, {}, hint="")
+    clip = bvh.read_bvh(options.input, options.unit)
+    with locate_errors(options.input):
+        mirrored = mirror(clip.motion)
+    bvh.write_bvh(options.output, mirrored, clip.form)
+    reporter.finish(clip.notes)
     print(f"{options.output}: {len(clip.motion)} frames")
 
 
-def run_retarget(options, told: Told, writers: Mapping[str, Writer]) -> None:
+def run_retarget(options, reporter: ProgressReporter, writers: Mapping[str, Writer]) -> None:
     """Run `retarget`: write the motion on another skeleton, with that skeleton's joint names and channels.
 
     The output has the input's frame rate.
@@ -77,20 +77,20 @@ def run_retarget(options, told: Told, writers: Mapping[str, Writer]) -> None:
         writers: further output formats, by file suffix (Blender's).
     """
     from ..files.bvh import bvh
-    from ..library.one_skeleton import bring_one
+    from ..library.one_skeleton import retarget_clip
 
-    check_outputs(options.out, never=(options.input, options.to, options.map))
-    writer_of(options.out, {}, others="")
-    clip, target = bvh.read(options.input, options.unit), bvh.read(options.to, options.to_unit)
+    check_outputs(options.out, reserved=(options.input, options.to, options.map))
+    choose_writer(options.out, {}, hint="")
+    clip, target = bvh.read_bvh(options.input, options.unit), bvh.read_bvh(options.to, options.to_unit)
     try:
-        motion = bring_one(clip.motion, target.motion, options.map)
+        motion = retarget_clip(clip.motion, target.motion, options.map)
     except InputError as error:
         if error.where != "skeleton":
             raise
         raise InputError(f"{options.input} to {options.to}", str(error)) from None  # skeletons do not know the file
-    notes = bvh.write(options.out, motion, target.form)
+    notes = bvh.write_bvh(options.out, motion, target.form)
     lines = [(options.input, clip.notes[0]), (options.to, target.notes[0]), *((options.out, note) for note in notes)]
-    told.end(f"{path}: {note}" for path, note in lines)
+    reporter.finish(f"{path}: {note}" for path, note in lines)
     print(f"{options.out}: {len(motion)} frames")
 
 
@@ -111,7 +111,7 @@ def add_stream(verbs):
     return verb
 
 
-def run_stream(options, told: Told, writers: Mapping[str, Writer]) -> None:
+def run_stream(options, reporter: ProgressReporter, writers: Mapping[str, Writer]) -> None:
     """Run `stream`: send the recording to its end.
 
     Args:
@@ -121,13 +121,13 @@ def run_stream(options, told: Told, writers: Mapping[str, Writer]) -> None:
     """
     from ..passes.stream.sender import Sender
 
-    way = "tcp" if options.tcp else "serve" if options.serve else "udp"
-    sender = Sender(options.clip, options.port, way, form=options.form, rate=options.fps, loop=options.loop)
-    where = f"port {options.port} of this machine ({way.upper()}, {options.form})"
+    transport = "tcp" if options.tcp else "serve" if options.serve else "udp"
+    sender = Sender(options.clip, options.port, transport, form=options.form, rate=options.fps, loop=options.loop)
+    where = f"port {options.port} of this machine ({transport.upper()}, {options.form})"
     print(f"sending {options.clip.name} to {where}", flush=True)
     count = len(sender.rows)
-    sent = sender.run(told.cancelled, lambda frame: told.progress((frame - 1) % count / count, "Sending"))
-    told.end()
+    sent = sender.send_file(reporter.is_cancelled, lambda frame: reporter.show_progress((frame - 1) % count / count, "Sending"))
+    reporter.finish()
     print(f"{sent} frames sent")
     if not options.loop:
-        told.check()
+        reporter.check_cancelled()

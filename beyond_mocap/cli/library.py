@@ -11,7 +11,7 @@ from pathlib import Path
 from .. import __version__
 from ..base.errors import InputError
 from ..base.settings.options import add_options
-from .outputs import Told, Writer, check_outputs
+from .outputs import ProgressReporter, Writer, check_outputs
 
 # Header of the table of proposed labels.
 PROPOSAL_COLUMNS = ("file", "fps", "start_frame", "end_frame", "key_frame", "labels", "confidence", "source", "why")
@@ -35,7 +35,7 @@ def add_library(verbs) -> argparse.ArgumentParser:
     return verb
 
 
-def run_library(options, told: Told, writers: Mapping[str, Writer]) -> None:
+def run_library(options, reporter: ProgressReporter, writers: Mapping[str, Writer]) -> None:
     """Run `library`: build the library and describe it, or learn from its labels and propose missing ones.
 
     Args:
@@ -43,12 +43,12 @@ def run_library(options, told: Told, writers: Mapping[str, Writer]) -> None:
         reporter: progress, notes and cancellation.
         writers: further output formats, by file suffix (Blender's).
     """
-    if options.learn or options.propose or options.learned:
-        return run_learning(options, told)
+    if options.estimate_joint_limits or options.propose_labels or options.learned:
+        return run_learning(options, reporter)
     check_outputs(options.report)
-    library = open_library(options, told, rebuild=options.rebuild)
-    summary = summarize(library)
-    told.end()
+    library = open_library(options, reporter, rebuild=options.rebuild)
+    summary = summarize_library(library)
+    reporter.finish()
     for line in summary["lines"]:
         print(line)
     if options.report:
@@ -57,7 +57,7 @@ def run_library(options, told: Told, writers: Mapping[str, Writer]) -> None:
         write_report(options.report, summary)
 
 
-def summarize(library) -> dict:
+def summarize_library(library) -> dict:
     """Summarize a library: clips, minutes, labels, speeds, and the lines that `library` prints.
 
     Args:
@@ -65,28 +65,28 @@ def summarize(library) -> dict:
     Returns:
         The report as plain values for JSON.
     """
-    from ..annotation import spoken
+    from ..annotation import sort_labels
 
-    own = [clip for clip in library.clips if not clip.mirrored]
-    words = sorted(library.words)
+    originals = [clip for clip in library.clips if not clip.mirrored]
+    labels = sorted(library.labels)
     gaits = [{"word": g.word, "words": list(g.words), "speed_m_s": g.speed} for g in library.gaits]
-    keys = sorted({" ".join(spoken(key.words)) for key in library.keys})
+    keys = sorted({" ".join(sort_labels(key.words)) for key in library.keys})
     lines = [
-        f"{library.folder}: {len(own)} clips (and their mirrors), {library.minutes:.1f} minutes, "
+        f"{library.folder}: {len(originals)} clips (and their mirrors), {library.minutes:.1f} minutes, "
         f"{len(library.skeleton)} joints",
-        "labels: " + " ".join(words),
+        "labels: " + " ".join(labels),
         "gaits: " + ", ".join(f"{g['word']} {g['speed_m_s']:.1f} m/s" for g in gaits),
-        f"fastest: {library.fastest:.1f} m/s",
+        f"fastest: {library.max_speed:.1f} m/s",
         "key moments: " + (", ".join(keys) if keys else "none"),
         *library.notes,
     ]
     return {
-        "version": __version__, "clips": len(own), "minutes": library.minutes, "words": words, "gaits": gaits,
-        "fastest_m_s": library.fastest, "keys": keys, "notes": list(library.notes), "lines": lines,
+        "version": __version__, "clips": len(originals), "minutes": library.minutes, "words": labels, "gaits": gaits,
+        "fastest_m_s": library.max_speed, "keys": keys, "notes": list(library.notes), "lines": lines,
     }
 
 
-def open_library(options, told: Told, rebuild: bool = False, seed: int = 0):
+def open_library(options, reporter: ProgressReporter, rebuild: bool = False, seed: int = 0):
     """Build or load the library of the command line.
 
     Args:
@@ -97,11 +97,11 @@ def open_library(options, told: Told, rebuild: bool = False, seed: int = 0):
     Returns:
         The `Library`.
     """
-    from ..library.build import build
+    from ..library.build import build_library
 
-    return build(
+    return build_library(
         options.library, rebuild=rebuild, cache_dir=options.cache, skeleton=options.skeleton, unit=options.unit,
-        seed=seed, progress=told.progress, cancelled=told.cancelled,
+        seed=seed, progress=reporter.show_progress, cancelled=reporter.is_cancelled,
     )
 
 
@@ -117,7 +117,7 @@ def add_learning_options(verb) -> None:
     add_options(verb, "library.learn")
 
 
-def run_learning(options, told: Told) -> None:
+def run_learning(options, reporter: ProgressReporter) -> None:
     """Learn from labels, propose labels, or both in this order.
 
     Args:
@@ -128,51 +128,51 @@ def run_learning(options, told: Told) -> None:
             overwritten.
     """
     from ..library.classify import classifier
-    from ..library.classify.examples import examples_of
-    from ..library.classify.train import trained
+    from ..library.classify.examples import read_examples
+    from ..library.classify.train import train_classifier
     from ..library.scan import TABLE_NAME
 
-    check_outputs(options.learn, options.propose, never=(options.learned,))
-    if options.learn and options.learned:
+    check_outputs(options.estimate_joint_limits, options.propose_labels, reserved=(options.learned,))
+    if options.estimate_joint_limits and options.learned:
         raise InputError("--learned", "set with --learn", "one of them", "remove one of them")
-    if options.learned and not options.propose:
+    if options.learned and not options.propose_labels:
         raise InputError("--learned", "set without --propose", "--propose OUT.csv", "add --propose OUT.csv")
-    if options.propose and options.propose.name == TABLE_NAME and options.propose.exists():
-        what = "already has labels, which would be lost"
-        raise InputError(options.propose, what, "a new file", "choose another name, then merge the rows")
-    known = classifier.read_classifier(options.learned) if options.learned else None
-    if options.learn:
-        examples = examples_of(options.library, options.unit, told.progress, cache_dir=options.cache,
-                               cancelled=told.cancelled, note=told.note)
-        known = trained(examples, told.progress, told.cancelled)
-        classifier.write_classifier(options.learn, known)
-        told.end()
-        for line in known.told():
+    if options.propose_labels and options.propose_labels.name == TABLE_NAME and options.propose_labels.exists():
+        problem = "already has labels, which would be lost"
+        raise InputError(options.propose_labels, problem, "a new file", "choose another name, then merge the rows")
+    model = classifier.read_classifier(options.learned) if options.learned else None
+    if options.estimate_joint_limits:
+        examples = read_examples(options.library, options.unit, reporter.show_progress, cache_dir=options.cache,
+                               cancelled=reporter.is_cancelled, on_note=reporter.show_note)
+        model = train_classifier(examples, reporter.show_progress, reporter.is_cancelled)
+        classifier.write_classifier(options.estimate_joint_limits, model)
+        reporter.finish()
+        for line in model.describe():
             print(line)
-    if options.propose:
-        count, clips = _write_proposals(options, known, told)
-        told.end()
-        print(f"{options.propose}: {count} rows for {clips} clips without labels")
+    if options.propose_labels:
+        count, clips = _write_proposals(options, model, reporter)
+        reporter.finish()
+        print(f"{options.propose_labels}: {count} rows for {clips} clips without labels")
 
 
-def _write_proposals(options, known, told: Told) -> tuple[int, int]:
+def _write_proposals(options, model, reporter: ProgressReporter) -> tuple[int, int]:
     """Write the table of proposals; return its number of rows and the number of clips without labels."""
     from ..files.whole import atomic_write
-    from ..library.classify.examples import without_words
-    from ..library.proposals import propose
+    from ..library.classify.examples import iter_unlabelled_clips
+    from ..library.proposals import propose_labels
 
     out = io.StringIO(newline="")
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow(PROPOSAL_COLUMNS)
     count = clips = 0
-    for name, motion in without_words(options.library, options.unit, told.progress, options.cache, told.cancelled):
+    for name, motion in iter_unlabelled_clips(options.library, options.unit, reporter.show_progress, options.cache, reporter.is_cancelled):
         clips += 1
-        for one in propose(motion, classifier=known):
-            row = one.annotation
-            if one.confidence >= options.least:
+        for proposal in propose_labels(motion, classifier=model):
+            row = proposal.annotation
+            if proposal.confidence >= options.least:
                 key = "" if row.key is None else row.key
-                figures = (f"{motion.fps:g}", row.start, row.end, key, " ".join(row.words), f"{one.confidence:.2f}")
-                writer.writerow((name, *figures, one.source, one.why))
+                figures = (f"{motion.fps:g}", row.start, row.end, key, " ".join(row.words), f"{proposal.confidence:.2f}")
+                writer.writerow((name, *figures, proposal.source, proposal.why))
                 count += 1
-    atomic_write(options.propose, out.getvalue())
+    atomic_write(options.propose_labels, out.getvalue())
     return count, clips

@@ -14,11 +14,11 @@ import threading
 from collections.abc import Callable, Mapping
 
 from .. import __version__
-from ..base.errors import BeyondMocapError, Cancelled, InputError
+from ..base.errors import BeyondMocapError, UserCancelledError, InputError
 from .convert import add_mirror, add_retarget, add_stream
 from .library import add_library
 from .matching import add_match, add_touches
-from .outputs import Told, Writer
+from .outputs import ProgressReporter, Writer
 from .passing import add_passes
 from .reconstructing import add_reconstruct, add_release
 from .ride_path import add_path
@@ -29,7 +29,7 @@ from .throwing import add_throw
 VERBS = (add_library, add_synthesize, add_path, add_touches, add_stream, add_passes, add_reconstruct, add_release,
          add_throw, add_match, add_study, add_mirror, add_retarget, add_evaluate)  # fmt: skip
 """Functions that add a verb, in the order of `--help`; each takes the sub-parsers and returns its parser."""
-Apart = Callable[[list[str], Callable[[float, str], None], Callable[[], bool]], object]
+IsolatedRunner = Callable[[list[str], Callable[[float, str], None], Callable[[], bool]], object]
 """Runs a command line in another process: (arguments, progress callback, cancellation callback)."""
 
 
@@ -51,7 +51,7 @@ class OneLineParser(argparse.ArgumentParser):
         raise InputError(self.prog, message, "", f"see '{self.prog} --help'")
 
 
-def parser(prog: str = "beyond-mocap") -> argparse.ArgumentParser:
+def build_parser(prog: str = "beyond-mocap") -> argparse.ArgumentParser:
     """Build the parser of all verbs.
 
     Args:
@@ -69,7 +69,7 @@ def parser(prog: str = "beyond-mocap") -> argparse.ArgumentParser:
 
 def main(
     argv: list[str] | None = None, writers: Mapping[str, Writer] | None = None, prog: str = "beyond-mocap",
-    apart: Apart | None = None,
+    run_isolated: IsolatedRunner | None = None,
 ) -> int:  # fmt: skip
     """Run one command and return its exit status.
 
@@ -81,56 +81,56 @@ def main(
     Returns:
         The exit status, see the module.
     """
-    told = None
-    _escape(sys.stdout)
+    reporter = None
+    _escape_unencodable(sys.stdout)
     try:
         argv = sys.argv[1:] if argv is None else argv
-        options = parser(prog).parse_args(argv)
-        options.argv, options.apart = argv, apart
-        told = Told(options.json)
-        with _interrupts(told):
-            options.run(options, told, writers or {})
+        options = build_parser(prog).parse_args(argv)
+        options.argv, options.apart = argv, run_isolated
+        reporter = ProgressReporter(options.json)
+        with _InterruptHandler(reporter):
+            options.run(options, reporter, writers or {})
         return 0
     except BeyondMocapError as error:
         status, text = error.exit_status, str(error)
     except KeyboardInterrupt:
-        status, text = Cancelled.exit_status, "cancelled"
+        status, text = UserCancelledError.exit_status, "cancelled"
     except OSError as error:
-        place = error.filename or prog
-        status, text = 2, f"{place}: {error.strerror or error}; check that the file can be read and its folder written"
+        path = error.filename or prog
+        status, text = 2, f"{path}: {error.strerror or error}; check that the file can be read and its folder written"
     except SystemExit as done:  # --help and --version
         return int(done.code or 0)
-    if told is not None:
-        told.end()
+    if reporter is not None:
+        reporter.finish()
     print(text if text.startswith(prog) else f"{prog}: {text}", file=sys.stderr)
     return status
 
 
-def _escape(stream) -> None:
+def _escape_unencodable(stream) -> None:
     """Make a stream write characters that its encoding lacks as escapes instead of raising an error."""
     if getattr(stream, "errors", None) == "strict" and hasattr(stream, "reconfigure"):
         stream.reconfigure(errors="backslashreplace")
 
 
-class _interrupts:
+class _InterruptHandler:
     """Context manager: Ctrl-C, or a render farm's SIGTERM, requests cancellation; a second one interrupts at once.
 
     Outside the main thread it does nothing.
     """
 
-    def __init__(self, told: Told):
-        self._told, self._before = told, {}
+    def __init__(self, reporter: ProgressReporter):
+        self._reporter, self._previous_handlers = reporter, {}
 
     def __enter__(self):
         if threading.current_thread() is threading.main_thread():
-            self._before = {kind: signal.signal(kind, self._asked) for kind in (signal.SIGINT, signal.SIGTERM)}
+            self._previous_handlers = {kind: signal.signal(kind, self._handle_signal) for kind in (signal.SIGINT, signal.SIGTERM)}
 
     def __exit__(self, *_):
-        for kind, before in self._before.items():
+        for kind, before in self._previous_handlers.items():
             # None: the handler was not set from Python (Blender's own) and cannot be restored from here
             signal.signal(kind, signal.SIG_DFL if before is None else before)
 
-    def _asked(self, *_):
-        if self._told.cancelled():
+    def _handle_signal(self, *_):
+        if self._reporter.is_cancelled():
             raise KeyboardInterrupt
-        self._told.cancel()
+        self._reporter.cancel()

@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 
 from .. import __version__
-from ..base.errors import BeyondMocapError, InputError, told_time
+from ..base.errors import BeyondMocapError, InputError, format_seconds
 from ..base.settings.options import add_options, option_values
-from .outputs import Told, Writer, check_outputs, named_folder
+from .outputs import ProgressReporter, Writer, check_outputs, parse_folder
 
 
 def add_match(verbs):
@@ -38,7 +38,7 @@ def add_match(verbs):
     verb.add_argument("--provider", metavar="NAME", default="",
                       help=f"format of FILE: {', '.join(PROVIDERS)}; default: detected")
     verb.add_argument("--library", type=Path, required=True)
-    verb.add_argument("--out", type=named_folder, required=True, metavar="FOLDER",
+    verb.add_argument("--out", type=parse_folder, required=True, metavar="FOLDER",
                       help="output folder; an unfinished run continues there")
     add_options(verb, "match.section")
     add_options(verb.add_mutually_exclusive_group(), "match.work")
@@ -49,7 +49,7 @@ def add_match(verbs):
     return verb
 
 
-def run_match(options, told: Told, writers: Mapping[str, Writer]) -> None:
+def run_match(options, reporter: ProgressReporter, writers: Mapping[str, Writer]) -> None:
     """Run `match`: synthesize what is not there yet and report the result.
 
     Args:
@@ -57,34 +57,34 @@ def run_match(options, told: Told, writers: Mapping[str, Writer]) -> None:
         reporter: progress, notes and cancellation.
         writers: further output formats, by file suffix (Blender's).
     """
-    from ..match.make import make_match, result_of
-    from ..match.order import MatchOrder
+    from ..match.make import synthesize_match, read_result
+    from ..match.order import MatchRequest
 
-    write = scene_writer(options.scene, writers) if options.scene else None
-    order = MatchOrder(
+    write = choose_scene_writer(options.scene, writers) if options.scene else None
+    order = MatchRequest(
         tracking=options.tracking, library=options.library, out=options.out, meta=options.meta, events=options.events,
         events_meta=options.events_meta, events_provider=options.events_provider, provider=options.provider,
-        **{**option_values(MatchOrder, options, "match.section", "match.work", "match", "library"),
-           "players": tuple(dict.fromkeys(options.players)), "workers": options.workers or len(_cores())},
+        **{**option_values(MatchRequest, options, "match.section", "match.work", "match", "library"),
+           "players": tuple(dict.fromkeys(options.players)), "workers": options.workers or len(_list_cores())},
     )  # fmt: skip
     if options.apart is None:
-        made = make_match(order, told.progress, told.cancelled)
+        result = synthesize_match(order, reporter.show_progress, reporter.is_cancelled)
     else:
-        options.apart(without(options.argv, "--scene"), told.progress, told.cancelled)
-        made = result_of(order)
-    told.end(made.notes)
-    for player in made.failed:
-        told.note(f"player {player.id} was skipped: {player.reason}")
-    if not made.done:
+        options.apart(remove_option(options.argv, "--scene"), reporter.show_progress, reporter.is_cancelled)
+        result = read_result(order)
+    reporter.finish(result.notes)
+    for player in result.failed:
+        reporter.show_note(f"player {player.id} was skipped: {player.reason}")
+    if not result.finished:
         raise BeyondMocapError(f"{options.out}: no player could be synthesized; see match.json there for the reasons")
     if write is not None:
-        for line in write(made, options.scene) or ():
-            told.note(line)
-    print(f"{options.out}: {len(made.done)} of {len(made.done) + len(made.failed)} players, "
-          f"{made.span[1] - made.span[0]:.1f} s")  # fmt: skip
+        for line in write(result, options.scene) or ():
+            reporter.show_note(line)
+    print(f"{options.out}: {len(result.finished)} of {len(result.finished) + len(result.failed)} players, "
+          f"{result.span[1] - result.span[0]:.1f} s")  # fmt: skip
 
 
-def scene_writer(scene: Path, writers: Mapping[str, Writer]) -> Writer:
+def choose_scene_writer(scene: Path, writers: Mapping[str, Writer]) -> Writer:
     """Choose the function that writes a whole match to a file.
 
     Args:
@@ -104,7 +104,7 @@ def scene_writer(scene: Path, writers: Mapping[str, Writer]) -> Writer:
     return writers[scene.suffix.lower()]
 
 
-def without(arguments: Sequence[str], option: str) -> list[str]:
+def remove_option(arguments: Sequence[str], option: str) -> list[str]:
     """Remove a long option with one value from a command line, also where it is abbreviated as argparse allows.
 
     Args:
@@ -113,17 +113,17 @@ def without(arguments: Sequence[str], option: str) -> list[str]:
     Returns:
         The other arguments.
     """
-    kept, rest = [], iter(arguments)
-    for one in rest:
-        name, equals, _ = one.partition("=")
+    others, remaining = [], iter(arguments)
+    for argument in remaining:
+        name, equals, _ = argument.partition("=")
         if len(name) > 2 and option.startswith(name):
-            next(rest if not equals else iter(()), None)
+            next(remaining if not equals else iter(()), None)
         else:
-            kept.append(one)
-    return kept
+            others.append(argument)
+    return others
 
 
-def _cores() -> range | set[int]:
+def _list_cores() -> range | set[int]:
     """List the cores that this process may use."""
     return os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else range(os.cpu_count() or 1)
 
@@ -151,7 +151,7 @@ def add_touches(verbs):
     return verb
 
 
-def run_touches(options, told: Told, writers: Mapping[str, Writer]) -> None:
+def run_touches(options, reporter: ProgressReporter, writers: Mapping[str, Writer]) -> None:
     """Run `touches`: solve the ball's trajectory and write the requested files.
 
     Args:
@@ -163,21 +163,21 @@ def run_touches(options, told: Told, writers: Mapping[str, Writer]) -> None:
     from ..files.tables import write_ball, write_report, write_touches
     from ..motion.track.ball_path import BallPath
 
-    begun = time.perf_counter()
-    check_outputs(options.out, options.ball, options.report, never=(options.input, options.meta))
+    started = time.perf_counter()
+    check_outputs(options.out, options.ball, options.report, reserved=(options.input, options.meta))
     if options.start is not None and options.end is not None and options.end <= options.start:
-        raise InputError("--to", f"{told_time(options.end)} s", f"later than --from {told_time(options.start)} s")
+        raise InputError("--to", f"{format_seconds(options.end)} s", f"later than --from {format_seconds(options.start)} s")
     source = _read_tracking(options)
     loaded = time.perf_counter()
-    solved = solve_ball(source, told.progress, told.cancelled, options.start, options.end)
+    solved = solve_ball(source, reporter.show_progress, reporter.is_cancelled, options.start, options.end)
     done = time.perf_counter()
     write_touches(options.out, solved.touches)
     if options.ball:
         write_ball(options.ball, BallPath(solved.times, solved.ball.at(solved.times), solved.measured))
     if options.report:
-        seconds = {"load": loaded - begun, "solve": done - loaded}
-        write_report(options.report, {**_report_touches(solved), "seconds": seconds})
-    told.end(f"{options.input}: {note}" for note in solved.notes)
+        seconds = {"load": loaded - started, "solve": done - loaded}
+        write_report(options.report, {**_build_touch_report(solved), "seconds": seconds})
+    reporter.finish(f"{options.input}: {note}" for note in solved.notes)
     print(f"{options.out}: {len(solved.touches)} touches in {solved.times[-1] - solved.times[0]:.1f} s")
 
 
@@ -195,9 +195,9 @@ def _read_tracking(options):
     return read_match(options.input, options.meta, options.provider)
 
 
-def _report_touches(solved) -> dict:
+def _build_touch_report(solved) -> dict:
     """Build the report of a `SolvedBall`, for JSON."""
-    off = solved.residuals[solved.measured & np.isfinite(solved.residuals)]
+    residuals = solved.residuals[solved.measured & np.isfinite(solved.residuals)]
     spread = [touch.uncertainty for touch in solved.touches]
     return {
         "version": __version__, "samples": len(solved.times), "touches": len(solved.touches),
@@ -206,14 +206,14 @@ def _report_touches(solved) -> dict:
         "players": dict(Counter(touch.player for touch in solved.touches)),
         "filled_share": solved.filled.mean(), "outliers": int(np.count_nonzero(solved.outlier)),
         "measured_share": solved.measured.mean(),
-        "residual_m": _percentiles(off), "uncertainty_s": _percentiles(np.array(spread)),
+        "residual_m": _compute_percentiles(residuals), "uncertainty_s": _compute_percentiles(np.array(spread)),
         "confidence": solved.confidence,
         "pieces": dict(Counter(piece.kind for piece in solved.pieces)),
         "ends": [vars(end) for end in solved.ends], "notes": list(solved.notes),
     }  # fmt: skip
 
 
-def _percentiles(values: np.ndarray) -> dict | None:
+def _compute_percentiles(values: np.ndarray) -> dict | None:
     """Compute median, 95th percentile and maximum; None without values."""
     if not len(values):
         return None

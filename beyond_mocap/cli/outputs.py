@@ -11,13 +11,13 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from ..base.errors import Cancelled, InputError
+from ..base.errors import UserCancelledError, InputError
 
 Writer = Callable[[object, Path], Sequence[str] | None]
 """Writes a take, or the result of the verb `match`, to a file; returns lines for the user, if any."""
 
 
-class Told:
+class ProgressReporter:
     """Shows progress and notes on the command line, and knows whether the user pressed Ctrl-C."""
 
     def __init__(self, as_json: bool, stream=None):
@@ -30,10 +30,10 @@ class Told:
         self._stream = stream or sys.stderr
         self._json = as_json
         self._bar = not as_json and self._stream.isatty()
-        self._stop = threading.Event()
+        self._stop_requested = threading.Event()
         self._last = ""
 
-    def progress(self, fraction: float, text: str) -> None:
+    def show_progress(self, fraction: float, text: str) -> None:
         """Show the progress.
 
         Args:
@@ -49,7 +49,7 @@ class Told:
                 print(line, end="", file=self._stream, flush=True)
                 self._last = line
 
-    def note(self, text: str) -> None:
+    def show_note(self, text: str) -> None:
         """Show a message to the user, on the stream of the progress.
 
         Args:
@@ -57,7 +57,7 @@ class Told:
         """
         print(json.dumps({"note": text}) if self._json else f"note: {text}", file=self._stream, flush=True)
 
-    def end(self, notes: Iterable[str] = ()) -> None:
+    def finish(self, notes: Iterable[str] = ()) -> None:
         """Clear the bar and show notes.
 
         Args:
@@ -67,24 +67,24 @@ class Told:
             print("\r" + " " * 80 + "\r", end="", file=self._stream, flush=True)
             self._last = ""
         for text in notes:
-            self.note(text)
+            self.show_note(text)
 
     def cancel(self) -> None:
         """Request cancellation."""
-        self._stop.set()
+        self._stop_requested.set()
 
-    def cancelled(self) -> bool:
+    def is_cancelled(self) -> bool:
         """Return whether the user requested cancellation."""
-        return self._stop.is_set()
+        return self._stop_requested.is_set()
 
-    def check(self) -> None:
+    def check_cancelled(self) -> None:
         """Raise Cancelled if the user requested cancellation."""
-        if self.cancelled():
-            raise Cancelled("cancelled")
+        if self.is_cancelled():
+            raise UserCancelledError("cancelled")
 
 
 @contextmanager
-def naming(path):
+def locate_errors(path):
     """Add the file's name to errors about its content: skeletons, motions and scenes do not know their file.
 
     Args:
@@ -100,7 +100,7 @@ def naming(path):
         raise InputError(path, str(error)) from None
 
 
-def writer_of(out: Path, writers: Mapping[str, Writer], others: str = "run inside Blender to write .blend, .fbx, .glb "
+def choose_writer(out: Path, writers: Mapping[str, Writer], hint: str = "run inside Blender to write .blend, .fbx, .glb "
               "or .usdc") -> Writer:
     """Choose the function that writes an output file.
 
@@ -113,14 +113,14 @@ def writer_of(out: Path, writers: Mapping[str, Writer], others: str = "run insid
     Raises:
         InputError: if no function writes this kind of file.
     """
-    known = {".bvh": write_bvh, **writers}
-    if out.suffix.lower() not in known:
+    by_suffix = {".bvh": write_bvh, **writers}
+    if out.suffix.lower() not in by_suffix:
         raise InputError(
             out, f"file type {out.suffix} cannot be written here" if out.suffix else "no file type",
-            f"one of {', '.join(sorted(known))}",
-            "choose another file type" if writers or not others else others,
+            f"one of {', '.join(sorted(by_suffix))}",
+            "choose another file type" if writers or not hint else hint,
         )
-    return known[out.suffix.lower()]
+    return by_suffix[out.suffix.lower()]
 
 
 def write_bvh(take, out: Path) -> None:
@@ -132,10 +132,10 @@ def write_bvh(take, out: Path) -> None:
     """
     from ..files.bvh import bvh
 
-    bvh.write(out, take.motion)
+    bvh.write_bvh(out, take.motion)
 
 
-def check_outputs(*paths: Path | None, never: tuple[Path | None, ...] = ()) -> None:
+def check_outputs(*paths: Path | None, reserved: tuple[Path | None, ...] = ()) -> None:
     """Check before the work that every output can be written and that no two paths are the same file.
 
     Args:
@@ -144,7 +144,7 @@ def check_outputs(*paths: Path | None, never: tuple[Path | None, ...] = ()) -> N
     Raises:
         InputError: for the first path that fails.
     """
-    taken = {path.resolve() for path in never if path is not None}
+    used = {path.resolve() for path in reserved if path is not None}
     for path in filter(None, paths):
         folder = path.absolute().parent
         if path.is_dir():
@@ -155,13 +155,13 @@ def check_outputs(*paths: Path | None, never: tuple[Path | None, ...] = ()) -> N
             raise InputError(path, "its folder does not exist", "an existing folder", "create the folder first")
         if not os.access(folder, os.W_OK | os.X_OK):
             raise InputError(path, "its folder is not writable", "a writable folder", "choose another folder")
-        if path.resolve() in taken:
-            what = "is both an output and another file of the command"
-            raise InputError(path, what, "different files", "rename one of them")
-        taken.add(path.resolve())
+        if path.resolve() in used:
+            problem = "is both an output and another file of the command"
+            raise InputError(path, problem, "different files", "rename one of them")
+        used.add(path.resolve())
 
 
-def named_folder(text: str) -> Path:
+def parse_folder(text: str) -> Path:
     """Parse an option that names a folder; an empty one would mean the current folder.
 
     Args:
@@ -186,7 +186,7 @@ def add_take_files(verb) -> None:
     verb.add_argument("--ball", type=Path, metavar="B.csv")
 
 
-def add_own_verbs(verb, dest: str, *adders: Callable):
+def add_subverbs(verb, dest: str, *adders: Callable):
     """Add verbs below a verb, each with --json as every verb has.
 
     Args:
@@ -196,14 +196,14 @@ def add_own_verbs(verb, dest: str, *adders: Callable):
     Returns:
         The parser of the verb above.
     """
-    own = verb.add_subparsers(dest=dest, required=True, metavar="VERB", parser_class=type(verb))
+    subparsers = verb.add_subparsers(dest=dest, required=True, metavar="VERB", parser_class=type(verb))
     for add_one in adders:
-        add_one(own).add_argument("--json", action="store_true", default=argparse.SUPPRESS,
+        add_one(subparsers).add_argument("--json", action="store_true", default=argparse.SUPPRESS,
                                   help="progress as JSON lines on stderr")  # fmt: skip
     return verb
 
 
-def build_take(motion, clip: str, method: str, **known):
+def build_take(motion, clip: str, method: str, **fields):
     """Build a take from a motion that is one clip, played frame by frame, for the writers of formats other than BVH.
 
     Args:
@@ -220,9 +220,9 @@ def build_take(motion, clip: str, method: str, **known):
     from ..synthesis.take import Take
 
     count = len(motion)
-    usual = dict(
+    defaults = dict(
         start_time=0.0, clip=np.zeros(count, int), clip_frame=np.arange(count, dtype=float), keys=(), ball=None, seed=0,
         mirrored=np.zeros(count, bool), words=((),) * count, contacts=np.zeros((count, 2), bool),
         seams=np.zeros(0, int), timeline=Timeline(),
     )  # fmt: skip
-    return Take(motion=motion, clips=(clip,), method=method, **{**usual, **known})
+    return Take(motion=motion, clips=(clip,), method=method, **{**defaults, **fields})

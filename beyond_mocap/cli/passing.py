@@ -12,7 +12,7 @@ import numpy as np
 from .. import __version__
 from ..base.errors import InputError
 from ..base.settings.options import add_options
-from .outputs import Told, Writer, named_folder, naming
+from .outputs import ProgressReporter, Writer, parse_folder, locate_errors
 
 
 def add_passes(verbs):
@@ -27,13 +27,13 @@ def add_passes(verbs):
     verb.add_argument("scene", type=Path, metavar="SCENE.json",
                       help="who passes to whom; see docs/passes/passes.md")
     verb.add_argument("--library", type=Path, required=True, help="a folder of clips with ball strikes")
-    verb.add_argument("--out", type=named_folder, required=True, metavar="FOLDER", help="created if missing")
+    verb.add_argument("--out", type=parse_folder, required=True, metavar="FOLDER", help="created if missing")
     add_options(verb, "library")
     verb.set_defaults(run=run_passes)
     return verb
 
 
-def run_passes(options, told: Told, writers: Mapping[str, Writer]) -> None:
+def run_passes(options, reporter: ProgressReporter, writers: Mapping[str, Writer]) -> None:
     """Run `passes`: simulate the scene and write its players, ball and reports.
 
     Args:
@@ -41,34 +41,34 @@ def run_passes(options, told: Told, writers: Mapping[str, Writer]) -> None:
         reporter: progress, notes and cancellation.
         writers: further output formats, by file suffix (Blender's).
     """
-    from ..library.build import build
-    from ..passes.passes import ball_of, passes
+    from ..library.build import build_library
+    from ..passes.passes import build_ball, synthesize_passes
     from ..passes.scene_json import read_scene
 
-    begun = time.perf_counter()
+    started = time.perf_counter()
     _check_folder(options.out)
     scene = read_scene(options.scene)
-    with naming(options.scene):
-        ball_of(scene)
-    library = build(
+    with locate_errors(options.scene):
+        build_ball(scene)
+    library = build_library(
         options.library, cache_dir=options.cache, skeleton=options.skeleton, unit=options.unit,
-        progress=lambda share, text: told.progress(0.3 * share, text), cancelled=told.cancelled,
+        progress=lambda share, text: reporter.show_progress(0.3 * share, text), cancelled=reporter.is_cancelled,
     )
     loaded = time.perf_counter()
-    with naming(options.scene):
-        played = passes(library, scene, lambda share, text: told.progress(0.3 + 0.65 * share, text), told.cancelled)
+    with locate_errors(options.scene):
+        result = synthesize_passes(library, scene, lambda share, text: reporter.show_progress(0.3 + 0.65 * share, text), reporter.is_cancelled)
     done = time.perf_counter()
-    told.check()
-    table = strikes(library, played)
-    report = {**_report(played, table), "seconds": {"load": loaded - begun, "play": done - loaded}}
-    _write(options.out, played, table, report)
-    told.end(f"{options.scene}: {line}" for line in played.warnings)
-    names = {player.name for player in played.players}
+    reporter.check_cancelled()
+    table = list_strikes(library, result)
+    report = {**_build_report(result, table), "seconds": {"load": loaded - started, "play": done - loaded}}
+    _write_results(options.out, result, table, report)
+    reporter.finish(f"{options.scene}: {line}" for line in result.warnings)
+    names = {player.name for player in result.players}
     others = sorted(path.stem for path in options.out.glob("*.bvh") if path.stem not in names)
     if others:
-        told.note(f"{options.out}: files of another scene: {', '.join(others)}")
+        reporter.show_note(f"{options.out}: files of another scene: {', '.join(others)}")
     gaps = [row["contact_gap_m"] for row in table if row["outcome"] != "missed"]
-    print(f"{options.out}: {len(played.players)} players, {len(table)} strikes in {played.plan.seconds:.1f} s, "
+    print(f"{options.out}: {len(result.players)} players, {len(table)} strikes in {result.plan.seconds:.1f} s, "
           f"widest gap {1000.0 * max(gaps, default=0.0):.1f} mm")  # fmt: skip
 
 
@@ -83,7 +83,7 @@ def _check_folder(folder: Path) -> None:
         raise InputError(folder, "is not writable", "a writable folder", "choose another folder")
 
 
-def strikes(library, played) -> list[dict]:
+def list_strikes(library, played) -> list[dict]:
     """List the strikes of a scene as rows of strikes.csv.
 
     Args:
@@ -93,44 +93,44 @@ def strikes(library, played) -> list[dict]:
         Column name -> value for each strike, in the plan's order.
     """
     out = []
-    for number, one in enumerate(played.plan.strikes):
-        order, clip = one.order, library.clips[one.order.clip]
+    for number, strike in enumerate(played.plan.strikes):
+        order, clip = strike.order, library.clips[strike.order.clip]
         x, y, z = order.ball
         out.append({
-            "time_s": order.time, "frame": int(round(order.time * played.plan.fps)), "player": one.player,
+            "time_s": order.time, "frame": int(round(order.time * played.plan.fps)), "player": strike.player,
             "kind": order.kind,
             "part": order.part, "side": order.side, "clip": clip.path, "clip_frame": float(order.strike_frame),
             "mirrored": clip.mirrored, "x_m": x, "y_m": y, "z_m": z,
-            "speed_in_m_s": float(np.linalg.norm(one.velocity_in)),
-            "speed_out_m_s": float(np.linalg.norm(one.velocity_out)),
-            "travel_s": one.travel, "bounces": one.bounces, "facing_deg": float(np.degrees(order.facing)),
-            "contact_gap_m": played.gap(number), "outcome": one.outcome,
+            "speed_in_m_s": float(np.linalg.norm(strike.velocity_in)),
+            "speed_out_m_s": float(np.linalg.norm(strike.velocity_out)),
+            "travel_s": strike.travel, "bounces": strike.bounces, "facing_deg": float(np.degrees(order.facing)),
+            "contact_gap_m": played.gap(number), "outcome": strike.outcome,
         })  # fmt: skip
     return out
 
 
-def _report(played, table: list[dict]) -> dict:
+def _build_report(played, table: list[dict]) -> dict:
     """Build the report of a scene, for JSON."""
     plan, kind = played.plan, played.kind
     return {
         "version": __version__, "seed": played.scene.seed, "fps": plan.fps, "frames": len(played.ball.times),
         "duration_s": plan.seconds, "ball": vars(kind), "strikes": table,
         "bounces": [float(time) for flight in plan.flights for time in flight.bounces],
-        "players": [_of_player(player) for player in played.players], "warnings": list(played.warnings),
+        "players": [_build_player_report(player) for player in played.players], "warnings": list(played.warnings),
     }
 
 
-def _of_player(player) -> dict:
+def _build_player_report(player) -> dict:
     """Build the evaluation of one player's motion, for JSON."""
     from ..evaluation.report import evaluate
 
-    whole = evaluate(player.take, None, None)
-    kept = ("skate", "seam_jerk_ratio", "foot_correction_m", "ik_miss_share", "ground_mm")
-    own = {"name": player.name, "strikes": len(player.gaps), "moved_m": player.moved}
-    return {**own, **{name: whole[name] for name in kept}}
+    evaluation = evaluate(player.take, None, None)
+    names = ("skate", "seam_jerk_ratio", "foot_correction_m", "ik_miss_share", "ground_mm")
+    own = {"name": player.name, "strikes": len(player.gaps), "moved_m": player.part_shifts}
+    return {**own, **{name: evaluation[name] for name in names}}
 
 
-def _write(folder: Path, played, table: list[dict], report: dict) -> None:
+def _write_results(folder: Path, played, table: list[dict], report: dict) -> None:
     """Write all files of a scene to its folder."""
     from ..files.bvh import bvh
     from ..files.tables import write_ball, write_report
@@ -139,7 +139,7 @@ def _write(folder: Path, played, table: list[dict], report: dict) -> None:
 
     folder.mkdir(exist_ok=True)
     for player in played.players:
-        bvh.write(folder / f"{player.name}.bvh", player.take.motion)
+        bvh.write_bvh(folder / f"{player.name}.bvh", player.take.motion)
         write_provenance(folder / f"{player.name}.provenance.csv", player.take)
     write_ball(folder / "ball.csv", played.ball)
     write_strikes(folder / "strikes.csv", table)

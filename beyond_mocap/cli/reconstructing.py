@@ -18,9 +18,9 @@ import numpy as np
 from .. import __version__
 from ..base.errors import InputError
 from ..base.settings.options import add_options, option_values
-from .outputs import Told, Writer, build_take, check_outputs, writer_of
+from .outputs import ProgressReporter, Writer, build_take, check_outputs, choose_writer
 
-_MOST_LINES = 12  # notes that the command prints; the report has all
+_MAX_LINES = 12  # notes that the command prints; the report has all
 
 
 def add_reconstruct(verbs):
@@ -43,7 +43,7 @@ def add_reconstruct(verbs):
     return verb
 
 
-def run_reconstruct(options, told: Told, writers: Mapping[str, Writer]) -> None:
+def run_reconstruct(options, reporter: ProgressReporter, writers: Mapping[str, Writer]) -> None:
     """Run `reconstruct` on one trial, or on all trials in a folder.
 
     Args:
@@ -51,85 +51,85 @@ def run_reconstruct(options, told: Told, writers: Mapping[str, Writer]) -> None:
         reporter: progress, notes and cancellation.
         writers: further output formats, by file suffix (Blender's).
     """
-    from ..library.keep_words import plain_words
+    from ..library.keep_words import parse_labels
 
     if options.model and options.static:
         raise InputError("--model", "set with --static", "one of them", "remove one of them")
     if options.words and not options.add_to:
         raise InputError("--words", "set without --add-to", "both", "add --add-to LIBRARY")
-    options.words = plain_words(options.words)
+    options.words = parse_labels(options.words)
     if options.trial.is_dir():
-        _run_folder(options, told)
+        _reconstruct_folder(options, reporter)
     else:
-        _run_one(options, told, writers)
+        _reconstruct_trial(options, reporter, writers)
 
 
-def _run_one(options, told: Told, writers: Mapping[str, Writer]) -> None:
+def _reconstruct_trial(options, reporter: ProgressReporter, writers: Mapping[str, Writer]) -> None:
     """Reconstruct one trial and write its files."""
     from ..files.tables import write_report
     from ..markers.files.model_json import write_model
     from ..markers.reconstruct import reconstruct
 
-    begun = time.perf_counter()
+    started = time.perf_counter()
     inputs = (options.trial, options.static, options.model)
-    check_outputs(options.out, options.report, options.save_model, never=inputs)
-    write = writer_of(options.out, writers)
+    check_outputs(options.out, options.report, options.save_model, reserved=inputs)
+    write = choose_writer(options.out, writers)
     if options.add_to:
-        from ..library.keep_words import free_place
+        from ..library.keep_words import find_free_file
 
-        check_outputs(options.out, free_place(options.add_to, options.trial.stem))
-    settings = settings_of(options)
+        check_outputs(options.out, find_free_file(options.add_to, options.trial.stem))
+    settings = build_settings(options)
     trial = read_trial(options.trial, options)
     static = None if options.static is None else read_trial(options.static, options)
     model = _read_chosen_model(options)
     loaded = time.perf_counter()
     try:
-        made = reconstruct(trial, static, model, settings=settings, progress=told.progress, cancelled=told.cancelled)
+        result = reconstruct(trial, static, model, settings=settings, progress=reporter.show_progress, cancelled=reporter.is_cancelled)
     except InputError as error:
-        raise _with_file(error, options) from None
-    made.seconds.update(load=loaded - begun, total=time.perf_counter() - begun)
-    if _is_throw(options.words) and made.release is None:
+        raise _add_file_name(error, options) from None
+    result.seconds.update(load_labels=loaded - started, total=time.perf_counter() - started)
+    if _names_throw(options.words) and result.release is None:
         raise InputError(options.trial, "no ball release found, but --words name a throw", "a throw", "remove --words")
-    notes = add_to_library(made, options.trial.stem, options) if options.add_to else []
+    notes = add_to_library(result, options.trial.stem, options) if options.add_to else []
     if options.report:
-        write_report(options.report, made.report())
-    write(as_take(made), options.out)
+        write_report(options.report, result.report())
+    write(to_take(result), options.out)
     if options.save_model:
-        write_model(made.model, options.save_model)
-    told.end()
-    lines = [f"{options.trial}: {line}" for line in (*trial.notes, *made.warnings)]
-    _tell(told, [*_upright_alike(options, trial, static), *lines], options.report)
+        write_model(result.model, options.save_model)
+    reporter.finish()
+    lines = [f"{options.trial}: {line}" for line in (*trial.notes, *result.warnings)]
+    _show_lines(reporter, [*_compare_up_axes(options, trial, static), *lines], options.report)
     for note in notes:
-        told.note(note)
-    print(f"{options.out}: {summary(made)}")
+        reporter.show_note(note)
+    print(f"{options.out}: {describe_result(result)}")
 
 
-def _upright_alike(options, trial, static) -> list[str]:
+def _compare_up_axes(options, trial, static) -> list[str]:
     """Describe a difference in the up axes of two files of one kind; no line where there is none."""
     if static is None or options.up or options.trial.suffix.lower() != options.static.suffix.lower():
         return []
-    mine, other = ({line.split(",")[0] for line in one.notes if " is up" in line} for one in (trial, static))
-    if mine == other:
+    trial_axes, static_axes = ({line.split(",")[0] for line in one.notes if " is up" in line} for one in (trial, static))
+    if trial_axes == static_axes:
         return []
-    return [f"{options.trial} and {options.static} have different up axes: {', '.join(sorted(mine | other))}; set --up"]
+    return [f"{options.trial} and {options.static} have different up axes: {', '.join(sorted(trial_axes | static_axes))}; set --up"]
 
 
-def _tell(told: Told, lines: list[str], report: Path | None) -> None:
+def _show_lines(reporter: ProgressReporter, lines: list[str], report: Path | None) -> None:
     """Show the first lines of many; the report has all of them."""
-    for line in lines[:_MOST_LINES]:
-        told.note(line)
-    if len(lines) > _MOST_LINES:
-        more = len(lines) - _MOST_LINES
-        told.note(f"{more} more lines: {f'see {report}' if report else 'write them with --report R.json'}")
+    for line in lines[:_MAX_LINES]:
+        reporter.show_note(line)
+    if len(lines) > _MAX_LINES:
+        more = len(lines) - _MAX_LINES
+        reporter.show_note(f"{more} more lines: {f'see {report}' if report else 'write them with --report R.json'}")
 
 
-def _run_folder(options, told: Told) -> None:
+def _reconstruct_folder(options, reporter: ProgressReporter) -> None:
     """Reconstruct all trials of a folder.
 
     Each gets NAME.bvh, NAME.report.json and, with a static trial, NAME.model.json; trials.json and report.html
     summarize all.
     """
-    from ..markers.reconstruct_folder import reconstruct_folder, recordings_of
+    from ..markers.reconstruct_folder import reconstruct_folder, list_recordings
 
     for name in ("static", "report", "save_model"):
         if getattr(options, name):
@@ -137,18 +137,18 @@ def _run_folder(options, told: Told) -> None:
                              "remove it: static trials are detected, and each trial gets a report")  # fmt: skip
     if options.add_to and not options.add_to.is_dir():
         raise InputError(options.add_to, "is not a folder", "a library's folder", "create the folder first")
-    recordings_of(options.trial)  # raises InputError where there are none
-    settings = settings_of(options)
+    list_recordings(options.trial)  # raises InputError where there are none
+    settings = build_settings(options)
     model = _read_chosen_model(options)
     _check_folder(options.out, options.trial)
     read = partial(read_trial, options=options)
     rows = []
-    for made in reconstruct_folder(options.trial, read, settings, model=model, progress=told.progress,
-                                   cancelled=told.cancelled):
-        rows.append(_kept(made, options))
-        told.end()
+    for result in reconstruct_folder(options.trial, read, settings, model=model, progress=reporter.show_progress,
+                                   cancelled=reporter.is_cancelled):
+        rows.append(_write_result(result, options))
+        reporter.finish()
         print(rows[-1]["line"])
-    _write_overview(rows, options, told)
+    _write_overview(rows, options, reporter)
     if not any(row["bvh"] for row in rows):
         raise InputError(options.trial, "no trial could be reconstructed", "at least one", rows[0]["line"])
 
@@ -163,47 +163,47 @@ def _check_folder(out: Path, trials: Path) -> None:
         out.mkdir()
 
 
-def _kept(made, options) -> dict:
+def _write_result(result, options) -> dict:
     """Write the files of one trial's result; return its row of trials.json."""
     from ..files.bvh import bvh
     from ..files.tables import write_report
     from ..markers.files.model_json import write_model
 
-    name = made.recording.name
-    row = {"trial": name, "file": str(made.recording.path), "session": made.recording.session, "error": made.error,
-           "static": made.static and made.static.name, "bvh": "", "report": ""}  # fmt: skip
-    if made.made is None:
-        return {**row, "line": f"{name}: {made.error.removeprefix(f'{made.recording.path.stem}: ')}"}
+    name = result.recording.name
+    row = {"trial": name, "file": str(result.recording.path), "session": result.recording.session, "error": result.error,
+           "static": result.static and result.static.name, "bvh": "", "report": ""}  # fmt: skip
+    if result.made is None:
+        return {**row, "line": f"{name}: {result.error.removeprefix(f'{result.recording.path.stem}: ')}"}
     place = options.out / name
     place.parent.mkdir(parents=True, exist_ok=True)
-    bvh.write(place.parent / f"{place.name}.bvh", made.made.motion)
-    write_report(place.parent / f"{place.name}.report.json", made.made.report())
-    write_model(made.made.model, place.parent / f"{place.name}.model.json")
+    bvh.write_bvh(place.parent / f"{place.name}.bvh", result.made.motion)
+    write_report(place.parent / f"{place.name}.report.json", result.made.report())
+    write_model(result.made.model, place.parent / f"{place.name}.model.json")
     try:
-        notes = add_to_library(made.made, name.replace("/", "_"), options) if options.add_to else []
+        notes = add_to_library(result.made, name.replace("/", "_"), options) if options.add_to else []
     except InputError as error:  # concerns this clip only
         notes = [f"not added: {error}"]
-    return {**row, "bvh": f"{name}.bvh", "report": f"{name}.report.json", "subject": made.made.model.subject,
-            "line": "; ".join([f"{name}: {summary(made.made)}", *filter(None, [made.note]), *notes])}  # fmt: skip
+    return {**row, "bvh": f"{name}.bvh", "report": f"{name}.report.json", "subject": result.made.model.subject,
+            "line": "; ".join([f"{name}: {describe_result(result.made)}", *filter(None, [result.note]), *notes])}  # fmt: skip
 
 
-def _write_overview(rows, options, told: Told) -> None:
+def _write_overview(rows, options, reporter: ProgressReporter) -> None:
     """Write trials.json, and report.html if matplotlib is installed."""
     from ..evaluation.plots import require_matplotlib
     from ..files.tables import write_report
     from ..files.whole import atomic_write
-    from ..markers.trials_page import trials_report
+    from ..markers.trials_page import build_trials_report
 
     write_report(options.out / "trials.json", {"trials": rows})
     try:
         require_matplotlib()
     except InputError as error:
-        told.note(f"{options.out / 'report.html'} was not written: {error}")
+        reporter.show_note(f"{options.out / 'report.html'} was not written: {error}")
         return
-    atomic_write(options.out / "report.html", trials_report(options.out))
+    atomic_write(options.out / "report.html", build_trials_report(options.out))
 
 
-def settings_of(options):
+def build_settings(options):
     """Build the reconstruction settings from the command line.
 
     Args:
@@ -211,13 +211,13 @@ def settings_of(options):
     Returns:
         The `ReconstructSettings`.
     """
-    from ..markers.files.marker_set_text import chosen_set
+    from ..markers.files.marker_set_text import choose_set
     from ..markers.reconstruct import ReconstructSettings
 
-    found = option_values(ReconstructSettings, options, "markers")
-    if _is_throw(options.words) and options.release == "auto":
-        found["release"] = "yes"
-    return ReconstructSettings(marker_set=options.marker_set and chosen_set(options.marker_set), **found)
+    values = option_values(ReconstructSettings, options, "markers")
+    if _names_throw(options.words) and options.release == "auto":
+        values["release"] = "yes"
+    return ReconstructSettings(marker_set=options.marker_set and choose_set(options.marker_set), **values)
 
 
 def read_trial(path: Path, options):
@@ -242,7 +242,7 @@ def _read_chosen_model(options):
     return None if options.model is None else read_model(options.model)
 
 
-def _with_file(error: InputError, options) -> InputError:
+def _add_file_name(error: InputError, options) -> InputError:
     """Add the file's path to an error: trials know only the file's name."""
     for path in (options.trial, options.static):
         if path is not None and error.where == path.stem:
@@ -250,7 +250,7 @@ def _with_file(error: InputError, options) -> InputError:
     return error if error.where.startswith("--") else InputError(options.trial, str(error))
 
 
-def as_take(made):
+def to_take(result):
     """Convert a reconstruction to a take, for the writers of takes (Blender's formats too).
 
     Args:
@@ -258,16 +258,16 @@ def as_take(made):
     Returns:
         A `Take`.
     """
-    from ..motion.contacts import detect
+    from ..motion.contacts import detect_contacts
 
-    known = {} if made.release is None else {"ball": made.release.path}
+    fields = {} if result.release is None else {"ball": result.release.path}
     with suppress(InputError):  # no legs
-        known["contacts"] = detect(made.motion)
-    return build_take(made.motion, made.raw.name, "reconstruct", start_time=made.trial.start, warnings=made.warnings,
-                      **known)
+        fields["contacts"] = detect_contacts(result.motion)
+    return build_take(result.motion, result.raw.name, "reconstruct", start_time=result.trial.start, warnings=result.warnings,
+                      **fields)
 
 
-def summary(made) -> str:
+def describe_result(result) -> str:
     """Describe a reconstruction in one line.
 
     Args:
@@ -275,16 +275,16 @@ def summary(made) -> str:
     Returns:
         Frames, duration, markers and their mean distance.
     """
-    residual = made.solved.residual[np.isfinite(made.solved.residual)]
-    near = f", markers {1000.0 * np.mean(residual):.1f} mm off" if len(residual) else ""
-    return f"{len(made.motion)} frames, {made.motion.duration:.1f} s, {len(made.model.markers)} markers{near}"
+    residual = result.solved.residual[np.isfinite(result.solved.residual)]
+    distance = f", markers {1000.0 * np.mean(residual):.1f} mm off" if len(residual) else ""
+    return f"{len(result.motion)} frames, {result.motion.duration:.1f} s, {len(result.model.markers)} markers{distance}"
 
 
-def _is_throw(words) -> bool:
-    return any(word.startswith("throw") for word in words)
+def _names_throw(labels) -> bool:
+    return any(word.startswith("throw") for word in labels)
 
 
-def add_to_library(made, name: str, options) -> list[str]:
+def add_to_library(result, name: str, options) -> list[str]:
     """Add the motion to a library as a clip; a throw's labels are placed at its release.
 
     Args:
@@ -297,9 +297,9 @@ def add_to_library(made, name: str, options) -> list[str]:
     from ..library.keep_words import add_clip
 
     key = None
-    if _is_throw(options.words) and made.release is not None:
-        key = made.release.frame / made.motion.fps
-    return add_clip(options.add_to, name, made.on_floor(), options.words, key)
+    if _names_throw(options.words) and result.release is not None:
+        key = result.release.frame / result.motion.fps
+    return add_clip(options.add_to, name, result.place_on_floor(), options.words, key)
 
 
 def add_release(verbs):
@@ -319,7 +319,7 @@ def add_release(verbs):
     return verb
 
 
-def run_release(options, told: Told, writers: Mapping[str, Writer]) -> None:
+def run_release(options, reporter: ProgressReporter, writers: Mapping[str, Writer]) -> None:
     """Run `release`: find the ball's release and write the requested files.
 
     Args:
@@ -330,24 +330,24 @@ def run_release(options, told: Told, writers: Mapping[str, Writer]) -> None:
     from ..files.bvh import bvh
     from ..files.tables import write_ball, write_report
     from ..markers.files.marker_files import read_markers
-    from ..markers.release.release import ReleaseSettings, release
+    from ..markers.release.release import ReleaseSettings, estimate_release
 
-    begun = time.perf_counter()
-    check_outputs(options.report, options.ball_csv, never=(options.trial, options.motion))
+    started = time.perf_counter()
+    check_outputs(options.report, options.ball_csv, reserved=(options.trial, options.motion))
     trial = read_markers(options.trial, options.unit, options.subject, options.up)
-    motion = bvh.read(options.motion).motion
+    motion = bvh.read_bvh(options.motion).motion
     loaded = time.perf_counter()
     settings = ReleaseSettings(**option_values(ReleaseSettings, options, "release"))
     try:
-        found = release(trial, motion, settings)
+        found = estimate_release(trial, motion, settings)
     except InputError as error:  # trials know only the file's name
         raise error if error.where != trial.name else InputError(options.trial, str(error).split(": ", 1)[1]) from None
     done = time.perf_counter()
     report = {"version": __version__, "trial": str(options.trial), **found.report()}
-    write_report(options.report, {**report, "seconds": {"load": loaded - begun, "release": done - loaded}})
+    write_report(options.report, {**report, "seconds": {"load": loaded - started, "release": done - loaded}})
     if options.ball_csv:
         write_ball(options.ball_csv, found.path)
-    told.end(f"{options.trial}: {note}" for note in found.notes)
+    reporter.finish(f"{options.trial}: {note}" for note in found.notes)
     radar = ""
     if found.radar is not None:
         radar = f", radar {found.radar:.1f} m/s ({100 * (found.speed / found.radar - 1):+.1f} %)"

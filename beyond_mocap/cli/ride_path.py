@@ -15,15 +15,15 @@ import numpy as np
 
 from ..base.errors import InputError
 from ..base.settings.options import add_options, option_values
-from .outputs import Told, Writer, build_take, check_outputs, naming, writer_of
+from .outputs import ProgressReporter, Writer, build_take, check_outputs, locate_errors, choose_writer
 
 if TYPE_CHECKING:
-    from ..path_editing.detour import Change, Follower
-    from ..path_editing.ride import Ridden, RideSettings, RideSource
+    from ..path_editing.detour import PathChange, Follower
+    from ..path_editing.ride import EditedMotion, PathEditSettings, PathEditSource
 
-_WHOLE = 0.95  # share of a path that counts as all of it
-_ROUNDS = 3  # searches for delays and detours at most
-_HIPS = 0.9  # metres, rough height of hips above the ground; only decides whether bodies are on one floor
+_COMPLETE_SHARE = 0.95  # share of a path that counts as all of it
+_MAX_ROUNDS = 3  # searches for delays and detours at most
+_HIP_HEIGHT = 0.9  # metres, rough height of hips above the ground; only decides whether bodies are on one floor
 
 
 def add_path(verbs):
@@ -44,7 +44,7 @@ def add_path(verbs):
     return verb
 
 
-def run_path(options, told: Told, writers: Mapping[str, Writer]) -> None:
+def run_path(options, reporter: ProgressReporter, writers: Mapping[str, Writer]) -> None:
     """Run `path`: move the recording onto the path and write the requested files.
 
     Args:
@@ -54,54 +54,54 @@ def run_path(options, told: Told, writers: Mapping[str, Writer]) -> None:
     """
     from ..files.bvh import bvh
 
-    begun = time.perf_counter()
+    started = time.perf_counter()
     inputs = (options.input, options.path, options.ground, *options.avoid)
-    check_outputs(options.out, options.report, options.provenance, never=inputs)
-    write = writer_of(options.out, writers)
-    if options.control_degree and not options.control_points:
+    check_outputs(options.out, options.report, options.provenance, reserved=inputs)
+    write = choose_writer(options.out, writers)
+    if options.control_degree and not options.fit_control_points:
         raise InputError("--control-degree", "set without --control-points", "both", "add --control-points")
     if options.distance and not options.avoid:
         raise InputError("--distance", "set without --avoid", "both", "add --avoid OTHER.bvh")
-    if options.closed and options.control_points:
+    if options.closed and options.fit_control_points:
         raise InputError("--closed", "set with --control-points", "one of them", "remove one: a B-spline is open")
-    path, ground = _path(options), _ground(options)
-    clip = bvh.read(options.input, options.unit)
+    path, ground = _read_path(options), _read_ground(options)
+    clip = bvh.read_bvh(options.input, options.unit)
     loaded = time.perf_counter()
-    told.check()
-    told.progress(0.2, "path")
-    source, settings = _prepared(clip.motion, options)
-    settings, asked = _apart(source, path, settings, ground, options)
-    told.check()
-    told.progress(0.5, "ride")
-    ridden, take = _ridden(source, path, settings, ground, options)
+    reporter.check_cancelled()
+    reporter.show_progress(0.2, "path")
+    source, settings = _prepare_source(clip.motion, options)
+    settings, changes = _avoid_others(source, path, settings, ground, options)
+    reporter.check_cancelled()
+    reporter.show_progress(0.5, "ride")
+    edited, take = _edit_motion(source, path, settings, ground, options)
     done = time.perf_counter()
-    take.seconds.update(load=loaded - begun, construct=done - loaded, total=done - begun)
-    told.check()
-    report = _report(source, ridden, take, path, ground) if options.report else None
-    told.check()
+    take.seconds.update(load_labels=loaded - started, construct=done - loaded, total=done - started)
+    reporter.check_cancelled()
+    report = _build_report(source, edited, take, path, ground) if options.report else None
+    reporter.check_cancelled()
     notes = [f"{options.input}: {note}" for note in clip.notes]
     if options.out.suffix.lower() == ".bvh":
-        notes += [f"{options.out}: {note}" for note in bvh.write(options.out, ridden.motion, clip.form)]
+        notes += [f"{options.out}: {note}" for note in bvh.write_bvh(options.out, edited.motion, clip.form)]
     else:
         write(take, options.out)
     _write_tables(options, take, report)
-    told.end((*notes, *asked, *ridden.warnings, *_left_over(source, ridden, path, options)))
-    gone = float(np.maximum(np.diff(ridden.arc), 0.0).sum())  # a repeated path starts again at 0
-    print(f"{options.out}: {len(ridden.motion)} frames, {ridden.motion.duration:.1f} s, {gone:.1f} "
-          f"m{_unit(clip, options)}")
+    reporter.finish((*notes, *changes, *edited.warnings, *_describe_remaining_path(source, edited, path, options)))
+    distance = float(np.maximum(np.diff(edited.arc), 0.0).sum())  # a repeated path starts again at 0
+    print(f"{options.out}: {len(edited.motion)} frames, {edited.motion.duration:.1f} s, {distance:.1f} "
+          f"m{_describe_unit(clip, options)}")
 
 
-def _left_over(source, ridden, path, options) -> list[str]:
+def _describe_remaining_path(source, edited, path, options) -> list[str]:
     """Report where the motion ends long before the path."""
     from ..motion.path.arc_length import ArcLength
 
-    gone, length = float(ridden.arc[-1]), ArcLength(path).length
-    if options.cycle or options.end == "repeat" or source.still or gone >= _WHOLE * length:
+    distance, length = float(edited.arc[-1]), ArcLength(path).length
+    if options.cycle or options.end == "repeat" or source.still or distance >= _COMPLETE_SHARE * length:
         return []
-    return [f"the motion ends after {gone:.1f} of {length:.1f} m of the path; --cycle repeats it"]
+    return [f"the motion ends after {distance:.1f} of {length:.1f} m of the path; --cycle repeats it"]
 
 
-def _unit(clip, options) -> str:
+def _describe_unit(clip, options) -> str:
     """Describe the output's unit where it differs from the input's."""
     same = options.out.suffix.lower() != ".bvh" or np.isclose(clip.form.unit, 0.01)
     return "" if same else "; positions in centimetres (--unit 0.01)"
@@ -117,19 +117,19 @@ def _write_tables(options, take, report: dict | None) -> None:
         write_report(options.report, report)
 
 
-def _path(options):
+def _read_path(options):
     """Read the new path."""
     from ..path_editing import path_line
     from ..path_editing.path_line import read_curve
 
     points = read_curve(options.path)
-    with naming(options.path):
-        if options.control_points:
-            return path_line.b_spline(points, options.control_degree or 3)
-        return path_line.through(points, str(options.path), closed=options.closed)
+    with locate_errors(options.path):
+        if options.fit_control_points:
+            return path_line.build_b_spline(points, options.control_degree or 3)
+        return path_line.fit_line(points, str(options.path), closed=options.closed)
 
 
-def _ground(options):
+def _read_ground(options):
     """Read the ground mesh; None for the path's own height."""
     if options.ground is None:
         return None
@@ -139,58 +139,58 @@ def _ground(options):
     return Terrain(*read_mesh(options.ground))
 
 
-def _prepared(motion, options):
+def _prepare_source(motion, options):
     """Separate the recording from its own path; return it with the settings."""
-    from ..path_editing.ride import RideSettings, prepare
+    from ..path_editing.ride import PathEditSettings, prepare_source
 
-    settings = RideSettings(
-        fit="polynomial" if options.degree else "spline", **option_values(RideSettings, options, "path_editing")
+    settings = PathEditSettings(
+        fit="polynomial" if options.degree else "spline", **option_values(PathEditSettings, options, "path_editing")
     )
-    with naming(options.input):
-        return prepare(motion, settings), settings
+    with locate_errors(options.input):
+        return prepare_source(motion, settings), settings
 
 
-def _apart(source, path, settings, ground, options):
+def _avoid_others(source, path, settings, ground, options):
     """Add delays and detours that avoid other bodies; return the settings and a line for each change."""
     if not options.avoid:
         return settings, ()
     from ..path_editing.collisions import DISTANCE
 
     others = _read_others(options.avoid)
-    with naming(f"{options.input} on {options.path}"):
-        return _keep_clear(others, options.distance or DISTANCE, source, path=path, settings=settings, ground=ground,
+    with locate_errors(f"{options.input} on {options.path}"):
+        return _avoid_collisions(others, options.distance or DISTANCE, source, path=path, settings=settings, ground=ground,
                            name=options.input.name)
 
 
-def _ridden(source, path, settings, ground, options):
+def _edit_motion(source, path, settings, ground, options):
     """Move the motion onto the path; return the result and the same as a take."""
-    from ..path_editing.path_ride import carried
-    from ..path_editing.ride import ride
+    from ..path_editing.path_ride import carry_contacts
+    from ..path_editing.ride import edit_path
 
-    with naming(f"{options.input} on {options.path}"):
-        ridden = ride(source, path, settings, ground)
+    with locate_errors(f"{options.input} on {options.path}"):
+        edited = edit_path(source, path, settings, ground)
     take = build_take(
-        ridden.motion, options.input.name, "ride", clip_frame=ridden.frames, contacts=carried(ridden).all(axis=2),
-        seams=np.asarray(ridden.seams, int), warnings=tuple(ridden.warnings), correction=ridden.correction,
-        ik_miss=ridden.miss,
+        edited.motion, options.input.name, "ride", clip_frame=edited.frames, contacts=carry_contacts(edited).all(axis=2),
+        seams=np.asarray(edited.transitions, int), warnings=tuple(edited.warnings), correction=edited.correction,
+        ik_miss=edited.miss,
     )  # fmt: skip
-    return ridden, take
+    return edited, take
 
 
-def _report(source, ridden, take, path, ground) -> dict:
+def _build_report(source, edited, take, path, ground) -> dict:
     """Build the report: the common figures, and how well the motion follows the path."""
-    from ..evaluation.report import evaluate, rounded
-    from ..path_editing.path_ride import figures
+    from ..evaluation.report import evaluate, round_values
+    from ..path_editing.path_ride import measure_path_edit
 
-    ridden_well = rounded(figures(source, ridden, path, ground))
-    if source.humanoid:
+    path_figures = round_values(measure_path_edit(source, edited, path, ground))
+    if source.has_legs:
         report = evaluate(take, None, None)
     else:
         report = {"version": 1, "fps": take.motion.fps, "frames": len(take.motion), "duration_s": take.motion.duration}
-    report["skate"] = {**report.get("skate", {}), **(ridden_well["skate"] or {})}
-    seams = {name: ridden_well["seam_jerk"][name] for name in ("median", "max")}
+    report["skate"] = {**report.get("skate", {}), **(path_figures["skate"] or {})}
+    seams = {name: path_figures["seam_jerk"][name] for name in ("median", "max")}
     report["seam_jerk_ratio"] = {**report.get("seam_jerk_ratio", {}), **seams}
-    return {**report, "root_error_m": ridden_well["root_error_m"], "path": ridden_well, "warnings": list(take.warnings)}
+    return {**report, "root_error_m": path_figures["root_error_m"], "path": path_figures, "warnings": list(take.warnings)}
 
 
 def _read_others(paths: Sequence[Path]) -> list[Follower]:
@@ -198,16 +198,16 @@ def _read_others(paths: Sequence[Path]) -> list[Follower]:
     from ..files.bvh import bvh
     from ..path_editing.detour import Follower
 
-    motions = [(path.name, bvh.read(path).motion) for path in paths]
+    motions = [(path.name, bvh.read_bvh(path).motion) for path in paths]
     return [
-        Follower(name=name, times=np.arange(len(motion)) / motion.fps, places=motion.root_positions - (0.0, 0.0, _HIPS))
+        Follower(name=name, times=np.arange(len(motion)) / motion.fps, places=motion.root_positions - (0.0, 0.0, _HIP_HEIGHT))
         for name, motion in motions
     ]
 
 
-def _keep_clear(
-    others: list[Follower], distance: float, source: RideSource, path, settings: RideSettings, ground, name: str
-) -> tuple[RideSettings, tuple[str, ...]]:
+def _avoid_collisions(
+    others: list[Follower], distance: float, source: PathEditSource, path, settings: PathEditSettings, ground, name: str
+) -> tuple[PathEditSettings, tuple[str, ...]]:
     """Search for the delay and detours that keep a body `distance` metres from others.
 
     Args:
@@ -221,49 +221,49 @@ def _keep_clear(
     Returns:
         The new settings, and one line for each change and for each collision that remains.
     """
-    from ..path_editing.apart import Limits, resolved
-    from ..path_editing.ride import ride
+    from ..path_editing.apart import Limits, resolve_collisions
+    from ..path_editing.ride import edit_path
 
     # Search with unplanted feet, which is faster and moves the root the same way.
-    bare, limits = ride(source, path, replace(settings, plant=False), ground), Limits(distance)
-    me = replace(_build_follower(name, bare), path=path, arc=bare.arc, by_arc=settings.by_arc_length)
-    for _ in range(_ROUNDS):
-        change = resolved([me, *others], limits).changes[0]
-        asked = _apply_change(settings, change, bare.motion.fps)
-        rider = _build_follower(name, ride(source, path, replace(asked, plant=False), ground))
-        left = _find_collisions([rider, *others], distance)
-        if not left:
+    edited, limits = edit_path(source, path, replace(settings, plant=False), ground), Limits(distance)
+    follower = replace(_build_follower(name, edited), path=path, arc=edited.arc, by_arc=settings.by_arc_length)
+    for _ in range(_MAX_ROUNDS):
+        change = resolve_collisions([follower, *others], limits).changes[0]
+        changed = _apply_change(settings, change, edited.motion.fps)
+        edited_follower = _build_follower(name, edit_path(source, path, replace(changed, plant=False), ground))
+        collisions = _find_collisions([edited_follower, *others], distance)
+        if not collisions:
             break
-        limits = replace(limits, distance=limits.distance + distance - min(hit.gap for hit in left) + 0.01)
-    still = (f"still comes within {hit.gap:.2f} m of {others[hit.second - 1].name} at {hit.time:.1f} s" for hit in left)
-    return asked, tuple(f"{name} {line}" for line in (*_describe_changes(asked, settings), *still))
+        limits = replace(limits, distance=limits.distance + distance - min(hit.gap for hit in collisions) + 0.01)
+    remaining = (f"still comes within {hit.gap:.2f} m of {others[hit.second - 1].name} at {hit.time:.1f} s" for hit in collisions)
+    return changed, tuple(f"{name} {line}" for line in (*_describe_changes(changed, settings), *remaining))
 
 
-def _build_follower(name: str, ridden: Ridden) -> Follower:
+def _build_follower(name: str, edited: EditedMotion) -> Follower:
     from ..path_editing.detour import Follower
 
-    times = np.arange(len(ridden.motion)) / ridden.motion.fps
+    times = np.arange(len(edited.motion)) / edited.motion.fps
     return Follower(name=name, times=times,
-                    places=np.column_stack([ridden.motion.root_positions[:, :2], ridden.origin[:, 2]]))
+                    places=np.column_stack([edited.motion.root_positions[:, :2], edited.origin[:, 2]]))
 
 
-def _apply_change(settings: RideSettings, change: Change, fps: float) -> RideSettings:
+def _apply_change(settings: PathEditSettings, change: PathChange, fps: float) -> PathEditSettings:
     """Apply a change to the settings; bodies wait for whole frames."""
-    waits = float(np.ceil(round(change.delay * fps, 3)) / fps)
-    return replace(settings, delay=settings.delay + waits, detours=change.detours)
+    delay = float(np.ceil(round(change.delay * fps, 3)) / fps)
+    return replace(settings, delay=settings.delay + delay, detours=change.detours)
 
 
 def _find_collisions(followers: list[Follower], distance: float) -> list:
     """Find the collisions of the first body with the others."""
-    from ..path_editing.collisions import collisions
+    from ..path_editing.collisions import find_collisions
 
     times = np.unique(np.concatenate([follower.times for follower in followers]))
     places = np.stack([follower.at(times) for follower in followers])
-    return [hit for hit in collisions(times, places, distance) if hit.first == 0]
+    return [hit for hit in find_collisions(times, places, distance) if hit.first == 0]
 
 
-def _describe_changes(asked: RideSettings, settings: RideSettings) -> list[str]:
-    waits = asked.delay - settings.delay
-    turns = (f"goes {abs(offset):.2f} m to the {'left' if offset > 0 else 'right'} {arc:.1f} m along the path"
-             for arc, _, offset in asked.detours)  # fmt: skip
-    return [*([f"waits {waits:.2f} s"] if waits else []), *turns]
+def _describe_changes(changed: PathEditSettings, settings: PathEditSettings) -> list[str]:
+    delay = changed.delay - settings.delay
+    detours = (f"goes {abs(offset):.2f} m to the {'left' if offset > 0 else 'right'} {arc:.1f} m along the path"
+             for arc, _, offset in changed.detours)  # fmt: skip
+    return [*([f"waits {delay:.2f} s"] if delay else []), *detours]

@@ -11,12 +11,12 @@ from pathlib import Path
 
 from ..base.errors import InputError
 from ..base.settings.options import add_options
-from .outputs import Told, Writer, add_own_verbs, check_outputs
+from .outputs import ProgressReporter, Writer, add_subverbs, check_outputs
 
 CLIPS, FORMS, ANSWERS = "clips", "forms", "answers"
 """Folders inside a study's folder."""
 _MOVIE = ".mp4"
-_EMBED_MOST = 200_000_000  # bytes of all clips in one form at most
+_MAX_EMBEDDED = 200_000_000  # bytes of all clips in one form at most
 
 
 def add_study(verbs):
@@ -28,7 +28,7 @@ def add_study(verbs):
         The parser of this verb.
     """
     verb = verbs.add_parser("study", help="how natural motions look to raters: order, form, analyse")
-    return add_own_verbs(verb, "study_verb", _add_order, _add_form, _add_analyse)
+    return add_subverbs(verb, "study_verb", _add_order, _add_form, _add_analyse)
 
 
 def _add_order(verbs):
@@ -58,7 +58,7 @@ def _add_analyse(verbs):
     return verb
 
 
-def run_order(options, told: Told, writers: Mapping[str, Writer]) -> None:
+def run_order(options, reporter: ProgressReporter, writers: Mapping[str, Writer]) -> None:
     """Run `study order`: write study.json and, if requested, copy the movies under neutral names.
 
     Args:
@@ -66,36 +66,36 @@ def run_order(options, told: Told, writers: Mapping[str, Writer]) -> None:
         reporter: progress, notes and cancellation.
         writers: further output formats, by file suffix (Blender's).
     """
-    from ..files.whole import whole_folder
+    from ..files.whole import atomic_folder
     from ..study.form import MOVIES
-    from ..study.order import ordered, read_clips, write_study
+    from ..study.order import build_study, read_clips, write_study
 
     table = options.clips.parent
-    clips = [replace(clip, file=_from(options.out, table / clip.file)) for clip in read_clips(options.clips)]
+    clips = [replace(clip, file=_relative_path(options.out, table / clip.file)) for clip in read_clips(options.clips)]
     try:
-        study = ordered(clips, options.raters, options.seed, options.pairs)
+        study = build_study(clips, options.raters, options.seed, options.pairs)
     except InputError as error:
         if error.where != "clips":
             raise
         raise InputError(options.clips, str(error).removeprefix("clips: ")) from None
     movies = [clip for clip in study.clips if options.copy and Path(clip.file).suffix.lower() in MOVIES]
-    with whole_folder(options.out) as place:
+    with atomic_folder(options.out) as place:
         write_study(place, study)
         if movies:
             (place / CLIPS).mkdir()
         for number, clip in enumerate(movies, 1):
-            told.check()
-            _copy(options.out / clip.file, place / CLIPS / clip.name)
-            told.progress(number / len(movies), clip.name)
-    told.end()
+            reporter.check_cancelled()
+            _copy_movie(options.out / clip.file, place / CLIPS / clip.name)
+            reporter.show_progress(number / len(movies), clip.name)
+    reporter.finish()
     if options.copy and len(movies) < len(study.clips):
-        told.note(f"{len(study.clips) - len(movies)} of {len(study.clips)} clips are not movies; render them")
-    shown = len(next(iter(study.orders.values())))
+        reporter.show_note(f"{len(study.clips) - len(movies)} of {len(study.clips)} clips are not movies; render them")
+    pages = len(next(iter(study.orders.values())))
     print(f"{options.out}: study {study.id}, {len(study.clips)} clips of {len(study.systems)} systems, "
-          f"{len(study.orders)} raters with {shown} pages each")  # fmt: skip
+          f"{len(study.orders)} raters with {pages} pages each")  # fmt: skip
 
 
-def _from(folder: Path, path: Path) -> str:
+def _relative_path(folder: Path, path: Path) -> str:
     """Build the relative path from a folder that need not exist yet, so that both can be moved together."""
     try:
         return Path(os.path.relpath(path.resolve(), folder.resolve())).as_posix()
@@ -103,7 +103,7 @@ def _from(folder: Path, path: Path) -> str:
         return path.resolve().as_posix()
 
 
-def _copy(source: Path, target: Path) -> None:
+def _copy_movie(source: Path, target: Path) -> None:
     """Copy one movie under its neutral name, without its time stamps and original name."""
     source = source.resolve()
     if not source.is_file():
@@ -111,7 +111,7 @@ def _copy(source: Path, target: Path) -> None:
     shutil.copyfile(source, target.with_suffix(source.suffix.lower()))
 
 
-def run_form(options, told: Told, writers: Mapping[str, Writer]) -> None:
+def run_form(options, reporter: ProgressReporter, writers: Mapping[str, Writer]) -> None:
     """Run `study form`: write a page and a table for each rater to FOLDER/forms.
 
     Args:
@@ -120,44 +120,44 @@ def run_form(options, told: Told, writers: Mapping[str, Writer]) -> None:
         writers: further output formats, by file suffix (Blender's).
     """
     from ..files.whole import atomic_write
-    from ..study.form import clip_source, form_page, form_table
+    from ..study.form import find_movie, build_form_page, build_form_table
     from ..study.order import read_study
 
     study = read_study(options.study)
-    found = {clip.name: clip_source(options.study / CLIPS, clip.name) for clip in study.clips}
-    absent = [name for name, path in found.items() if path is None]
-    if options.embed and absent:
-        raise InputError(options.study / CLIPS, f"{len(absent)} clips are missing, such as {absent[0]}{_MOVIE}",
+    movies = {clip.name: find_movie(options.study / CLIPS, clip.name) for clip in study.clips}
+    missing_names = [name for name, path in movies.items() if path is None]
+    if options.embed and missing_names:
+        raise InputError(options.study / CLIPS, f"{len(missing_names)} clips are missing, such as {missing_names[0]}{_MOVIE}",
                          "a movie for each clip", "render them first")  # fmt: skip
-    sources = _embedded(options.study, found) if options.embed else {
-        name: f"../{CLIPS}/{path.name if path else name + _MOVIE}" for name, path in found.items()
+    sources = _embed_movies(options.study, movies) if options.embed else {
+        name: f"../{CLIPS}/{path.name if path else name + _MOVIE}" for name, path in movies.items()
     }
     (options.study / FORMS).mkdir(exist_ok=True)
     for number, rater in enumerate(study.orders, 1):
-        told.check()
-        atomic_write(options.study / FORMS / f"{rater}.html", form_page(study, rater, sources))
-        atomic_write(options.study / FORMS / f"{rater}.csv", form_table(study, rater))
-        told.progress(number / len(study.orders), rater)
-    told.end()
-    if absent:
-        missing = f"{len(absent)} of {len(found)} clips are missing, such as {absent[0]}{_MOVIE}"
-        told.note(f"{options.study / CLIPS}: {missing}")
+        reporter.check_cancelled()
+        atomic_write(options.study / FORMS / f"{rater}.html", build_form_page(study, rater, sources))
+        atomic_write(options.study / FORMS / f"{rater}.csv", build_form_table(study, rater))
+        reporter.show_progress(number / len(study.orders), rater)
+    reporter.finish()
+    if missing_names:
+        missing = f"{len(missing_names)} of {len(movies)} clips are missing, such as {missing_names[0]}{_MOVIE}"
+        reporter.show_note(f"{options.study / CLIPS}: {missing}")
     print(f"{options.study / FORMS}: {len(study.orders)} forms")
 
 
-def _embedded(folder: Path, found: Mapping[str, Path]) -> dict[str, str]:
+def _embed_movies(folder: Path, movies: Mapping[str, Path]) -> dict[str, str]:
     """Build the data URLs of all clips."""
-    from ..evaluation.html_page import build_data_address
+    from ..evaluation.html_page import build_data_url
 
-    size = sum(path.stat().st_size for path in found.values())
-    if size > _EMBED_MOST:
+    size = sum(path.stat().st_size for path in movies.values())
+    if size > _MAX_EMBEDDED:
         what = f"{size / 1e6:.0f} MB of movies"
-        raise InputError(folder / CLIPS, what, f"{_EMBED_MOST / 1e6:.0f} MB at most in a page", "remove --embed")
-    kinds = {name: mimetypes.guess_type(path.name)[0] or "video/mp4" for name, path in found.items()}
-    return {name: build_data_address(path.read_bytes(), kinds[name]) for name, path in found.items()}
+        raise InputError(folder / CLIPS, what, f"{_MAX_EMBEDDED / 1e6:.0f} MB at most in a page", "remove --embed")
+    kinds = {name: mimetypes.guess_type(path.name)[0] or "video/mp4" for name, path in movies.items()}
+    return {name: build_data_url(path.read_bytes(), kinds[name]) for name, path in movies.items()}
 
 
-def run_analyse(options, told: Told, writers: Mapping[str, Writer]) -> None:
+def run_analyse(options, reporter: ProgressReporter, writers: Mapping[str, Writer]) -> None:
     """Run `study analyse`: write the report and, if requested, its page.
 
     Args:
@@ -167,20 +167,20 @@ def run_analyse(options, told: Told, writers: Mapping[str, Writer]) -> None:
     """
     from ..files.tables import write_report
     from ..files.whole import atomic_write
-    from ..study.analysis import analysed
-    from ..study.answers import answer_files, read_answers
+    from ..study.analysis import analyse_study
+    from ..study.answers import list_answer_files, read_answers
     from ..study.order import read_study
-    from ..study.page import p_text, study_page, study_report
+    from ..study.page import format_p, build_study_page, build_study_report
 
     answers = options.answers or [options.study / ANSWERS]
-    check_outputs(options.report, options.html, never=(*answer_files(answers), options.study / "study.json"))
+    check_outputs(options.report, options.html, reserved=(*list_answer_files(answers), options.study / "study.json"))
     study = read_study(options.study)
-    found = analysed(study, read_answers(study, answers), [tuple(pair) for pair in options.better])
-    page = study_page(found) if options.html else None
-    write_report(options.report, study_report(found))
+    analysis = analyse_study(study, read_answers(study, answers), [tuple(pair) for pair in options.better])
+    page = build_study_page(analysis) if options.html else None
+    write_report(options.report, build_study_report(analysis))
     if page:
         atomic_write(options.html, page)
-    told.end(found.notes)
-    for one in found.findings:
-        said = "more natural" if one.better else "not significantly more natural"
-        print(f"{one.new} over {one.old}: {said}, difference {one.mean:+.2f}, one-sided {p_text(one.holm_p)}")
+    reporter.finish(analysis.notes)
+    for finding in analysis.findings:
+        verdict = "more natural" if finding.better else "not significantly more natural"
+        print(f"{finding.new} over {finding.old}: {verdict}, difference {finding.mean:+.2f}, one-sided {format_p(finding.holm_p)}")

@@ -7,10 +7,10 @@ import time
 from collections.abc import Mapping
 from pathlib import Path
 
-from ..base.errors import NotInLibrary
+from ..base.errors import NotInLibraryError
 from ..base.settings.options import add_options, option_values
 from .library import open_library
-from .outputs import Told, Writer, add_take_files, check_outputs, writer_of
+from .outputs import ProgressReporter, Writer, add_take_files, check_outputs, choose_writer
 
 
 def add_synthesize(verbs) -> argparse.ArgumentParser:
@@ -36,7 +36,7 @@ def add_synthesize(verbs) -> argparse.ArgumentParser:
     return verb
 
 
-def run_synthesize(options, told: Told, writers: Mapping[str, Writer]) -> None:
+def run_synthesize(options, reporter: ProgressReporter, writers: Mapping[str, Writer]) -> None:
     """Run `synthesize`: synthesize one player's motion and write the requested files.
 
     Args:
@@ -44,34 +44,34 @@ def run_synthesize(options, told: Told, writers: Mapping[str, Writer]) -> None:
         reporter: progress, notes and cancellation.
         writers: further output formats, by file suffix (Blender's).
     """
-    from ..annotation import read_timeline, validate
+    from ..annotation import read_timeline, check_timeline
     from ..files.tables import write_ball, write_report
     from ..files.tracking.tracking import read_track_csv
-    from ..motion.track import clean
+    from ..motion.track import clean_track
     from ..synthesis.pins import read_pins
     from ..synthesis.plan import Plan
     from ..synthesis.provenance import write_provenance
     from ..synthesis.synthesize import synthesize
 
-    begun = time.perf_counter()
+    started = time.perf_counter()
     outputs = (options.out, options.provenance, options.ball, options.report)
-    check_outputs(*outputs, never=(options.track, options.annotations, options.pins))
-    write = writer_of(options.out, writers)
-    track, data = clean(read_track_csv(options.track))
+    check_outputs(*outputs, reserved=(options.track, options.annotations, options.pins))
+    write = choose_writer(options.out, writers)
+    track, data = clean_track(read_track_csv(options.track))
     timeline = read_timeline(options.annotations, options.fps, float(track.times[0]))
     loaded = time.perf_counter()
-    library = open_library(options, told, seed=options.seed)
-    validate(timeline, library.words, float(track.times[0]), float(track.times[-1]), str(options.annotations))
+    library = open_library(options, reporter, seed=options.seed)
+    check_timeline(timeline, library.labels, float(track.times[0]), float(track.times[-1]), str(options.annotations))
     ready = time.perf_counter()
     plan = Plan(
         track=track, timeline=timeline, library=str(options.library),
         pins=read_pins(options.pins) if options.pins else (), **option_values(Plan, options, "synthesis", "player"),
     )
     try:
-        take = synthesize(library, plan, told.progress, told.cancelled)
-    except NotInLibrary as error:
-        raise NotInLibrary(f"{options.annotations}: {error}", error.nearest) from None
-    take.seconds.update(load=loaded - begun, library=ready - loaded, total=time.perf_counter() - begun)
+        take = synthesize(library, plan, reporter.show_progress, reporter.is_cancelled)
+    except NotInLibraryError as error:
+        raise NotInLibraryError(f"{options.annotations}: {error}", error.nearest) from None
+    take.seconds.update(load_labels=loaded - started, library=ready - loaded, total=time.perf_counter() - started)
     if options.report:
         from ..evaluation.report import evaluate
 
@@ -84,15 +84,15 @@ def run_synthesize(options, told: Told, writers: Mapping[str, Writer]) -> None:
         write_ball(options.ball, take.ball)
     if options.report:
         write_report(options.report, report)
-    told.end()
+    reporter.finish()
     if library.notes:
         notes = f"{len(library.notes)} notes on how its recordings were read and repaired"
-        told.note(f"{options.library}: {notes}; the command 'library' prints them")
-    of_take = [line for line in take.warnings if line not in library.notes]
-    for line in (*of_take, *(f"{options.track}: {line}" for line in data.lines)):
-        told.note(line)
+        reporter.show_note(f"{options.library}: {notes}; the command 'library' prints them")
+    take_warnings = [line for line in take.warnings if line not in library.notes]
+    for line in (*take_warnings, *(f"{options.track}: {line}" for line in data.lines)):
+        reporter.show_note(line)
     if options.ball and take.ball is None:
-        told.note(f"{options.track} has no ball, so {options.ball} is not written")
+        reporter.show_note(f"{options.track} has no ball, so {options.ball} is not written")
     print(f"{options.out}: {len(take.motion)} frames, {take.motion.duration:.1f} s")
 
 
@@ -117,7 +117,7 @@ def add_evaluate(verbs) -> argparse.ArgumentParser:
     return verb
 
 
-def run_evaluate(options, told: Told, writers: Mapping[str, Writer]) -> None:
+def run_evaluate(options, reporter: ProgressReporter, writers: Mapping[str, Writer]) -> None:
     """Run `evaluate`: report on a motion that was written before.
 
     If there is a library, `--unit` applies to its recordings.
@@ -127,50 +127,50 @@ def run_evaluate(options, told: Told, writers: Mapping[str, Writer]) -> None:
         reporter: progress, notes and cancellation.
         writers: further output formats, by file suffix (Blender's).
     """
-    from ..annotation import read_timeline, validate
-    from ..evaluation.html import html_report
+    from ..annotation import read_timeline, check_timeline
+    from ..evaluation.html import build_html_report
     from ..evaluation.plots import require_matplotlib
     from ..evaluation.report import evaluate_played
     from ..files.bvh import bvh
     from ..files.tables import read_ball, write_report
     from ..files.tracking.tracking import read_track_csv
     from ..files.whole import atomic_write
-    from ..motion.track import clean
+    from ..motion.track import clean_track
     from ..synthesis.provenance import read_provenance
-    from ..synthesis.quality.played import played_from_tables
+    from ..synthesis.quality.played import playback_from_tables
 
     inputs = (options.motion, options.track, options.annotations, options.provenance, options.ball)
-    check_outputs(options.report, options.html, never=inputs)
+    check_outputs(options.report, options.html, reserved=inputs)
     if options.html:
         require_matplotlib()
-    motion = bvh.read(options.motion, None if options.library else options.unit).motion
-    track = clean(read_track_csv(options.track))[0] if options.track else None
+    motion = bvh.read_bvh(options.motion, None if options.library else options.unit).motion
+    track = clean_track(read_track_csv(options.track))[0] if options.track else None
     start = float(track.times[0]) if track else 0.0
     timeline = read_timeline(options.annotations, motion.fps, start) if options.annotations else None
     provenance = read_provenance(options.provenance) if options.provenance else None
     ball = read_ball(options.ball) if options.ball else None
-    played = played_from_tables(motion, provenance, ball, start, str(options.provenance))
-    library = open_library(options, told) if options.library else None
+    played = playback_from_tables(motion, provenance, ball, start, str(options.provenance))
+    library = open_library(options, reporter) if options.library else None
     if timeline is not None and track is not None and library is not None:  # otherwise some labels or times are unknown
-        validate(timeline, library.words, start, float(track.times[-1]), str(options.annotations))
+        check_timeline(timeline, library.labels, start, float(track.times[-1]), str(options.annotations))
     report = evaluate_played(played, track=track, timeline=timeline, library=library)
     write_report(options.report, report)
     if options.html:
-        atomic_write(options.html, html_report(played, report, track=track, timeline=timeline, library=library,
+        atomic_write(options.html, build_html_report(played, report, track=track, timeline=timeline, library=library,
                                                title=options.motion.name))  # fmt: skip
-    told.end()
-    if library is not None and (strangers := _strangers(played.clips, library)):
-        first, count = strangers[0], len(strangers)
-        told.note(
+    reporter.finish()
+    if library is not None and (unknown_clips := _find_unknown_clips(played.clips, library)):
+        first, count = unknown_clips[0], len(unknown_clips)
+        reporter.show_note(
             f"{options.provenance}: {count} clips, such as {first}, are not in {options.library} and cannot be "
             "compared"
         )
     print(options.report)
 
 
-def _strangers(clips: tuple[str, ...], library) -> list[str]:
+def _find_unknown_clips(clips: tuple[str, ...], library) -> list[str]:
     """Find the clips of a provenance table that are neither in the library nor in its cache folder."""
     from ..library.scan import CACHE_FOLDER
 
-    own = {clip.path for clip in library.clips}
-    return [clip for clip in clips if clip and clip not in own and not clip.startswith(CACHE_FOLDER)]
+    known = {clip.path for clip in library.clips}
+    return [clip for clip in clips if clip and clip not in known and not clip.startswith(CACHE_FOLDER)]

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .. import __version__
-from ..base.errors import InputError, told_time
+from ..base.errors import InputError, format_seconds
 from ..base.settings.options import add_options
-from .outputs import Told, Writer, add_own_verbs, build_take, check_outputs, naming, writer_of
+from .outputs import ProgressReporter, Writer, add_subverbs, build_take, check_outputs, locate_errors, choose_writer
 
 if TYPE_CHECKING:
     from ..library.library import Library
@@ -30,7 +30,7 @@ def add_throw(verbs):
         The parser of this verb.
     """
     verb = verbs.add_parser("throw", help="throws and kicks from networks: train, synthesize, evaluate, examples")
-    return add_own_verbs(verb, "throw_verb", *(_add_train, _add_synthesize, _add_evaluate, _add_examples))
+    return add_subverbs(verb, "throw_verb", *(_add_train, _add_synthesize, _add_evaluate, _add_examples))
 
 
 def _add_train(verbs):
@@ -42,7 +42,7 @@ def _add_train(verbs):
     return verb
 
 
-def run_train(options, told: Told, writers: Mapping[str, Writer]) -> None:
+def run_train(options, reporter: ProgressReporter, writers: Mapping[str, Writer]) -> None:
     """Run `throw train`: train a model and write it.
 
     Args:
@@ -50,13 +50,13 @@ def run_train(options, told: Told, writers: Mapping[str, Writer]) -> None:
         reporter: progress, notes and cancellation.
         writers: further output formats, by file suffix (Blender's).
     """
-    check_outputs(options.out, never=(options.config, options.skeleton))
+    check_outputs(options.out, reserved=(options.config, options.skeleton))
     if options.out.suffix.lower() != ".npz":
         raise InputError(options.out, "not a weights file", "a name ending in .npz", "choose another file type")
     _require_training()
     from training.train import train_folder
 
-    train_folder(options, told)
+    train_folder(options, reporter)
 
 
 def _require_training() -> None:
@@ -79,14 +79,14 @@ def _require_training() -> None:
 
 def _add_synthesize(verbs):
     verb = verbs.add_parser("synthesize", help="a throw or kick that hits a target")
-    verb.add_argument("--target", type=_point, required=True, metavar="X,Y,Z", help="metres, Z up")
+    verb.add_argument("--target", type=_parse_point, required=True, metavar="X,Y,Z", help="metres, Z up")
     verb.add_argument("--out", type=Path, required=True, metavar="OUT.bvh")
     verb.add_argument("--model", type=Path, metavar="W.npz", help="default: the weights supplied with the project")
     add_options(verb, "throw")
     place = verb.add_mutually_exclusive_group()
-    place.add_argument("--start", type=_place, metavar="X,Y", help="hips in the first frame; default 0,0")
-    place.add_argument("--over", type=_place, metavar="X,Y", help="position of the hips at the release")
-    place.add_argument("--ball-place", type=_place, metavar="X,Y", help="position of the ball that is kicked")
+    place.add_argument("--start", type=_parse_ground_point, metavar="X,Y", help="hips in the first frame; default 0,0")
+    place.add_argument("--over", type=_parse_ground_point, metavar="X,Y", help="position of the hips at the release")
+    place.add_argument("--ball-place", type=_parse_ground_point, metavar="X,Y", help="position of the ball that is kicked")
     add_options(verb, "throw.ball")
     verb.add_argument("--library", type=Path, metavar="L", help="with --track: source of run-up and recovery")
     verb.add_argument("--track", type=Path, metavar="T.csv", help="the player's track; the throw is on it at --time")
@@ -96,7 +96,7 @@ def _add_synthesize(verbs):
     return verb
 
 
-def run_synthesize(options, told: Told, writers: Mapping[str, Writer]) -> None:
+def run_synthesize(options, reporter: ProgressReporter, writers: Mapping[str, Writer]) -> None:
     """Run `throw synthesize`: synthesize a throw or kick and write the requested files.
 
     Args:
@@ -107,49 +107,49 @@ def run_synthesize(options, told: Told, writers: Mapping[str, Writer]) -> None:
     from ..files.tables import write_ball, write_report
     from ..throws.throw import throw_at
 
-    begun = time.perf_counter()
+    started = time.perf_counter()
     inputs = (options.model, options.skeleton, options.track, options.annotations)
-    check_outputs(options.out, options.ball, options.report, never=inputs)
-    write = writer_of(options.out, writers)
-    for one, other, why in (("library", "track", "a player's track"), ("track", "library", "a folder of recordings"),
+    check_outputs(options.out, options.ball, options.report, reserved=inputs)
+    write = choose_writer(options.out, writers)
+    for option, required, why in (("library", "track", "a player's track"), ("track", "library", "a folder of recordings"),
                             ("annotations", "track", "a player's track"),
                             ("track", "time", "the time of the ball's release")):  # fmt: skip
-        if getattr(options, one) and getattr(options, other) is None:
-            raise InputError(f"--{one}", f"set without --{other}", why, f"add --{other}")
+        if getattr(options, option) and getattr(options, required) is None:
+            raise InputError(f"--{option}", f"set without --{required}", why, f"add --{required}")
     model = _read_chosen_model(options)
-    player = _Player.of(options, model, told) if options.library else None
-    skeleton, form = _skeleton(options, player)
+    player = _Player.from_options(options, model, reporter) if options.library else None
+    skeleton, form = _read_skeleton(options, player)
     loaded = time.perf_counter()
-    order = _order(options, player)
-    thrown = throw_at(model, order, skeleton, told.progress, told.cancelled)
-    notes = list(thrown.warnings)
+    order = _build_order(options, player)
+    result = throw_at(model, order, skeleton, reporter.show_progress, reporter.is_cancelled)
+    notes = list(result.warnings)
     if player is not None:
-        thrown, joined = player.joined(thrown, told)
-        notes += joined
+        result, lines = player.insert_throw(result, reporter)
+        notes += lines
     done = time.perf_counter()
     if form is not None and options.out.suffix.lower() == ".bvh":
         from ..files.bvh import bvh
 
-        notes += [f"{options.out}: {note}" for note in bvh.write(options.out, thrown.motion, form)]
+        notes += [f"{options.out}: {note}" for note in bvh.write_bvh(options.out, result.motion, form)]
     else:
-        still = np.zeros((len(thrown.motion), 2))
-        write(build_take(thrown.motion, "throw", "throw", start_time=thrown.start_time, ball=thrown.path,
-                         warnings=thrown.warnings, correction=still, ik_miss=still), options.out)  # fmt: skip
+        still = np.zeros((len(result.motion), 2))
+        write(build_take(result.motion, "throw", "throw", start_time=result.start_time, ball=result.path,
+                         warnings=result.warnings, correction=still, ik_miss=still), options.out)  # fmt: skip
     if options.ball:
-        write_ball(options.ball, thrown.path)
+        write_ball(options.ball, result.path)
     if options.report:
-        seconds = {"load": loaded - begun, "throw": done - loaded}
-        write_report(options.report, {"version": __version__, "seed": options.seed, **thrown.report(),
+        seconds = {"load": loaded - started, "throw": done - loaded}
+        write_report(options.report, {"version": __version__, "seed": options.seed, **result.build_report(),
                                       "warnings": notes, "seconds": seconds})  # fmt: skip
-    told.end(notes)
-    verb = "struck" if thrown.grip is None else "released"
+    reporter.finish(notes)
+    verb = "struck" if result.grip is None else "released"
     print(
-        f"{options.out}: {len(thrown.motion)} frames, {verb} at {thrown.release_time:.3f} s with {thrown.speed:.1f} "
-        f"m/s, {100 * thrown.impact_error:.1f} cm from the target, {100 * thrown.moved:.1f} cm moved"
+        f"{options.out}: {len(result.motion)} frames, {verb} at {result.release_time:.3f} s with {result.speed:.1f} "
+        f"m/s, {100 * result.impact_error:.1f} cm from the target, {100 * result.displacement:.1f} cm moved"
     )
 
 
-def _point(text: str, count: int = 3) -> tuple[float, ...]:
+def _parse_point(text: str, count: int = 3) -> tuple[float, ...]:
     """Parse numbers separated by commas, in metres."""
     try:
         values = tuple(float(part) for part in text.split(","))
@@ -160,44 +160,44 @@ def _point(text: str, count: int = 3) -> tuple[float, ...]:
     return values
 
 
-def _place(text: str) -> tuple[float, ...]:
-    return _point(text, 2)
+def _parse_ground_point(text: str) -> tuple[float, ...]:
+    return _parse_point(text, 2)
 
 
 def _read_chosen_model(options):
     """Read the model of the command line; without one, the supplied model for the limb's action."""
     if options.model is None:
-        from ..throws.network_npz import shipped_model
+        from ..throws.network_npz import read_shipped_model
 
         kicks = options.ball_place is not None or (options.limb or "").endswith("foot")
-        return shipped_model("kick" if kicks else "throw")
+        return read_shipped_model("kick" if kicks else "throw")
     from ..throws.network_npz import read_model
 
     return read_model(options.model)
 
 
-def _skeleton(options, player):
+def _read_skeleton(options, player):
     """Read the skeleton and the form of its file; (None, None) for the model's own."""
     if options.skeleton is None:
         return (player.library.skeleton if player else None), None
     from ..files.bvh import bvh
-    from ..motion.humanoid import identify
+    from ..motion.humanoid import identify_joints
 
-    clip = bvh.read(options.skeleton, options.unit)
-    with naming(options.skeleton):
-        identify(clip.motion.skeleton)
+    clip = bvh.read_bvh(options.skeleton, options.unit)
+    with locate_errors(options.skeleton):
+        identify_joints(clip.motion.skeleton)
     return clip.motion.skeleton, clip.form
 
 
-def _order(options, player):
+def _build_order(options, player):
     """Build the request of the throw from the command line."""
-    from ..throws.throw import Order
+    from ..throws.throw import ThrowRequest
 
     over = options.over
     if player is not None and not (options.start or options.over or options.ball_place):
         over = player.place(options.time)
     fps = options.fps or (player.plan.fps if player else None)
-    return Order(
+    return ThrowRequest(
         target=options.target, limb=options.limb, speed=options.speed, ball=options.kind, start=options.start,
         over=over, ball_place=options.ball_place, release_time=options.time, fps=fps, seed=options.seed,
     )
@@ -217,49 +217,49 @@ class _Player:
     library: Library
     plan: Plan
     action: str
-    at: float
+    time: float
 
     @classmethod
-    def of(cls, options, model, told: Told) -> _Player:
+    def from_options(cls, options, model, reporter: ProgressReporter) -> _Player:
         """Read library, track and annotations of the command line."""
         from ..annotation import Timeline, read_timeline
         from ..files.tracking.tracking import read_track_csv
-        from ..library.build import build
-        from ..motion.track import clean
+        from ..library.build import build_library
+        from ..motion.track import clean_track
         from ..synthesis.plan import Plan
 
-        track, _ = clean(read_track_csv(options.track))
+        track, _ = clean_track(read_track_csv(options.track))
         if not track.times[0] <= options.time <= track.times[-1]:
-            expected = f"{told_time(track.times[0])} to {told_time(track.times[-1])} s, the track"
-            raise InputError("--time", f"{told_time(options.time)} s", expected)
+            expected = f"{format_seconds(track.times[0])} to {format_seconds(track.times[-1])} s, the track"
+            raise InputError("--time", f"{format_seconds(options.time)} s", expected)
         fps = options.fps or 30.0
         timeline = Timeline()
         if options.annotations:
             timeline = read_timeline(options.annotations, fps, float(track.times[0]))
-        library = build(options.library, cache_dir=options.cache, unit=options.unit, progress=told.progress,
-                        cancelled=told.cancelled)
+        library = build_library(options.library, cache_dir=options.cache, unit=options.unit, progress=reporter.show_progress,
+                        cancelled=reporter.is_cancelled)
         plan = Plan(track=track, timeline=timeline, library=str(options.library), fps=fps, seed=options.seed)
         return cls(library, plan, model.settings.action, options.time)
 
-    def place(self, at: float) -> tuple[float, ...]:
+    def find_position(self, time: float) -> tuple[float, ...]:
         """Find the track's position (2,) m at a time."""
-        track = self.plan.sampled(self.plan.fps)
-        return tuple(float(np.interp(at, track.times, column)) for column in track.positions.T)
+        track = self.plan.sample_track(self.plan.fps)
+        return tuple(float(np.interp(time, track.times, column)) for column in track.positions.T)
 
-    def joined(self, thrown, told: Told):
+    def insert_throw(self, result, reporter: ProgressReporter):
         """Insert the throw into the player's motion; return it with lines for the user."""
         from ..throws.join_throw import join_throw, trim_waiting
         from ..throws.run_up import EDGE, construct_run_up
-        from ..throws.throw_order import within
+        from ..throws.throw_order import place_in_motion
 
-        motion, release = trim_waiting(thrown.motion, thrown.release, EDGE)
-        first = round((thrown.release - release) * thrown.motion.fps)
-        shift = thrown.shift[first : first + len(motion)]
-        thrown = replace(thrown, motion=motion, release=release, shift=shift)
-        way = construct_run_up(self.library, self.plan, thrown.motion, thrown.release, self.at, action=self.action,
-                               progress=told.progress, cancelled=told.cancelled)
-        laid = join_throw(way.motion, way.start, thrown.motion, thrown.release, at=self.at)
-        return within(thrown, laid.motion, laid.start, laid.release, laid.first), [*way.warnings, *laid.warnings]
+        motion, release = trim_waiting(result.motion, result.release, EDGE)
+        first = round((result.release - release) * result.motion.fps)
+        shift = result.shift[first : first + len(motion)]
+        result = replace(result, motion=motion, release=release, shift=shift)
+        run_up = construct_run_up(self.library, self.plan, result.motion, result.release, self.time, action=self.action,
+                               progress=reporter.show_progress, cancelled=reporter.is_cancelled)
+        whole = join_throw(run_up.motion, run_up.start, result.motion, result.release, at=self.time)
+        return place_in_motion(result, whole.motion, whole.start, whole.release, whole.first), [*run_up.warnings, *whole.warnings]
 
 
 def _add_evaluate(verbs):
@@ -271,7 +271,7 @@ def _add_evaluate(verbs):
     return verb
 
 
-def run_evaluate(options, told: Told, writers: Mapping[str, Writer]) -> None:
+def run_evaluate(options, reporter: ProgressReporter, writers: Mapping[str, Writer]) -> None:
     """Run `throw evaluate`: regenerate every example and measure its errors.
 
     Args:
@@ -281,58 +281,58 @@ def run_evaluate(options, told: Told, writers: Mapping[str, Writer]) -> None:
     """
     from ..files.tables import write_report
     from ..files.whole import atomic_write
-    from ..throws.evaluate_throws import FULL, RAW, evaluate_throws, some_of_each
+    from ..throws.evaluate_throws import FULL_OPTIONS, RAW_OPTIONS, evaluate_throws, select_of_each
     from ..throws.network_npz import read_model
     from ..throws.throw_examples import TABLE_NAME
-    from ..throws.throws_page import throws_page
+    from ..throws.throws_page import build_throws_page
 
-    begun = time.perf_counter()
-    check_outputs(options.report, options.html, never=(options.model, options.examples / TABLE_NAME))
+    started = time.perf_counter()
+    check_outputs(options.report, options.html, reserved=(options.model, options.examples / TABLE_NAME))
     model = read_model(options.model)
-    every = _read_examples(options.examples, model, told)
-    chosen = some_of_each(_choose_subjects(every, options.subject, options.examples), options.motions)
+    examples = _read_examples(options.examples, model, reporter)
+    chosen = select_of_each(_choose_subjects(examples, options.subject, options.examples), options.motions)
     loaded = time.perf_counter()
-    found = evaluate_throws(
-        model, chosen, RAW if options.raw else FULL, by_height=not options.as_they_are, progress=told.progress,
-        cancelled=told.cancelled,
+    evaluation = evaluate_throws(
+        model, chosen, RAW_OPTIONS if options.raw else FULL_OPTIONS, by_height=not options.as_they_are, progress=reporter.show_progress,
+        cancelled=reporter.is_cancelled,
     )  # fmt: skip
-    for line in found.left_out:
-        told.note(line)
+    for line in evaluation.left_out:
+        reporter.show_note(line)
     report = {
         "version": __version__, "model": str(options.model), "trained_on": model.trained_on,
-        "examples": str(options.examples), **found.report(),
-        "elapsed": {"load": loaded - begun, "evaluate": time.perf_counter() - loaded},
+        "examples": str(options.examples), **evaluation.build_report(),
+        "elapsed": {"load": loaded - started, "evaluate": time.perf_counter() - loaded},
     }  # fmt: skip
     write_report(options.report, report)
     if options.html:
-        atomic_write(options.html, throws_page(report))
-    told.end()
+        atomic_write(options.html, build_throws_page(report))
+    reporter.finish()
     print(f"{options.report}: {report['motions']} of {len(chosen)} motions")
 
 
-def _read_examples(folder: Path, model, told: Told) -> list:
+def _read_examples(folder: Path, model, reporter: ProgressReporter) -> list:
     """Read the examples of a folder.
 
     Examples on the model's joint names stay as they are; otherwise all are retargeted to the model's skeleton, because
     hands with another rest pose rotate differently.
     """
-    from ..throws.throw_examples import examples_in
+    from ..throws.throw_examples import read_examples
 
     settings = model.settings
-    found = examples_in(folder, settings.action, settings.fps, told=told.note, cancelled=told.cancelled)
-    if all(example.motion.skeleton.names == model.skeleton.names for example in found):
-        return found
-    told.note(f"{folder}: skeletons differ from the model's; motions are retargeted to it")
-    return examples_in(folder, settings.action, settings.fps, model.skeleton, cancelled=told.cancelled)
+    examples = read_examples(folder, settings.action, settings.fps, report=reporter.show_note, cancelled=reporter.is_cancelled)
+    if all(example.motion.skeleton.names == model.skeleton.names for example in examples):
+        return examples
+    reporter.show_note(f"{folder}: skeletons differ from the model's; motions are retargeted to it")
+    return read_examples(folder, settings.action, settings.fps, model.skeleton, cancelled=reporter.is_cancelled)
 
 
-def _choose_subjects(examples, wanted: list[str], folder: Path):
+def _choose_subjects(examples, subjects: list[str], folder: Path):
     """Select the examples of some subjects, all without any name; InputError for an unknown subject."""
-    there = sorted({example.subject for example in examples})
-    for name in wanted:
-        if name not in there:
-            raise InputError("--subject", name, f"one of {', '.join(there)}", f"see {folder}")
-    return [example for example in examples if not wanted or example.subject in wanted]
+    known = sorted({example.subject for example in examples})
+    for name in subjects:
+        if name not in known:
+            raise InputError("--subject", name, f"one of {', '.join(known)}", f"see {folder}")
+    return [example for example in examples if not subjects or example.subject in subjects]
 
 
 def _add_examples(verbs):
@@ -343,7 +343,7 @@ def _add_examples(verbs):
     return verb
 
 
-def run_examples(options, told: Told, writers: Mapping[str, Writer]) -> None:
+def run_examples(options, reporter: ProgressReporter, writers: Mapping[str, Writer]) -> None:
     """Run `throw examples`: write synthetic throws or kicks with known targets.
 
     Args:
@@ -351,14 +351,14 @@ def run_examples(options, told: Told, writers: Mapping[str, Writer]) -> None:
         reporter: progress, notes and cancellation.
         writers: further output formats, by file suffix (Blender's).
     """
-    from ..throws.planted_examples import write_planted
+    from ..throws.planted_examples import write_examples
     from ..throws.throw_examples import TABLE_NAME
 
-    begun = time.perf_counter()
-    count = write_planted(options.out, options.action, options.subjects, count=options.throws, seed=options.seed,
-                          progress=told.progress, cancelled=told.cancelled)
-    told.end()
-    seconds = time.perf_counter() - begun
+    started = time.perf_counter()
+    count = write_examples(options.out, options.action, options.subjects, count=options.throws, seed=options.seed,
+                          progress=reporter.show_progress, cancelled=reporter.is_cancelled)
+    reporter.finish()
+    seconds = time.perf_counter() - started
     who = "person" if options.subjects == 1 else "people"
     what = f"{count} {options.action}{'s' * (count > 1)} of {options.subjects} {who}"
     print(f"{options.out}: {what}, with {TABLE_NAME}, in {seconds:.1f} s")

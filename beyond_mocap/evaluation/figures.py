@@ -12,21 +12,21 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from ..annotation import Timeline, automatic_gaits, fill, words_per_frame
+from ..annotation import Timeline, choose_gaits, fill_timeline, labels_per_frame
 from ..base.errors import InputError
-from ..library.automatic import automatic_words
-from ..library.keys import serving
-from ..motion.contacts import floor_height
-from ..motion.track import sample, zero_phase_hann
+from ..library.automatic import build_automatic_labels
+from ..library.keys import select_keys
+from ..motion.contacts import measure_floor_height
+from ..motion.track import sample_track, smooth_zero_phase_hann
 from ..synthesis.quality import movement
-from ..synthesis.quality.give_way import give_way, jolts
-from ..synthesis.quality.moments import Moment, ball_gap, ball_shift, met, with_made
-from ..synthesis.quality.played import find_replayed, warp_rates
+from ..synthesis.quality.give_way import report_unmet_constraints, report_jolts
+from ..synthesis.quality.moments import KeyMomentResult, measure_ball_gap, measure_ball_shift, measure_contact, extend_with_synthetic
+from ..synthesis.quality.played import find_replayed, list_warp_rates
 from . import realism
-from .reference import View, source_poses
+from .reference import View, compute_source_poses
 
 
-def place(view: View) -> dict:
+def measure_path_errors(view: View) -> dict:
     """Measure root and pelvis error, surge and speed coverage.
 
     Args:
@@ -35,36 +35,36 @@ def place(view: View) -> dict:
         The report's groups.
     """
     pelvis, fps = view.played.pelvis, view.fps
-    own = _mean(view.own("sway"))
+    source_sway = _finite_mean(view.source_values("sway"))
     out = {"root_error_m": dict.fromkeys(("mean", "p95", "max")),
-           "pelvis_error_m": {"mean": None, "own": own, "keys": None},
+           "pelvis_error_m": {"mean": None, "own": source_sway, "keys": None},
            "speed_coverage": {"above": None, "below": None}}  # fmt: skip
-    if view.wanted is not None:
-        error, unsmoothed = movement.root_error(pelvis, view.wanted, fps), movement.pelvis_error(pelvis, view.wanted)
-        out["root_error_m"] = _spread(error, ("mean", "p95", "max"))
-        at_keys = [float(np.interp(m.asked.in_force, view.played.times, unsmoothed)) for m in view.moments]
-        out["pelvis_error_m"] = {"mean": _mean(unsmoothed), "own": own, "keys": _mean(np.array(at_keys))}
-    if view.wanted is not None and view.reference is not None:
-        asked = movement.travel_speed(view.wanted, fps)
-        out["speed_coverage"] = movement.speed_coverage(asked, view.reference.fastest, view.reference.slowest)
-    return {**out, **_surge(view)}
+    if view.target is not None:
+        error, unsmoothed = movement.measure_root_error(pelvis, view.target, fps), movement.measure_pelvis_error(pelvis, view.target)
+        out["root_error_m"] = _compute_measures(error, ("mean", "p95", "max"))
+        at_keys = [float(np.interp(m.requested.resolved_time, view.played.times, unsmoothed)) for m in view.moments]
+        out["pelvis_error_m"] = {"mean": _finite_mean(unsmoothed), "own": source_sway, "keys": _finite_mean(np.array(at_keys))}
+    if view.target is not None and view.reference is not None:
+        requested_speed = movement.measure_travel_speed(view.target, fps)
+        out["speed_coverage"] = movement.measure_speed_coverage(requested_speed, view.reference.fastest, view.reference.slowest)
+    return {**out, **_measure_surge(view)}
 
 
-def _surge(view: View) -> dict:
+def _measure_surge(view: View) -> dict:
     """Measure surge against the rms of the used recordings at the same speed.
 
     The key `track` is the surge of the track itself, smoothed with the window within which the root must follow it.
     """
-    ours = movement.surge(view.played.pelvis, view.fps)
-    own = movement.class_rms(view.own("surge"), movement.speed_class(view.own("speed")))
-    rms, real = _rms(ours), _rms(own[movement.speed_class(view.speed)])
-    smooth = None if view.wanted is None else zero_phase_hann(view.wanted, view.fps, movement.ROOT_WINDOW)
-    asked = None if smooth is None else _rms(movement.surge(smooth, view.fps))
-    surge = {"mean": rms, "own": real, "track": asked}
-    return {"pelvis_surge_ratio": rms / real if real else math.nan, "pelvis_surge_m_s": surge}
+    surge_values = movement.measure_surge(view.played.pelvis, view.fps)
+    own = movement.compute_class_rms(view.source_values("surge"), movement.classify_speed(view.source_values("speed")))
+    rms, source_rms = _finite_rms(surge_values), _finite_rms(own[movement.classify_speed(view.speed)])
+    smooth = None if view.target is None else smooth_zero_phase_hann(view.target, view.fps, movement.ROOT_WINDOW)
+    track_rms = None if smooth is None else _finite_rms(movement.measure_surge(smooth, view.fps))
+    surge = {"mean": rms, "own": source_rms, "track": track_rms}
+    return {"pelvis_surge_ratio": rms / source_rms if source_rms else math.nan, "pelvis_surge_m_s": surge}
 
 
-def keys(view: View) -> list[dict]:
+def measure_key_moments(view: View) -> list[dict]:
     """Measure each key moment.
 
     Args:
@@ -72,30 +72,30 @@ def keys(view: View) -> list[dict]:
     Returns:
         One group for each key moment.
     """
-    return [_key(view, moment) for moment in view.moments]
+    return [_measure_key_moment(view, moment) for moment in view.moments]
 
 
-def _key(view: View, moment: Moment) -> dict:
+def _measure_key_moment(view: View, moment: KeyMomentResult) -> dict:
     """Measure one key moment: times, errors of position, contact gap, and the clip used."""
-    played, time = view.played, moment.asked.in_force
-    place: dict[str, float | None] = {"position_error_m": None, "pelvis_error_m": None, "ball_shift_m": None}
-    met_at, met_gap = met(played, moment)
-    if view.wanted is not None:
-        error = movement.root_error(played.pelvis, view.wanted, view.fps)
-        frame = int(round((met_at - played.start_time) * view.fps)) if np.isfinite(met_at) else moment.frame
-        place["position_error_m"] = float(np.interp(time, played.times, error))
-        unsmoothed = movement.pelvis_error(played.pelvis, view.wanted)
-        place["pelvis_error_m"] = float(np.interp(time, played.times, unsmoothed))
-        place["ball_shift_m"] = ball_shift(played, frame, view.track)
+    played, time = view.played, moment.requested.resolved_time
+    errors: dict[str, float | None] = {"position_error_m": None, "pelvis_error_m": None, "ball_shift_m": None}
+    contact_time, contact_gap = measure_contact(played, moment)
+    if view.target is not None:
+        error = movement.measure_root_error(played.pelvis, view.target, view.fps)
+        frame = int(round((contact_time - played.start_time) * view.fps)) if np.isfinite(contact_time) else moment.frame
+        errors["position_error_m"] = float(np.interp(time, played.times, error))
+        unsmoothed = movement.measure_pelvis_error(played.pelvis, view.target)
+        errors["pelvis_error_m"] = float(np.interp(time, played.times, unsmoothed))
+        errors["ball_shift_m"] = measure_ball_shift(played, frame, view.track)
     return {
-        "time_s": moment.asked.time, "solved_time_s": moment.asked.solved, "labels": list(moment.asked.words),
-        "clip": moment.clip, "clip_frame": moment.clip_frame, "time_error_s": moment.played_at - time, **place,
-        "contact_gap_m": ball_gap(played, moment), "met_s": met_at, "met_gap_m": met_gap,
+        "time_s": moment.requested.time, "solved_time_s": moment.requested.solved, "labels": list(moment.requested.words),
+        "clip": moment.clip, "clip_frame": moment.clip_frame, "time_error_s": moment.played_at - time, **errors,
+        "contact_gap_m": measure_ball_gap(played, moment), "met_s": contact_time, "met_gap_m": contact_gap,
         "used_instead": None if moment.used_instead is None else list(moment.used_instead),
     }
 
 
-def skate_and_ground(view: View) -> dict:
+def measure_feet(view: View) -> dict:
     """Measure foot slide in all its forms, and the feet's height above the ground.
 
     Args:
@@ -105,31 +105,31 @@ def skate_and_ground(view: View) -> dict:
     """
     played, fps = view.played, view.fps
     planted = played.feet
-    travel = movement.stance_travel(planted[:, :, 1], movement.stances(played.contacts))
-    own = np.zeros(0) if view.reference is None else view.reference.used_stances(view.used)
-    skating = movement.skating_steps(planted[:, :, 1], floor_height(played.motion), fps)
+    travel = movement.measure_stance_travel(planted[:, :, 1], movement.list_stances(played.contacts))
+    source_travel = np.zeros(0) if view.reference is None else view.reference.select_used_travel(view.used_rows)
+    skating = movement.find_skating_steps(planted[:, :, 1], measure_floor_height(played.motion), fps)
     known = view.reference is not None
-    heel_rest = view.reference.heel_rest if known else movement.heel_rest_height(planted, played.contacts)
-    support = movement.support_height(planted, played.contacts, heel_rest)
+    heel_rest = view.reference.heel_rest if known else movement.measure_heel_rest(planted, played.contacts)
+    support = movement.measure_support_height(planted, played.contacts, heel_rest)
     return {
         "skate": {
-            "contact_cm_s": 100.0 * _mean(movement.contact_speeds(planted, played.contacts, fps)),
-            "source_contact_cm_s": 100.0 * _mean(view.own("contact_speed")),
-            "stance_mm_median": 1000.0 * _median(travel), "stances_over_21mm": _mean(travel > movement.NOTICED_SLIDE),
-            "gmd_ratio": _mean(skating), "source_gmd_ratio": _mean(view.own("skating")),
-            "source_stance_mm_median": 1000.0 * _median(own),
-            "source_stances_over_21mm": _mean(own > movement.NOTICED_SLIDE),
+            "contact_cm_s": 100.0 * _finite_mean(movement.measure_contact_speeds(planted, played.contacts, fps)),
+            "source_contact_cm_s": 100.0 * _finite_mean(view.source_values("contact_speed")),
+            "stance_mm_median": 1000.0 * _finite_median(travel), "stances_over_21mm": _finite_mean(travel > movement.NOTICED_SLIDE),
+            "gmd_ratio": _finite_mean(skating), "source_gmd_ratio": _finite_mean(view.source_values("skating")),
+            "source_stance_mm_median": 1000.0 * _finite_median(source_travel),
+            "source_stances_over_21mm": _finite_mean(source_travel > movement.NOTICED_SLIDE),
         },
         "ground_mm": {
-            "min": 1000.0 * float(played.positions[..., 2].min()), "support_max": 1000.0 * _max(support),
-            "source_support_max": 1000.0 * _max(view.own("support")),
-            "tip_min": -1000.0 * _max(-movement.tip_height(played.motion.skeleton, played.positions, played.rotations)),
-            "source_tip_min": -1000.0 * _max(-view.own("tip")),
+            "min": 1000.0 * float(played.positions[..., 2].min()), "support_max": 1000.0 * _finite_max(support),
+            "source_support_max": 1000.0 * _finite_max(view.source_values("support")),
+            "tip_min": -1000.0 * _finite_max(-movement.measure_tip_height(played.motion.skeleton, played.positions, played.rotations)),
+            "source_tip_min": -1000.0 * _finite_max(-view.source_values("tip")),
         },
     }
 
 
-def polish(view: View, ik_miss: np.ndarray | None) -> dict:
+def measure_corrections(view: View, ik_miss: np.ndarray | None) -> dict:
     """Measure what polishing changed: foot correction, missed targets, pelvis drop, bone lengths.
 
     Args:
@@ -139,45 +139,45 @@ def polish(view: View, ik_miss: np.ndarray | None) -> dict:
         The report's groups.
     """
     played = view.played
-    shift, drop = _against_source(view)
+    shift, drop = _compare_to_source(view)
     if played.correction is not None:
         shift = np.asarray(played.correction)[played.contacts]
     missed = None if ik_miss is None else np.asarray(ik_miss).reshape(view.count, -1).max(axis=1) > 0.005
-    bones = None if view.library is None else _bone_change(view)
+    bones = None if view.library is None else _measure_bone_change(view)
     return {
-        "foot_correction_m": _spread(shift, ("p95",)), "ik_miss_share": None if missed is None else _mean(missed),
+        "foot_correction_m": _compute_measures(shift, ("p95",)), "ik_miss_share": None if missed is None else _finite_mean(missed),
         "pelvis_drop_m": drop, "bone_change_m": bones,
     }
 
 
-def _against_source(view: View) -> tuple[np.ndarray, float]:
+def _compare_to_source(view: View) -> tuple[np.ndarray, float]:
     """Compare planted feet and pelvis with the source poses, away from transitions, where two clips are blended.
 
     Returns the distance (N,) m of planted feet from the source pose placed at the output's pelvis and heading, and the
     largest drop of the pelvis below the source's, m.
     """
-    if view.library is None or not len(view.used):
+    if view.library is None or not len(view.used_rows):
         return np.zeros(0), math.nan
     played, hips = view.played, view.played.body.hips
-    joints = movement.foot_joints(played.motion.skeleton)
-    local = realism.local_positions(played.motion.skeleton, played.positions, hips)
-    source = source_poses(view.library, played.clips, played.clip, played.mirrored, played.clip_frame)
-    pure = np.isfinite(source[:, 0, 0])
-    for seam in view.seams:
-        pure[max(seam - movement.JERK_REACH, 0) : seam + movement.JERK_REACH] = False
-    shift = movement.planted_shift(local[:, joints], source[:, joints], played.contacts & pure[:, None])
-    drop = (source[:, hips, 2] - local[:, hips, 2])[pure]
+    joints = movement.list_foot_joints(played.motion.skeleton)
+    local = realism.compute_local_positions(played.motion.skeleton, played.positions, hips)
+    source = compute_source_poses(view.library, played.clips, played.clip, played.mirrored, played.clip_frame)
+    is_unblended = np.isfinite(source[:, 0, 0])
+    for seam in view.transitions:
+        is_unblended[max(seam - movement.JERK_REACH, 0) : seam + movement.JERK_REACH] = False
+    shift = movement.measure_planted_shift(local[:, joints], source[:, joints], played.contacts & is_unblended[:, None])
+    drop = (source[:, hips, 2] - local[:, hips, 2])[is_unblended]
     return shift, float(max(drop.max(), 0.0)) if len(drop) else math.nan
 
 
-def _bone_change(view: View) -> float:
+def _measure_bone_change(view: View) -> float:
     """Measure the largest difference of a bone's length in any frame from the library's skeleton, m."""
     skeleton, positions = view.library.skeleton, view.played.positions
     bones = np.linalg.norm(positions[:, 1:] - positions[:, list(skeleton.parents[1:])], axis=-1)
-    return float(np.max(np.abs(bones - view.size * np.linalg.norm(skeleton.offsets[1:], axis=-1)), initial=0.0))
+    return float(np.max(np.abs(bones - view.scale * np.linalg.norm(skeleton.offsets[1:], axis=-1)), initial=0.0))
 
 
-def seams_and_loops(view: View) -> dict:
+def measure_transitions(view: View) -> dict:
     """Measure transitions, the other frames, playback rate and loops.
 
     Args:
@@ -187,23 +187,23 @@ def seams_and_loops(view: View) -> dict:
     """
     out = {"seam_jerk_ratio": dict.fromkeys(("median", "p95", "max", "share_above_real"))}
     if view.reference is not None:
-        values = movement.jerk(view.played.positions, view.fps)
-        at_seams = movement.seam_ratios(values, view.seams, view.speed, view.reference.jerk_p95)
-        rest = movement.rest_ratios(values, view.seams, view.speed, view.reference.jerk_p95)
+        values = movement.compute_jerk(view.played.positions, view.fps)
+        at_seams = movement.compute_transition_ratios(values, view.transitions, view.speed, view.reference.jerk_p95)
+        rest = movement.compute_rest_ratios(values, view.transitions, view.speed, view.reference.jerk_p95)
         out["seam_jerk_ratio"] = {
-            **_spread(at_seams, ("median", "p95", "max")), "share_above_real": _mean(at_seams > 1.0),
-            "source_share_above_real": _mean(view.own("jerk_above_real")), "rest_max": _max(rest),
-            "rest_share_above_real": _mean(rest > 1.0),
+            **_compute_measures(at_seams, ("median", "p95", "max")), "share_above_real": _finite_mean(at_seams > 1.0),
+            "source_share_above_real": _finite_mean(view.source_values("jerk_above_real")), "rest_max": _finite_max(rest),
+            "rest_share_above_real": _finite_mean(rest > 1.0),
         }
     known = bool(np.any(view.played.clip >= 0))
-    rates = warp_rates(*view.source)
+    rates = list_warp_rates(*view.source)
     return {
-        **out, "seams": len(view.seams) if known else None, "warp_rate": {"min": -_max(-rates), "max": _max(rates)},
-        "loop_share": _mean(find_replayed(*view.source, view.fps)) if known else None,
+        **out, "seams": len(view.transitions) if known else None, "warp_rate": {"min": -_finite_max(-rates), "max": _finite_max(rates)},
+        "loop_share": _finite_mean(find_replayed(*view.source, view.fps)) if known else None,
     }
 
 
-def poses(view: View) -> dict:
+def measure_poses(view: View) -> dict:
     """Measure pose realism and smoothness.
 
     Args:
@@ -212,19 +212,19 @@ def poses(view: View) -> dict:
         The report's groups.
     """
     played = view.played
-    features = realism.pose_features(played.motion.skeleton, played.positions, view.fps, played.body.hips)
-    curve = realism.smoothness(played.motion.skeleton, played.positions, view.fps)
-    own = _spread(view.own("smoothness"), ("mean", "p95", "max"))
-    smoothness = {**_spread(curve, ("mean", "p95", "max")), **{f"source_{name}": value for name, value in own.items()}}
+    features = realism.build_pose_features(played.motion.skeleton, played.positions, view.fps, played.body.hips)
+    curve = realism.measure_smoothness(played.motion.skeleton, played.positions, view.fps)
+    source_smoothness = _compute_measures(view.source_values("smoothness"), ("mean", "p95", "max"))
+    smoothness = {**_compute_measures(curve, ("mean", "p95", "max")), **{f"source_{name}": value for name, value in source_smoothness.items()}}
     out: dict = {"pose_realism": None, "smoothness_m": smoothness}
     if view.reference is not None and np.isfinite(view.reference.pose_p95).all():
-        distance = realism.nearest_distance(features / view.size, view.reference.poses)
-        out["pose_realism"] = _mean(realism.unreal(distance, view.speed, view.reference.pose_p95))
+        distance = realism.measure_nearest_distance(features / view.scale, view.reference.poses)
+        out["pose_realism"] = _finite_mean(realism.find_unreal_frames(distance, view.speed, view.reference.pose_p95))
     return out
 
 
-def asked_words(
-    timeline: Timeline, times: np.ndarray, moments: Sequence[Moment] = ()
+def list_requested_labels(
+    timeline: Timeline, times: np.ndarray, moments: Sequence[KeyMomentResult] = ()
 ) -> list[frozenset[str] | None]:
     """List the requested labels at each time.
 
@@ -236,13 +236,13 @@ def asked_words(
         For each time the labels, None where none count: in transitions, at the entry and exit of each key moment's clip
         (Faustino §3.2.2), and where automatic locomotion is not filled in.
     """
-    out = [found or None for found in words_per_frame(timeline, times)]
+    out = [labels or None for labels in labels_per_frame(timeline, times)]
     for moment in moments:
         out[moment.entry : moment.exit + 1] = [None] * (moment.exit + 1 - moment.entry)
     return out
 
 
-def filled_timeline(view: View) -> Timeline:
+def fill_automatic_spans(view: View) -> Timeline:
     """Fill automatic locomotion into the timeline by the library's gaits (Faustino §3.1.1).
 
     Synthetic clips count as the library's if one is played.
@@ -252,20 +252,20 @@ def filled_timeline(view: View) -> Timeline:
     Returns:
         The filled timeline; the same one without library or track.
     """
-    library = with_made(view.library, view.played)
+    library = extend_with_synthetic(view.library, view.played)
     if library is None or view.track is None:
         return view.timeline
     try:
         gaits = library.gaits
     except InputError:
         return view.timeline
-    sampled = sample(view.track, library.fps)
+    sampled = sample_track(view.track, library.fps)
     thresholds = library.gait_thresholds
-    chosen = automatic_gaits(sampled.speed, sampled.fps, [gait.speed for gait in gaits], thresholds)
-    return fill(view.timeline, sampled.times, automatic_words(library, chosen, sampled))
+    gait_index = choose_gaits(sampled.speed, sampled.fps, [gait.speed for gait in gaits], thresholds)
+    return fill_timeline(view.timeline, sampled.times, build_automatic_labels(library, gait_index, sampled))
 
 
-def annotation_similarity(view: View) -> dict:
+def measure_annotation_similarity(view: View) -> dict:
     """Measure how well the played labels match the requested ones.
 
     Args:
@@ -277,18 +277,18 @@ def annotation_similarity(view: View) -> dict:
     played = view.played
     if view.timeline is None or played.words is None:
         return dict.fromkeys(("all", "keys", "had_keys", "eq18_all", "eq18_keys"))
-    asked = asked_words(filled_timeline(view), played.times, view.moments)
-    want, have = [m.asked.words for m in view.moments], [m.words for m in view.moments]
+    requested = list_requested_labels(fill_automatic_spans(view), played.times, view.moments)
+    key_requested, key_played = [m.requested.words for m in view.moments], [m.words for m in view.moments]
     offered = [] if view.library is None else view.library.keys
-    had = [m for m in view.moments if serving(offered, m.asked.words)]
+    available = [m for m in view.moments if select_keys(offered, m.requested.words)]
     return {  # means over the frames that count, as in Faustino Table 2
-        "all": _mean(similarity(asked, played.words)), "keys": _mean(similarity(want, have)),
-        "had_keys": _mean(similarity([m.asked.words for m in had], [m.words for m in had])),
-        "eq18_all": _mean(similarity(asked, played.words, eq18)), "eq18_keys": _mean(similarity(want, have, eq18)),
+        "all": _finite_mean(measure_similarity(requested, played.words)), "keys": _finite_mean(measure_similarity(key_requested, key_played)),
+        "had_keys": _finite_mean(measure_similarity([m.requested.words for m in available], [m.words for m in available])),
+        "eq18_all": _finite_mean(measure_similarity(requested, played.words, compute_eq18)), "eq18_keys": _finite_mean(measure_similarity(key_requested, key_played, compute_eq18)),
     }
 
 
-def warnings(view: View, ik_miss: np.ndarray | None, asked: Timeline | None) -> list[str]:
+def list_warnings(view: View, ik_miss: np.ndarray | None, requested: Timeline | None) -> list[str]:
     """List what was relaxed in the take and when, and visible jolts.
 
     Args:
@@ -298,17 +298,17 @@ def warnings(view: View, ik_miss: np.ndarray | None, asked: Timeline | None) -> 
     Returns:
         One line for each warning.
     """
-    lines: list[str] = [*give_way(view.played, track=view.track, timeline=view.timeline, library=view.library,
-                                  ik_miss=ik_miss, asked=asked)]
+    lines: list[str] = [*report_unmet_constraints(view.played, track=view.track, timeline=view.timeline, library=view.library,
+                                  ik_miss=ik_miss, user_timeline=requested)]
     if view.reference is None:
         return lines
-    hard = movement.jerk(view.played.positions, view.fps)
-    ratios = movement.seam_ratios(hard, view.seams, view.speed, view.reference.jerk_p95)
-    told = jolts(view.played.times, view.seams, ratios)
-    return [*lines, told] if told else lines
+    jerk = movement.compute_jerk(view.played.positions, view.fps)
+    ratios = movement.compute_transition_ratios(jerk, view.transitions, view.speed, view.reference.jerk_p95)
+    jolt_line = report_jolts(view.played.times, view.transitions, ratios)
+    return [*lines, jolt_line] if jolt_line else lines
 
 
-def eq18(asked: Iterable[str], played: Iterable[str]) -> float:
+def compute_eq18(requested: Iterable[str], played: Iterable[str]) -> float:
     """Compute Faustino's eq. 18 for one frame as printed.
 
     With 1 for a present and -1 for an absent label, it is the negated sum of products over the labels that either frame
@@ -321,12 +321,12 @@ def eq18(asked: Iterable[str], played: Iterable[str]) -> float:
         -1 if all labels agree to 1 if none does; NaN if neither has a label.
     Source: Faustino 2024, section 3.2.2, equation (18).
     """
-    asked, played = set(asked), set(played)
-    either = asked | played
-    return (len(asked ^ played) - len(asked & played)) / len(either) if either else np.nan
+    requested, played = set(requested), set(played)
+    either = requested | played
+    return (len(requested ^ played) - len(requested & played)) / len(either) if either else np.nan
 
 
-def asked_similarity(asked: Iterable[str], played: Iterable[str]) -> float:
+def compute_requested_similarity(requested: Iterable[str], played: Iterable[str]) -> float:
     """Compute eq. 18 over the requested labels only; further labels do not count.
 
     Args:
@@ -335,12 +335,12 @@ def asked_similarity(asked: Iterable[str], played: Iterable[str]) -> float:
     Returns:
         -1 if all are played to 1 if none is; NaN without requested labels.
     """
-    asked = set(asked)
-    return 1.0 - 2.0 * len(asked & set(played)) / len(asked) if asked else np.nan
+    requested = set(requested)
+    return 1.0 - 2.0 * len(requested & set(played)) / len(requested) if requested else np.nan
 
 
-def similarity(
-    asked: Sequence[Iterable[str] | None], played: Sequence[Iterable[str]], measure=asked_similarity
+def measure_similarity(
+    requested: Sequence[Iterable[str] | None], played: Sequence[Iterable[str]], measure=compute_requested_similarity
 ) -> np.ndarray:
     """Measure the similarity at every frame.
 
@@ -355,40 +355,40 @@ def similarity(
     """
     known: dict[tuple, float] = {}
     out = np.full(len(played), np.nan)
-    for frame, (want, have) in enumerate(zip(asked, played)):
-        if want is None:
+    for frame, (requested_here, played_here) in enumerate(zip(requested, played)):
+        if requested_here is None:
             continue
-        pair = (tuple(want), tuple(have))
+        pair = (tuple(requested_here), tuple(played_here))
         if pair not in known:
             known[pair] = measure(*pair)
         out[frame] = known[pair]
     return out
 
 
-def _known(values: np.ndarray) -> np.ndarray:
+def _select_finite(values: np.ndarray) -> np.ndarray:
     values = np.asarray(values, dtype=float)
     return values[np.isfinite(values)]
 
 
-def _mean(values: np.ndarray) -> float:
-    known = _known(values)
+def _finite_mean(values: np.ndarray) -> float:
+    known = _select_finite(values)
     return float(known.mean()) if len(known) else math.nan
 
 
-def _median(values: np.ndarray) -> float:
+def _finite_median(values: np.ndarray) -> float:
     return float(np.median(values)) if len(values) else math.nan
 
 
-def _max(values: np.ndarray) -> float:
-    known = _known(values)
+def _finite_max(values: np.ndarray) -> float:
+    known = _select_finite(values)
     return float(known.max()) if len(known) else math.nan
 
 
-def _rms(values: np.ndarray) -> float:
-    return math.sqrt(_mean(np.square(values)))
+def _finite_rms(values: np.ndarray) -> float:
+    return math.sqrt(_finite_mean(np.square(values)))
 
 
-def _spread(values: np.ndarray, names: Sequence[str]) -> dict[str, float]:
+def _compute_measures(values: np.ndarray, names: Sequence[str]) -> dict[str, float]:
     """Compute the measures `names` of values (N,): mean, median, p95 or max; NaN without values."""
     known = values[np.isfinite(values)]
     measures = {"mean": np.mean, "median": np.median, "p95": lambda v: np.percentile(v, 95), "max": np.max}

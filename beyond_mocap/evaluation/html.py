@@ -17,8 +17,8 @@ from ..annotation import Timeline
 from ..library.library import Library
 from ..motion.track import Track
 from ..synthesis.quality import movement
-from ..synthesis.quality.movement import contact_speeds
-from ..synthesis.quality.played import Played
+from ..synthesis.quality.movement import measure_contact_speeds
+from ..synthesis.quality.played import Playback
 from . import plots
 from .html_page import (
     Html,
@@ -29,13 +29,13 @@ from .html_page import (
     build_section,
     build_table,
     build_title,
-    element,
-    fragment,
+    build_element,
+    join_html,
 )
 from .reference import View
 from .report import judge_figures
 
-MOST_MOMENTS = 12
+MAX_MOMENTS = 12
 """Key moments with stick figures on the page; the table lists all."""
 
 # Seconds around a moment at which stick figures are drawn.
@@ -49,8 +49,8 @@ _STYLE = """
 """
 
 
-def html_report(
-    played: Played, report: Mapping, *, track: Track | None = None, timeline: Timeline | None = None,
+def build_html_report(
+    played: Playback, report: Mapping, *, track: Track | None = None, timeline: Timeline | None = None,
     library: Library | None = None, title: str = "Take",
 ) -> str:  # fmt: skip
     """Build the page.
@@ -67,66 +67,66 @@ def html_report(
     """
     plots.require_matplotlib()
     view = View(played, track, timeline, library)
-    over_time = build_image(plots.curves(view), "distance from the track, toe heights, speed, smoothness")
+    over_time = build_image(plots.draw_curves(view), "distance from the track, toe heights, speed, smoothness")
     return build_page(
-        title, _head(view, report, title), _warnings(report), build_section("Over time", over_time), _clips(view),
-        _words(view), _moments(view, report), _worst(view), _figures(report), style=_STYLE,
+        title, _build_head(view, report, title), _build_warnings(report), build_section("Over time", over_time), _build_clips(view),
+        _build_labels(view), _build_moments(view, report), _build_worst(view), _build_figures(report), style=_STYLE,
     )  # fmt: skip
 
 
-def _head(view: View, report: Mapping, title: str) -> Html:
+def _build_head(view: View, report: Mapping, title: str) -> Html:
     statuses = [row.status for row in judge_figures(report) if row.status]
     method = f"method {report['method']}, " if report.get("method") else ""
-    told = f"{view.count} frames at {view.fps:g} per second, {view.played.motion.duration:.1f} s, {method}"
-    met = f"{statuses.count('met')} of {len(statuses)} targets met"
-    return fragment(element("h1", title), element("p", told + met, class_="quiet"), between="\n")
+    summary = f"{view.count} frames at {view.fps:g} per second, {view.played.motion.duration:.1f} s, {method}"
+    targets = f"{statuses.count('targets')} of {len(statuses)} targets met"
+    return join_html(build_element("h1", title), build_element("p", summary + targets, class_="quiet"), separator="\n")
 
 
-def _warnings(report: Mapping) -> Html:
+def _build_warnings(report: Mapping) -> Html:
     lines = build_list(report.get("warnings") or ())
     return build_section("Warnings", lines) if lines else Html()
 
 
-def _clips(view: View) -> Html:
-    names = plots.legend(view)
+def _build_clips(view: View) -> Html:
+    names = plots.choose_clip_colours(view)
     if not names:
         unknown = "The played clips are unknown without provenance."
-        return build_section("Clips", element("p", unknown, class_="quiet"))
+        return build_section("Clips", build_element("p", unknown, class_="quiet"))
     chips = [
-        element(
-            "span", element("i", style=f"background:{colour}"), f"{number}: {view.played.clips[clip]}, "
+        build_element(
+            "span", build_element("i", style=f"background:{colour}"), f"{number}: {view.played.clips[clip]}, "
             f"{np.sum(view.played.clip == clip) / view.fps:.1f} s",
         ) for clip, (number, colour) in names.items()
     ]  # fmt: skip
-    picture = build_image(plots.clips(view), "clips, transitions and playback rate")
-    return build_section("Clips", picture, element("p", *chips, class_="chips"))
+    picture = build_image(plots.draw_clips(view), "clips, transitions and playback rate")
+    return build_section("Clips", picture, build_element("p", *chips, class_="chips"))
 
 
-def _words(view: View) -> Html:
-    picture = plots.words(view)
+def _build_labels(view: View) -> Html:
+    picture = plots.draw_labels(view)
     return build_section("Labels", build_image(picture, "labels requested and played")) if picture else Html()
 
 
-def _moments(view: View, report: Mapping) -> Html:
+def _build_moments(view: View, report: Mapping) -> Html:
     if not view.moments:
         return Html()
     parts = []
-    for moment, told in list(zip(view.moments, report["keys"]))[:MOST_MOMENTS]:
-        name = f"{moment.asked.time:.2f} s: {' '.join(moment.asked.words)}"
-        parts += [element("h3", name), element("p", _told(told), class_="quiet"), _strip(view, moment.frame, name)]
-    left = len(view.moments) - MOST_MOMENTS
-    if left > 0:
-        parts.append(element("p", f"and {left} more, in the table below", class_="quiet"))
+    for moment, figures in list(zip(view.moments, report["keys"]))[:MAX_MOMENTS]:
+        name = f"{moment.requested.time:.2f} s: {' '.join(moment.requested.words)}"
+        parts += [build_element("h3", name), build_element("p", _describe_key_moment(figures), class_="quiet"), _build_strip(view, moment.frame, name)]
+    more = len(view.moments) - MAX_MOMENTS
+    if more > 0:
+        parts.append(build_element("p", f"and {more} more, in the table below", class_="quiet"))
     return build_section("Key moments", *parts)
 
 
-def _strip(view: View, frame: int, name: str) -> Html:
+def _build_strip(view: View, frame: int, name: str) -> Html:
     frames = np.rint(frame + np.array(_STRIP_SECONDS) * view.fps).astype(int)
     around = np.unique(np.clip(frames, 0, view.count - 1)).tolist()
-    return build_image(plots.strip(view, around, frame), f"stick figures at {name}")
+    return build_image(plots.draw_strip(view, around, frame), f"stick figures at {name}")
 
 
-def _told(key: Mapping) -> str:
+def _describe_key_moment(key: Mapping) -> str:
     """Describe one key moment in a line."""
     source = f"{key['clip']}, frame {key['clip_frame']:.1f}" if key["clip_frame"] is not None else "no key moment"
     out = [f"played: {source}"]
@@ -136,15 +136,15 @@ def _told(key: Mapping) -> str:
     return "; ".join(out)
 
 
-def _worst(view: View) -> Html:
+def _build_worst(view: View) -> Html:
     parts = []
-    for frame, reason in worst_frames(view):
+    for frame, reason in find_worst_frames(view):
         name = f"{view.played.times[frame]:.2f} s: {reason}"
-        parts += [element("h3", name), _strip(view, frame, name)]
+        parts += [build_element("h3", name), _build_strip(view, frame, name)]
     return build_section("Worst seconds", *parts) if parts else Html()
 
 
-def worst_frames(view: View) -> list[tuple[int, str]]:
+def find_worst_frames(view: View) -> list[tuple[int, str]]:
     """Find the strongest jolts and the worst slide of a foot in contact, at least a second apart.
 
     Args:
@@ -152,32 +152,32 @@ def worst_frames(view: View) -> list[tuple[int, str]]:
     Returns:
         (output frame, description) of each.
     """
-    jolts = movement.jerk(view.played.positions, view.fps), 1, "jolt of {:.0f} m/s³"
-    speeds = np.nan_to_num(contact_speeds(view.played.feet, view.played.contacts, view.fps))
+    jolts = movement.compute_jerk(view.played.positions, view.fps), 1, "jolt of {:.0f} m/s³"
+    speeds = np.nan_to_num(measure_contact_speeds(view.played.feet, view.played.contacts, view.fps))
     slides = speeds.max(axis=1, initial=0.0), 0, "foot slides at {:.2f} m/s"
-    found: list[tuple[int, str]] = []
+    frames: list[tuple[int, str]] = []
     for values, lead, text in (jolts, slides, jolts):
-        values, apart = values.copy(), int(view.fps)
-        for frame, _ in found:
-            values[max(frame - lead - apart, 0) : max(frame - lead + apart + 1, 0)] = 0.0
+        values, min_distance = values.copy(), int(view.fps)
+        for frame, _ in frames:
+            values[max(frame - lead - min_distance, 0) : max(frame - lead + min_distance + 1, 0)] = 0.0
         if len(values) and values.max() > 0.0:
-            at = int(np.argmax(values))
-            found.append((at + lead, text.format(values[at])))
-    return found
+            peak = int(np.argmax(values))
+            frames.append((peak + lead, text.format(values[peak])))
+    return frames
 
 
-def _figures(report: Mapping) -> Html:
+def _build_figures(report: Mapping) -> Html:
     head = ("figure", build_title("value"), build_title("recordings"), "target", "")
     rows = [
         build_row(
-            row.name, element("td", row.value, class_="n"), element("td", row.own, class_="n"), row.target,
-            element("td", row.status, class_=row.status or "quiet"),
+            row.name, build_element("td", row.value, class_="n"), build_element("td", row.own, class_="n"), row.target,
+            build_element("td", row.status, class_=row.status or "quiet"),
         ) for row in judge_figures(report) if not row.name.startswith("keys ")
     ]  # fmt: skip
-    return build_section("All figures", build_table(head, rows), _key_table(report))
+    return build_section("All figures", build_table(head, rows), _build_key_table(report))
 
 
-def _key_table(report: Mapping) -> Html:
+def _build_key_table(report: Mapping) -> Html:
     """Build the table of key moments: one line for each, one column for each figure, targets in the head."""
     if not report["keys"]:
         return Html()
@@ -188,7 +188,7 @@ def _key_table(report: Mapping) -> Html:
     lines = []
     for number in numbers:
         cells = [rows.get(f"keys {number}.{leaf}") for leaf in columns]
-        told = [element("td", cell.value, class_=cell.status or "plain") if cell else "–" for cell in cells]
-        lines.append(build_row(str(number), *told))
-    head = ("", *(build_title(leaf, aim, class_="") for leaf, aim in columns.items()))
-    return fragment(element("h3", "Key moments"), build_table(head, lines, class_="keys"))
+        cells_html = [build_element("td", cell.value, class_=cell.status or "plain") if cell else "–" for cell in cells]
+        lines.append(build_row(str(number), *cells_html))
+    head = ("", *(build_title(leaf, target, class_="") for leaf, target in columns.items()))
+    return join_html(build_element("h3", "Key moments"), build_table(head, lines, class_="keys"))

@@ -34,7 +34,7 @@ class Html(str):
     """
 
 
-def element(name: str, /, *content: str, **attributes: object) -> Html:
+def build_element(name: str, /, *content: str, **attributes: object) -> Html:
     """Build an element.
 
     Args:
@@ -47,10 +47,10 @@ def element(name: str, /, *content: str, **attributes: object) -> Html:
         The element.
     """
     begin = name + "".join(_format_attribute(key, value) for key, value in attributes.items())
-    return Html(f"<{begin}>{fragment(*content)}" + ("" if name in _WITHOUT_END else f"</{name}>"))
+    return Html(f"<{begin}>{join_html(*content)}" + ("" if name in _WITHOUT_END else f"</{name}>"))
 
 
-def fragment(*content: str, between: str = "") -> Html:
+def join_html(*content: str, separator: str = "") -> Html:
     """Join text, which is escaped, and Html.
 
     Args:
@@ -59,7 +59,7 @@ def fragment(*content: str, between: str = "") -> Html:
     Returns:
         The joined HTML.
     """
-    return Html(between.join(part if isinstance(part, Html) else escape(str(part)) for part in content))
+    return Html(separator.join(part if isinstance(part, Html) else escape(str(part)) for part in content))
 
 
 def _format_attribute(key: str, value: object) -> str:
@@ -81,11 +81,11 @@ def build_page(title: str, *parts: str, style: str = "") -> str:
     Returns:
         The document as text.
     """
-    head = fragment(
-        Html('<meta charset="utf-8"><meta name="viewport" content="width=device-width">'), element("title", title),
-        element("style", Html(_STYLE + style)),
+    head = join_html(
+        Html('<meta charset="utf-8"><meta name="viewport" content="width=device-width">'), build_element("title", title),
+        build_element("style", Html(_STYLE + style)),
     )  # fmt: skip
-    body = fragment(*(part for part in parts if part), between="\n")
+    body = join_html(*(part for part in parts if part), separator="\n")
     return f'<!DOCTYPE html>\n<html lang="en"><head>{head}</head>\n<body>\n{body}\n</body></html>\n'
 
 
@@ -98,7 +98,7 @@ def build_section(title: str, *parts: str) -> Html:
     Returns:
         The section.
     """
-    return fragment(element("h2", title), *parts, between="\n")
+    return join_html(build_element("h2", title), *parts, separator="\n")
 
 
 def build_list(lines: Iterable[str]) -> Html:
@@ -109,8 +109,8 @@ def build_list(lines: Iterable[str]) -> Html:
     Returns:
         The list.
     """
-    points = [element("li", line) for line in lines]
-    return element("ul", *points) if points else Html()
+    items = [build_element("li", line) for line in lines]
+    return build_element("ul", *items) if items else Html()
 
 
 def build_table(head: Sequence[str], rows: Iterable[Html], **attributes: object) -> Html:
@@ -123,9 +123,9 @@ def build_table(head: Sequence[str], rows: Iterable[Html], **attributes: object)
     Returns:
         The table.
     """
-    cells = [title if isinstance(title, Html) else element("th", title) for title in head]
-    lines = ([element("tr", *cells)] if cells else []) + list(rows)
-    return element("div", element("table", fragment(*lines, between="\n"), **attributes), class_="scroll")
+    cells = [title if isinstance(title, Html) else build_element("th", title) for title in head]
+    lines = ([build_element("tr", *cells)] if cells else []) + list(rows)
+    return build_element("div", build_element("table", join_html(*lines, separator="\n"), **attributes), class_="scroll")
 
 
 def build_row(*cells: str, class_: str = "") -> Html:
@@ -137,7 +137,7 @@ def build_row(*cells: str, class_: str = "") -> Html:
     Returns:
         The row.
     """
-    return element("tr", *(cell if isinstance(cell, Html) else element("td", cell) for cell in cells), class_=class_)
+    return build_element("tr", *(cell if isinstance(cell, Html) else build_element("td", cell) for cell in cells), class_=class_)
 
 
 def build_number_cell(value: float | None, digits: int = 0, scale: float = 1.0, status: str = "") -> Html:
@@ -152,8 +152,8 @@ def build_number_cell(value: float | None, digits: int = 0, scale: float = 1.0, 
         The cell.
     """
     if value is None or not math.isfinite(value):
-        return element("td", "–", class_="n")
-    return element("td", f"{scale * value:.{digits}f}", class_=f"n {status}".strip())
+        return build_element("td", "–", class_="n")
+    return build_element("td", f"{scale * value:.{digits}f}", class_=f"n {status}".strip())
 
 
 def build_title(title: str, note: str = "", class_: str = "n") -> Html:
@@ -166,8 +166,8 @@ def build_title(title: str, note: str = "", class_: str = "n") -> Html:
     Returns:
         The cell.
     """
-    below = (element("br"), element("span", note, class_="quiet")) if note else ()
-    return element("th", title, *below, class_=class_)
+    below = (build_element("br"), build_element("span", note, class_="quiet")) if note else ()
+    return build_element("th", title, *below, class_=class_)
 
 
 def build_image(png: bytes, text: str, class_: str = "") -> Html:
@@ -180,10 +180,10 @@ def build_image(png: bytes, text: str, class_: str = "") -> Html:
     Returns:
         The image element.
     """
-    return element("img", class_=class_, alt=text, src=build_data_address(png, "image/png"))
+    return build_element("img", class_=class_, alt=text, src=build_data_url(png, "image/png"))
 
 
-def build_data_address(data: bytes, kind: str) -> str:
+def build_data_url(data: bytes, kind: str) -> str:
     """Build the data URL of a file.
 
     Args:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-CULLED = 3.0
+OUTLIER_SIGMAS = 3.0
 """Standard deviations from the mean beyond which a throw is an outlier (Fredriksson §8.3)."""
 NORMALITY = 0.05
 """Significance level of the normality test; Fredriksson does not name one."""
@@ -42,7 +42,7 @@ class Comparison:
     wilcoxon_p: float
     least_p: float
 
-def judged(differences: np.ndarray) -> Comparison:
+def compare_differences(differences: np.ndarray) -> Comparison:
     """Compare two methods by the differences of their figures.
 
     Args:
@@ -52,22 +52,22 @@ def judged(differences: np.ndarray) -> Comparison:
     """
     from scipy.stats import shapiro, ttest_1samp, wilcoxon
 
-    off = np.asarray(differences, float)
-    if not len(off):
-        none = float("nan")
-        return Comparison(differences=off, mean=none, spread=none, normal=none, test="t", p=none, t_p=none,
-                          wilcoxon_p=none, least_p=none)
-    varies = len(off) > 1 and np.ptp(off) > 1e-12
-    normal = float(shapiro(off).pvalue) if len(off) > 2 and varies else np.nan
-    t_p = float(ttest_1samp(off, 0.0, alternative="less").pvalue) if varies else np.nan
-    ranks = float(wilcoxon(off, alternative="less").pvalue) if np.any(off != 0.0) else np.nan
+    values = np.asarray(differences, float)
+    if not len(values):
+        nan = float("nan")
+        return Comparison(differences=values, mean=nan, spread=nan, normal=nan, test="t", p=nan, t_p=nan,
+                          wilcoxon_p=nan, least_p=nan)
+    varies = len(values) > 1 and np.ptp(values) > 1e-12
+    normal = float(shapiro(values).pvalue) if len(values) > 2 and varies else np.nan
+    t_p = float(ttest_1samp(values, 0.0, alternative="less").pvalue) if varies else np.nan
+    ranks = float(wilcoxon(values, alternative="less").pvalue) if np.any(values != 0.0) else np.nan
     test = "Wilcoxon" if normal < NORMALITY else "t"
-    return Comparison(differences=off, mean=float(off.mean()), spread=float(off.std()), normal=normal, test=test,
+    return Comparison(differences=values, mean=float(values.mean()), spread=float(values.std()), normal=normal, test=test,
                       p=ranks if test == "Wilcoxon" else t_p, t_p=t_p, wilcoxon_p=ranks,
-                      least_p=2.0 ** -len(off) if test == "Wilcoxon" else 0.0)
+                      least_p=2.0 ** -len(values) if test == "Wilcoxon" else 0.0)
 
 
-def kept(values: np.ndarray) -> np.ndarray:
+def find_inliers(values: np.ndarray) -> np.ndarray:
     """Find the values within three standard deviations of the mean of the finite ones.
 
     Up to ten values can never contain an outlier by this rule.
@@ -82,4 +82,4 @@ def kept(values: np.ndarray) -> np.ndarray:
     if not known.any():
         return known
     mean, spread = values[known].mean(), values[known].std()
-    return known & (np.abs(np.where(known, values, mean) - mean) <= CULLED * spread + 1e-12)
+    return known & (np.abs(np.where(known, values, mean) - mean) <= OUTLIER_SIGMAS * spread + 1e-12)

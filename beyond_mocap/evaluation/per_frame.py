@@ -10,10 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..annotation.ball_contact import surfaces
-from ..annotation.striking import faster_middle, nearest_on
+from ..annotation.ball_contact import build_surfaces
+from ..annotation.striking import trace_fastest_surface, find_nearest_point
 from ..synthesis.quality import movement
-from ..synthesis.quality.moments import Moment, met, touching_words, written_ball
+from ..synthesis.quality.moments import KeyMomentResult, measure_contact, list_contact_labels, find_written_ball
 from .reference import View
 
 
@@ -39,12 +39,12 @@ class PerFrame:
     correction: np.ndarray
     jerk: np.ndarray
     speed: np.ndarray
-    asked_speed: np.ndarray
+    requested_speed: np.ndarray
 
     @property
     def speed_gap(self) -> np.ndarray:
         """(T,) m/s by which the body is faster than the track."""
-        return self.speed - self.asked_speed
+        return self.speed - self.requested_speed
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -87,7 +87,7 @@ class Strike:
     gap: float
 
 
-def per_frame(view: View) -> PerFrame:
+def measure_per_frame(view: View) -> PerFrame:
     """Measure every frame of a take.
 
     Args:
@@ -97,24 +97,24 @@ def per_frame(view: View) -> PerFrame:
     """
     played, count = view.played, view.count
     unknown = np.full(count, np.nan)
-    wanted = np.full((count, 2), np.nan) if view.wanted is None else view.wanted
-    known = view.wanted is not None
+    wanted = np.full((count, 2), np.nan) if view.target is None else view.target
+    known = view.target is not None
     slides = np.full((count, 2), np.nan)
-    slides[1:] = movement.contact_speeds(played.feet, played.contacts, view.fps)
+    slides[1:] = movement.measure_contact_speeds(played.feet, played.contacts, view.fps)
     corrected = np.full((count, 2), np.nan) if played.correction is None else np.asarray(played.correction, float)
-    hard = unknown.copy()
-    if view.reference is not None and count > movement.SEAM_TO_JERK + 1:
-        values = movement.jerk(played.positions, view.fps)
-        hard[movement.SEAM_TO_JERK :][: len(values)] = movement.jerk_ratios(values, view.speed, view.reference.jerk_p95)
+    jerk = unknown.copy()
+    if view.reference is not None and count > movement.TRANSITION_TO_JERK + 1:
+        values = movement.compute_jerk(played.positions, view.fps)
+        jerk[movement.TRANSITION_TO_JERK :][: len(values)] = movement.compute_jerk_ratios(values, view.speed, view.reference.jerk_p95)
     return PerFrame(
-        times=played.times, track=wanted, slide=slides, correction=corrected, jerk=hard, speed=view.speed,
-        root_error=movement.root_error(played.pelvis, wanted, view.fps) if known else unknown,
-        pelvis_error=movement.pelvis_error(played.pelvis, wanted) if known else unknown,
-        asked_speed=movement.travel_speed(wanted, view.fps) if known else unknown,
+        times=played.times, track=wanted, slide=slides, correction=corrected, jerk=jerk, speed=view.speed,
+        root_error=movement.measure_root_error(played.pelvis, wanted, view.fps) if known else unknown,
+        pelvis_error=movement.measure_pelvis_error(played.pelvis, wanted) if known else unknown,
+        requested_speed=movement.measure_travel_speed(wanted, view.fps) if known else unknown,
     )  # fmt: skip
 
 
-def footprints(view: View) -> tuple[Footprint, ...]:
+def find_footprints(view: View) -> tuple[Footprint, ...]:
     """Find every stance.
 
     Args:
@@ -123,13 +123,13 @@ def footprints(view: View) -> tuple[Footprint, ...]:
         The footprints, ordered by time.
     """
     played = view.played
-    spans = movement.stances(played.contacts)
-    travel = movement.stance_travel(played.feet[:, :, 1], spans)
-    found = [_footprint(view, span, slide) for span, slide in zip(spans.tolist(), travel.tolist())]
-    return tuple(sorted(found, key=lambda print_: (print_.start, print_.side)))
+    spans = movement.list_stances(played.contacts)
+    travel = movement.measure_stance_travel(played.feet[:, :, 1], spans)
+    prints = [_build_footprint(view, span, slide) for span, slide in zip(spans.tolist(), travel.tolist())]
+    return tuple(sorted(prints, key=lambda print_: (print_.start, print_.side)))
 
 
-def _footprint(view: View, span: Sequence[int], slide: float) -> Footprint:
+def _build_footprint(view: View, span: Sequence[int], slide: float) -> Footprint:
     played, (first, end, side) = view.played, span
     heel, toe = played.feet[first:end, side, :, :2].mean(axis=0)
     along = toe - heel
@@ -140,7 +140,7 @@ def _footprint(view: View, span: Sequence[int], slide: float) -> Footprint:
                      heel=tuple(heel.tolist()), toe=tuple(toe.tolist()), direction=direction, slide=slide)  # fmt: skip
 
 
-def strikes(view: View) -> tuple[Strike, ...]:
+def find_strikes(view: View) -> tuple[Strike, ...]:
     """Find every key moment in space.
 
     Args:
@@ -148,35 +148,35 @@ def strikes(view: View) -> tuple[Strike, ...]:
     Returns:
         The strikes, in the order of the timeline.
     """
-    return tuple(_strike(view, moment) for moment in view.moments)
+    return tuple(_find_strike(view, moment) for moment in view.moments)
 
 
-def _strike(view: View, moment: Moment) -> Strike:
+def _find_strike(view: View, moment: KeyMomentResult) -> Strike:
     """Find the nearest points of body and ball at one key moment."""
-    played, words = view.played, touching_words(moment)
-    when, gap = met(played, moment)
-    found = surfaces(played.motion.skeleton, words)
-    if not np.isfinite(gap) or not found:
+    played, words = view.played, list_contact_labels(moment)
+    contact_time, gap = measure_contact(played, moment)
+    surfaces = build_surfaces(played.motion.skeleton, words)
+    if not np.isfinite(gap) or not surfaces:
         part = played.positions[moment.frame, played.body.hips]
-        if found:
-            part = faster_middle(found, *_around(view, moment.frame))[-1]
-        return Strike(time=moment.asked.in_force, words=moment.asked.words, part=part, ball=None, gap=np.nan)
-    frame = int(np.clip(round((when - played.start_time) * view.fps), 0, view.count - 1))
-    ball = written_ball(played, frame)
-    lines = [surface.line(played.positions[frame], played.rotations[frame]) for surface in found]
-    skins = [_skin(nearest_on(line, ball), ball, surface.radius) for line, surface in zip(lines, found)]
-    part = min(skins, key=lambda point: float(np.linalg.norm(point - ball)))
-    return Strike(time=when, words=moment.asked.words, part=part, ball=ball, gap=gap)
+        if surfaces:
+            part = trace_fastest_surface(surfaces, *_list_recent_poses(view, moment.frame))[-1]
+        return Strike(time=moment.requested.resolved_time, words=moment.requested.words, part=part, ball=None, gap=np.nan)
+    frame = int(np.clip(round((contact_time - played.start_time) * view.fps), 0, view.count - 1))
+    ball = find_written_ball(played, frame)
+    lines = [surface.compute_line(played.positions[frame], played.rotations[frame]) for surface in surfaces]
+    points = [_find_surface_point(find_nearest_point(line, ball), ball, surface.radius) for line, surface in zip(lines, surfaces)]
+    part = min(points, key=lambda point: float(np.linalg.norm(point - ball)))
+    return Strike(time=contact_time, words=moment.requested.words, part=part, ball=ball, gap=gap)
 
 
-def _skin(inside: np.ndarray, ball: np.ndarray, radius: float) -> np.ndarray:
+def _find_surface_point(inside: np.ndarray, ball: np.ndarray, radius: float) -> np.ndarray:
     """Find the point (3,) m of a surface towards the ball (3,), `radius` m away from the point `inside` (3,) on its
     line."""
     away = ball - inside
     return inside + away * min(1.0, radius / max(float(np.linalg.norm(away)), 1e-9))
 
 
-def _around(view: View, frame: int) -> tuple[np.ndarray, np.ndarray]:
+def _list_recent_poses(view: View, frame: int) -> tuple[np.ndarray, np.ndarray]:
     """Return the joints' positions and rotations of the last frames up to `frame`."""
     frames = slice(max(frame - 3, 0), frame + 1)
     return view.played.positions[frames], view.played.rotations[frames]

@@ -9,18 +9,18 @@ from __future__ import annotations
 import numpy as np
 
 from ..base.time_series import time_derivative
-from ..library.features import feature_joints, raw_features
+from ..library.features import select_feature_joints, compute_raw_features
 from ..motion import quaternion
-from ..motion.humanoid import Humanoid, heading_from_positions
+from ..motion.humanoid import Humanoid, compute_heading_from_positions
 from ..motion.skeleton import Skeleton
 from ..synthesis.quality import movement
-from ..synthesis.quality.movement import speed_class
+from ..synthesis.quality.movement import classify_speed
 
 VELOCITY_SECONDS = 0.12  # weight of m/s against metres, like `library.features.HORIZON`
 _ROWS_AT_ONCE = 512  # rows of distances at once, to limit memory
 
 
-def local_positions(skeleton: Skeleton, positions: np.ndarray, hips: int) -> np.ndarray:
+def compute_local_positions(skeleton: Skeleton, positions: np.ndarray, hips: int) -> np.ndarray:
     """Transform positions to the body's frame: X ahead, Y left, Z up, origin on the ground below the hips.
 
     Args:
@@ -30,10 +30,10 @@ def local_positions(skeleton: Skeleton, positions: np.ndarray, hips: int) -> np.
     Returns:
         (T, J, 3) m, float32.
     """
-    return turned(positions - ground_point(positions, hips), -heading_from_positions(skeleton, positions))
+    return rotate_about_up(positions - find_ground_point(positions, hips), -compute_heading_from_positions(skeleton, positions))
 
 
-def ground_point(positions: np.ndarray, joint: int) -> np.ndarray:
+def find_ground_point(positions: np.ndarray, joint: int) -> np.ndarray:
     """Find the point on the ground below a joint.
 
     Args:
@@ -45,7 +45,7 @@ def ground_point(positions: np.ndarray, joint: int) -> np.ndarray:
     return positions[:, joint, None] * np.array([1.0, 1.0, 0.0])
 
 
-def turned(vectors: np.ndarray, angle: np.ndarray) -> np.ndarray:
+def rotate_about_up(vectors: np.ndarray, angle: np.ndarray) -> np.ndarray:
     """Rotate vectors about Z by one angle per frame.
 
     Args:
@@ -54,10 +54,10 @@ def turned(vectors: np.ndarray, angle: np.ndarray) -> np.ndarray:
     Returns:
         (T, J, 3), float32.
     """
-    return quaternion.turned_about_up(vectors, angle[:, None]).astype(np.float32)
+    return quaternion.rotate_about_up(vectors, angle[:, None]).astype(np.float32)
 
 
-def pose_features(skeleton: Skeleton, positions: np.ndarray, fps: float, hips: int) -> np.ndarray:
+def build_pose_features(skeleton: Skeleton, positions: np.ndarray, fps: float, hips: int) -> np.ndarray:
     """Build features of poses: positions, then 0.12 s of velocity, both divided by sqrt(J).
 
     Velocities are world velocities rotated into the heading frame, so travel counts. The Euclidean distance of two rows
@@ -72,13 +72,13 @@ def pose_features(skeleton: Skeleton, positions: np.ndarray, fps: float, hips: i
     Returns:
         (T, 6 J) m, float32.
     """
-    places = local_positions(skeleton, positions, hips)
-    moves = turned(time_derivative(positions, fps), -heading_from_positions(skeleton, positions)) * VELOCITY_SECONDS
-    both = np.concatenate([places, moves], axis=1).reshape(len(positions), -1)
+    local = compute_local_positions(skeleton, positions, hips)
+    velocities = rotate_about_up(time_derivative(positions, fps), -compute_heading_from_positions(skeleton, positions)) * VELOCITY_SECONDS
+    both = np.concatenate([local, velocities], axis=1).reshape(len(positions), -1)
     return both / np.float32(np.sqrt(len(skeleton)))
 
 
-def mirrored_features(features: np.ndarray, body: Humanoid) -> np.ndarray:
+def mirror_features(features: np.ndarray, body: Humanoid) -> np.ndarray:
     """Compute the features of the mirrored poses: sides exchanged, left and right of the body swapped.
 
     Args:
@@ -91,7 +91,7 @@ def mirrored_features(features: np.ndarray, body: Humanoid) -> np.ndarray:
     return (parts * np.array([1.0, -1.0, 1.0], dtype=np.float32)).reshape(len(features), -1)
 
 
-def nearest_distance(
+def measure_nearest_distance(
     features: np.ndarray, library: np.ndarray, left_out: np.ndarray | None = None, owner: np.ndarray | None = None
 ) -> np.ndarray:
     """Measure the distance from each row of features to the nearest row of a library.
@@ -109,14 +109,14 @@ def nearest_distance(
     out = np.empty(len(features))
     for start in range(0, len(features), _ROWS_AT_ONCE):
         rows = features[start : start + _ROWS_AT_ONCE]
-        gap = squares - 2.0 * (rows @ library.T)
+        squared_distance = squares - 2.0 * (rows @ library.T)
         if left_out is not None:
-            gap[left_out[start : start + _ROWS_AT_ONCE, None] == owner] = np.inf
-        out[start : start + len(rows)] = gap.min(axis=1) + np.einsum("td,td->t", rows, rows)
+            squared_distance[left_out[start : start + _ROWS_AT_ONCE, None] == owner] = np.inf
+        out[start : start + len(rows)] = squared_distance.min(axis=1) + np.einsum("td,td->t", rows, rows)
     return np.sqrt(np.maximum(out, 0.0))
 
 
-def real_p95(values: np.ndarray, speed: np.ndarray) -> np.ndarray:
+def compute_class_p95(values: np.ndarray, speed: np.ndarray) -> np.ndarray:
     """Compute the 95th percentile of values in each speed class, with `movement.real_p95`.
 
     Args:
@@ -127,10 +127,10 @@ def real_p95(values: np.ndarray, speed: np.ndarray) -> np.ndarray:
         (5,) m.
     """
     known = np.isfinite(values)
-    return movement.real_p95(values[known], speed[known])
+    return movement.compute_real_p95(values[known], speed[known])
 
 
-def unreal(distance: np.ndarray, speed: np.ndarray, real: np.ndarray) -> np.ndarray:
+def find_unreal_frames(distance: np.ndarray, speed: np.ndarray, real: np.ndarray) -> np.ndarray:
     """Find the frames whose nearest library pose is farther than the recordings' 95th percentile.
 
     Args:
@@ -140,10 +140,10 @@ def unreal(distance: np.ndarray, speed: np.ndarray, real: np.ndarray) -> np.ndar
     Returns:
         (T,) bool.
     """
-    return distance > real[speed_class(speed)]
+    return distance > real[classify_speed(speed)]
 
 
-def smoothness(skeleton: Skeleton, positions: np.ndarray, fps: float) -> np.ndarray:
+def measure_smoothness(skeleton: Skeleton, positions: np.ndarray, fps: float) -> np.ndarray:
     """Measure the distance between the features of consecutive frames, the curves of Faustino's App. D (§5.2.1).
 
     Peaks of the curve are what counts. The features are those of Faustino's §3.2: position, velocity and acceleration
@@ -159,6 +159,6 @@ def smoothness(skeleton: Skeleton, positions: np.ndarray, fps: float) -> np.ndar
     Returns:
         (T-1,) m.
     """
-    joints = feature_joints(skeleton)
-    facing = np.unwrap(heading_from_positions(skeleton, positions))
-    return np.linalg.norm(np.diff(raw_features(positions[:, joints], facing, fps), axis=0), axis=-1)
+    joints = select_feature_joints(skeleton)
+    heading = np.unwrap(compute_heading_from_positions(skeleton, positions))
+    return np.linalg.norm(np.diff(compute_raw_features(positions[:, joints], heading, fps), axis=0), axis=-1)

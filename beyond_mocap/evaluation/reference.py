@@ -21,13 +21,13 @@ from ..annotation.gaits import STANDING
 from ..base.errors import InputError
 from ..library.clip import Clip
 from ..library.library import Library
-from ..motion.humanoid import Humanoid, identify, stature
-from ..motion.motion import at_frames, forward_kinematics, pose_kinematics, resample
+from ..motion.humanoid import Humanoid, identify_joints, estimate_stature
+from ..motion.motion import sample_frames, forward_kinematics, compute_pose, resample
 from ..motion.skeleton import Skeleton
 from ..motion.track import Track
 from ..synthesis.quality import movement
-from ..synthesis.quality.moments import moments
-from ..synthesis.quality.played import Played, find_transitions
+from ..synthesis.quality.moments import evaluate_moments
+from ..synthesis.quality.played import Playback, find_transitions
 from . import realism
 
 POSES_PER_SECOND = 10.0  # of a recording that are compared with
@@ -116,7 +116,7 @@ class LibraryReference:
     fastest: float
     slowest: float
 
-    def rows(self, clips: tuple[str, ...], clip: np.ndarray, clip_frame: np.ndarray) -> np.ndarray:
+    def find_rows(self, clips: tuple[str, ...], clip: np.ndarray, clip_frame: np.ndarray) -> np.ndarray:
         """Find the row of each output frame's source.
 
         Args:
@@ -127,11 +127,11 @@ class LibraryReference:
             (T,) fractional rows, NaN if unknown.
         """
         table = np.array([self.index.get(path, -1) for path in clips] + [-1])
-        own = table[clip]
-        frame = np.clip(clip_frame * self.fps / self.rate[own], 0, np.diff(self.first)[own] - 1)
-        return np.where((own >= 0) & (clip >= 0), self.first[own] + frame, np.nan)
+        recordings = table[clip]
+        frame = np.clip(clip_frame * self.fps / self.rate[recordings], 0, np.diff(self.first)[recordings] - 1)
+        return np.where((recordings >= 0) & (clip >= 0), self.first[recordings] + frame, np.nan)
 
-    def used_stances(self, rows: np.ndarray) -> np.ndarray:
+    def select_used_travel(self, rows: np.ndarray) -> np.ndarray:
         """Select the travel of the source stances that a take uses.
 
         Args:
@@ -146,10 +146,10 @@ class LibraryReference:
         return self.travel[count[self.stances[:, 1]] > count[self.stances[:, 0]]]
 
 
-_MADE: WeakKeyDictionary[Library, dict[float, LibraryReference]] = WeakKeyDictionary()
+_CACHE: WeakKeyDictionary[Library, dict[float, LibraryReference]] = WeakKeyDictionary()
 
 
-def library_reference(library: Library, fps: float) -> LibraryReference:
+def load_reference(library: Library, fps: float) -> LibraryReference:
     """Return the library's reference at a frame rate; it stays in memory as long as the library.
 
     Args:
@@ -158,10 +158,10 @@ def library_reference(library: Library, fps: float) -> LibraryReference:
     Returns:
         The reference.
     """
-    made = _MADE.setdefault(library, {})
-    if fps not in made:
-        made[fps] = build_reference(library, fps)
-    return made[fps]
+    by_fps = _CACHE.setdefault(library, {})
+    if fps not in by_fps:
+        by_fps[fps] = build_reference(library, fps)
+    return by_fps[fps]
 
 
 def build_reference(library: Library, fps: float) -> LibraryReference:
@@ -173,30 +173,30 @@ def build_reference(library: Library, fps: float) -> LibraryReference:
     Returns:
         The reference.
     """
-    originals, twins = _originals(library.clips)
-    measured = [measure(clip, fps) for clip in originals]
+    originals, twins = _select_originals(library.clips)
+    measured = [measure_recording(clip, fps) for clip in originals]
     lengths = [len(recording.sway) for recording in measured]
     first = np.concatenate([[0], np.cumsum(lengths)])
-    windows = [movement.uncut_windows(recording.jerk, recording.speed) for recording in measured]
-    hard, speed = (np.concatenate(column) for column in zip(*windows))
-    jerk_p95 = movement.real_p95(hard, speed)
-    poses, pose_p95 = _poses(measured, twins, identify(library.skeleton), fps)
-    joined = {name: np.concatenate([getattr(recording, name) for recording in measured]) for name in _JOINED}
+    windows = [movement.collect_uncut_windows(recording.jerk, recording.speed) for recording in measured]
+    jerk, speed = (np.concatenate(column) for column in zip(*windows))
+    jerk_p95 = movement.compute_real_p95(jerk, speed)
+    poses, pose_p95 = _select_poses(measured, twins, identify_joints(library.skeleton), fps)
+    joined = {name: np.concatenate([getattr(recording, name) for recording in measured]) for name in _JOINED_FIELDS}
     return LibraryReference(
         fps=fps, index={recording.path: i for i, recording in enumerate(measured)}, first=first,
         rate=np.array([recording.rate for recording in measured]),
-        jerk_above_real=np.concatenate([_above(recording, jerk_p95) for recording in measured]),
+        jerk_above_real=np.concatenate([_flag_high_jerk(recording, jerk_p95) for recording in measured]),
         stances=np.concatenate([r.stances + [start, start, 0] for r, start in zip(measured, first)]),
         heel_rest=float(np.median([recording.heel_rest for recording in measured])), jerk_p95=jerk_p95,
-        smoothness_p95=realism.real_p95(joined["smoothness"], joined["speed"]), poses=poses, pose_p95=pose_p95,
-        fastest=float(joined["speed"].max()), slowest=_slowest_gait(library), **joined,
+        smoothness_p95=realism.compute_class_p95(joined["smoothness"], joined["speed"]), poses=poses, pose_p95=pose_p95,
+        fastest=float(joined["speed"].max()), slowest=_find_slowest_speed(library), **joined,
     )  # fmt: skip
 
 
-_JOINED = ("sway", "surge", "speed", "contact_speed", "skating", "support", "tip", "smoothness", "travel")
+_JOINED_FIELDS = ("sway", "surge", "speed", "contact_speed", "skating", "support", "tip", "smoothness", "travel")
 
 
-def _originals(clips: tuple[Clip, ...]) -> tuple[list[Clip], np.ndarray]:
+def _select_originals(clips: tuple[Clip, ...]) -> tuple[list[Clip], np.ndarray]:
     """Select one clip per path, unmirrored if possible, and whether its mirrored twin is in the library too (C,)."""
     chosen: dict[str, Clip] = {}
     count: dict[str, int] = {}
@@ -206,7 +206,7 @@ def _originals(clips: tuple[Clip, ...]) -> tuple[list[Clip], np.ndarray]:
     return list(chosen.values()), np.array([count[path] > 1 for path in chosen])
 
 
-def measure(clip: Clip, fps: float) -> Recording:
+def measure_recording(clip: Clip, fps: float) -> Recording:
     """Measure one clip, uncut, frame by frame.
 
     Args:
@@ -216,36 +216,36 @@ def measure(clip: Clip, fps: float) -> Recording:
         Its figures.
     """
     motion = resample(clip.recording, fps)
-    skeleton, hips = motion.skeleton, identify(motion.skeleton).hips
+    skeleton, hips = motion.skeleton, identify_joints(motion.skeleton).hips
     positions, rotations = forward_kinematics(motion)
-    pelvis, planted = positions[:, hips, :2], positions[:, movement.foot_joints(skeleton)]
-    at = np.minimum(np.rint(np.arange(len(motion)) * clip.motion.fps / fps).astype(int), len(clip.motion) - 1)
-    contacts = clip.contacts[at]
-    spans = movement.stances(contacts)
-    heel_rest, floor = movement.heel_rest_height(planted, contacts), float(np.percentile(planted[:, :, 1, 2], 2))
+    pelvis, feet = positions[:, hips, :2], positions[:, movement.list_foot_joints(skeleton)]
+    source_frames = np.minimum(np.rint(np.arange(len(motion)) * clip.motion.fps / fps).astype(int), len(clip.motion) - 1)
+    contacts = clip.contacts[source_frames]
+    spans = movement.list_stances(contacts)
+    heel_rest, floor = movement.measure_heel_rest(feet, contacts), float(np.percentile(feet[:, :, 1, 2], 2))
     return Recording(
-        path=clip.path, rate=clip.motion.fps, features=realism.pose_features(skeleton, positions, fps, hips),
-        sway=movement.sway(pelvis, fps), surge=movement.surge(pelvis, fps), speed=movement.travel_speed(pelvis, fps),
-        contact_speed=np.concatenate([movement.contact_speeds(planted, contacts, fps), [[np.nan, np.nan]]]),
-        skating=np.append(movement.skating_steps(planted[:, :, 1], floor, fps), False), heel_rest=heel_rest,
-        support=movement.support_height(planted, contacts, heel_rest),
-        tip=movement.tip_height(skeleton, positions, rotations),
-        jerk=movement.jerk(positions, fps), smoothness=np.append(realism.smoothness(skeleton, positions, fps), np.nan),
-        stances=spans, travel=movement.stance_travel(planted[:, :, 1], spans),
+        path=clip.path, rate=clip.motion.fps, features=realism.build_pose_features(skeleton, positions, fps, hips),
+        sway=movement.measure_sway(pelvis, fps), surge=movement.measure_surge(pelvis, fps), speed=movement.measure_travel_speed(pelvis, fps),
+        contact_speed=np.concatenate([movement.measure_contact_speeds(feet, contacts, fps), [[np.nan, np.nan]]]),
+        skating=np.append(movement.find_skating_steps(feet[:, :, 1], floor, fps), False), heel_rest=heel_rest,
+        support=movement.measure_support_height(feet, contacts, heel_rest),
+        tip=movement.measure_tip_height(skeleton, positions, rotations),
+        jerk=movement.compute_jerk(positions, fps), smoothness=np.append(realism.measure_smoothness(skeleton, positions, fps), np.nan),
+        stances=spans, travel=movement.measure_stance_travel(feet[:, :, 1], spans),
     )  # fmt: skip
 
 
-def _above(recording: Recording, real: np.ndarray) -> np.ndarray:
+def _flag_high_jerk(recording: Recording, real: np.ndarray) -> np.ndarray:
     """Flag each frame of a recording: 1 if the window around it has more jerk than `real`, 0 if not, NaN at its ends.
     """
     out = np.full(len(recording.sway), np.nan)
-    windows, speed = movement.uncut_windows(recording.jerk, recording.speed)
-    start = movement.JERK_REACH + movement.SEAM_TO_JERK
-    out[start : start + len(windows)] = windows > real[movement.speed_class(speed)]
+    windows, speed = movement.collect_uncut_windows(recording.jerk, recording.speed)
+    start = movement.JERK_REACH + movement.TRANSITION_TO_JERK
+    out[start : start + len(windows)] = windows > real[movement.classify_speed(speed)]
     return out
 
 
-def _poses(measured: list[Recording], twins: np.ndarray, body: Humanoid, fps: float) -> tuple[np.ndarray, np.ndarray]:
+def _select_poses(measured: list[Recording], twins: np.ndarray, body: Humanoid, fps: float) -> tuple[np.ndarray, np.ndarray]:
     """Select the poses to compare with (M, 6 J), and compute the 95th percentile (5,) of the leave-one-clip-out
     distance.
 
@@ -256,15 +256,15 @@ def _poses(measured: list[Recording], twins: np.ndarray, body: Humanoid, fps: fl
     rows = np.concatenate([recording.features[::step] for recording in measured])
     owner = np.concatenate([np.full(len(r.features[::step]), i) for i, r in enumerate(measured)])
     speed = np.concatenate([recording.speed[::step] for recording in measured])
-    again = twins[owner]
-    poses = np.concatenate([rows, realism.mirrored_features(rows[again], body)])
-    owners = np.concatenate([owner, owner[again]])
-    some = np.unique(np.linspace(0, len(rows) - 1, LEFT_OUT_POSES).astype(int))
-    distance = realism.nearest_distance(rows[some], poses, owner[some], owners)
-    return poses, realism.real_p95(distance, speed[some])
+    has_twin = twins[owner]
+    poses = np.concatenate([rows, realism.mirror_features(rows[has_twin], body)])
+    owners = np.concatenate([owner, owner[has_twin]])
+    sampled = np.unique(np.linspace(0, len(rows) - 1, LEFT_OUT_POSES).astype(int))
+    distance = realism.measure_nearest_distance(rows[sampled], poses, owner[sampled], owners)
+    return poses, realism.compute_class_p95(distance, speed[sampled])
 
 
-def source_poses(library: Library, clips: tuple[str, ...], clip, mirrored, clip_frame) -> np.ndarray:
+def compute_source_poses(library: Library, clips: tuple[str, ...], clip, mirrored, clip_frame) -> np.ndarray:
     """Compute the recorded pose of each output frame's source, in the body's frame.
 
     Args:
@@ -282,16 +282,16 @@ def source_poses(library: Library, clips: tuple[str, ...], clip, mirrored, clip_
         motion = table.get((clips[number], side)) if number >= 0 else None
         if motion is None:
             continue
-        mine = (clip == number) & (mirrored == side)
-        positions = pose_kinematics(motion.skeleton, *at_frames(motion, clip_frame[mine]))[0]
-        out[mine] = realism.local_positions(motion.skeleton, positions, identify(motion.skeleton).hips)
+        selected = (clip == number) & (mirrored == side)
+        positions = compute_pose(motion.skeleton, *sample_frames(motion, clip_frame[selected]))[0]
+        out[selected] = realism.compute_local_positions(motion.skeleton, positions, identify_joints(motion.skeleton).hips)
     return out
 
 
-def _slowest_gait(library: Library) -> float:
+def _find_slowest_speed(library: Library) -> float:
     """Find the speed of the slowest gait that travels, m/s; NaN for a library without locomotion."""
     try:
-        return min(gait.speed for gait in library.gaits if gait.word != STANDING)
+        return min(gait.speed for gait in library.gaits if gait.label != STANDING)
     except InputError:
         return np.nan
 
@@ -314,26 +314,26 @@ class View:
         moments: the key moments with their clips.
     """
 
-    def __init__(self, played: Played, track: Track | None, timeline: Timeline | None, library: Library | None):
+    def __init__(self, played: Playback, track: Track | None, timeline: Timeline | None, library: Library | None):
         motion = played.motion
         self.played, self.timeline, self.library, self.track = played, timeline, library, track
         self.fps, self.count = motion.fps, len(motion)
-        self.reference = None if library is None else library_reference(library, motion.fps)
-        self.size = 1.0 if library is None else _size(motion.skeleton, library.skeleton)
-        self.stride = played.stride(library)
-        self.rows = self._rows()
-        self.used = np.rint(self.rows[np.isfinite(self.rows)]).astype(int)
-        self.seams = find_transitions(*self.source)
-        self.speed = movement.travel_speed(played.pelvis, self.fps)
-        self.wanted = None if track is None else movement.track_at(track, played.times)
-        self.moments = [] if timeline is None else moments(played, timeline.keys, self.stride, library)
+        self.reference = None if library is None else load_reference(library, motion.fps)
+        self.scale = 1.0 if library is None else _compute_scale(motion.skeleton, library.skeleton)
+        self.stride = played.compute_stride(library)
+        self.reference_rows = self._find_reference_rows()
+        self.used_rows = np.rint(self.reference_rows[np.isfinite(self.reference_rows)]).astype(int)
+        self.transitions = find_transitions(*self.source)
+        self.speed = movement.measure_travel_speed(played.pelvis, self.fps)
+        self.target = None if track is None else movement.interpolate_track(track, played.times)
+        self.moments = [] if timeline is None else evaluate_moments(played, timeline.keys, self.stride, library)
 
     @property
     def source(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Clip, mirrored, clip_frame and stride per frame, in the order that `played` functions take."""
         return self.played.clip, self.played.mirrored, self.played.clip_frame, self.stride
 
-    def own(self, name: str) -> np.ndarray:
+    def source_values(self, name: str) -> np.ndarray:
         """Return a figure of the uncut recordings at the used frames.
 
         Args:
@@ -341,19 +341,19 @@ class View:
         Returns:
             (U, ...), empty without a library.
         """
-        return np.zeros(0) if self.reference is None else getattr(self.reference, name)[self.used]
+        return np.zeros(0) if self.reference is None else getattr(self.reference, name)[self.used_rows]
 
-    def _rows(self) -> np.ndarray:
+    def _find_reference_rows(self) -> np.ndarray:
         if self.reference is None:
             return np.full(self.count, np.nan)
-        return self.reference.rows(self.played.clips, self.played.clip, self.played.clip_frame)
+        return self.reference.find_rows(self.played.clips, self.played.clip, self.played.clip_frame)
 
 
-def _size(skeleton: Skeleton, library: Skeleton) -> float:
+def _compute_scale(skeleton: Skeleton, library: Skeleton) -> float:
     """Compute the stature of a skeleton relative to the library's; InputError if the bones differ otherwise."""
-    if skeleton.same_bones(library, 5e-3):
+    if skeleton.has_same_bones(library, 5e-3):
         return 1.0
-    size = stature(skeleton) / stature(library) if skeleton.names == library.names else 1.0
-    if not skeleton.same_bones(library.scaled(size), 5e-3):
+    size = estimate_stature(skeleton) / estimate_stature(library) if skeleton.names == library.names else 1.0
+    if not skeleton.has_same_bones(library.scale(size), 5e-3):
         raise InputError("motion", "its skeleton differs from the library's", "a motion from this library")
     return size

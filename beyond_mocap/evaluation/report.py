@@ -10,18 +10,18 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..annotation import Timeline
-from ..base.errors import InputError, spans_of
+from ..base.errors import InputError, line_spans
 from ..library.library import Library
 from ..motion.track import Track
-from ..synthesis.quality.moments import dribble_touches
-from ..synthesis.quality.played import Played, played_from_take
-from ..synthesis.quality.targets import target_of
+from ..synthesis.quality.moments import measure_dribble_touches
+from ..synthesis.quality.played import Playback, playback_from_take
+from ..synthesis.quality.targets import find_target
 from ..synthesis.take import Take
 from . import figures
 from .reference import View
 
 VERSION = 1
-DEEPEST = 30
+MAX_DEPTH = 30
 """Nesting depth that no report reaches."""
 
 SECONDS = ("load", "library", "search", "construct", "polish", "total")
@@ -38,24 +38,24 @@ def evaluate(take: Take, track: Track | None, library: Library | None) -> dict:
         The report as plain values for JSON, None where a value is unknown.
     """
     report = evaluate_played(
-        played_from_take(take), track=track, timeline=take.timeline, library=library, ik_miss=take.ik_miss,
-        asked=take.plan.timeline if take.plan else Timeline(),
+        playback_from_take(take), track=track, timeline=take.timeline, library=library, ik_miss=take.ik_miss,
+        requested=take.plan.timeline if take.plan else Timeline(),
     )
     seconds = {name: take.seconds.get(name) for name in (*SECONDS, *(s for s in take.seconds if s not in SECONDS))}
     warnings = list(dict.fromkeys((*take.warnings, *report["warnings"])))
     pins = [{"time_s": p.pin.time, "part": p.pin.part, "miss": p.miss} for p in take.pins]
-    out = {**report, "seed": take.seed, "seconds": rounded(seconds), "method": take.method, "warnings": warnings,
-           "warning_seconds": _seconds_of(warnings)}
+    out = {**report, "seed": take.seed, "seconds": round_values(seconds), "method": take.method, "warnings": warnings,
+           "warning_seconds": _list_message_spans(warnings)}
     if pins:
-        out["pins"] = rounded(pins)
+        out["pins"] = round_values(pins)
     if take.solved is not None:
-        out["dribbles"] = rounded(dribble_touches(played_from_take(take), take.dribbled, track))
+        out["dribbles"] = round_values(measure_dribble_touches(playback_from_take(take), take.dribble_touches, track))
     return out
 
 
 def evaluate_played(
-    played: Played, *, track: Track | None = None, timeline: Timeline | None = None, library: Library | None = None,
-    ik_miss: np.ndarray | None = None, asked: Timeline | None = None,
+    played: Playback, *, track: Track | None = None, timeline: Timeline | None = None, library: Library | None = None,
+    ik_miss: np.ndarray | None = None, requested: Timeline | None = None,
 ) -> dict:  # fmt: skip
     """Build the report of a motion with its sources, from memory or files (`played_from_take`, `played_from_tables`).
 
@@ -74,21 +74,21 @@ def evaluate_played(
     view = View(played, track, timeline, library)
     report = {
         "version": VERSION, "seed": None, "fps": played.motion.fps, "frames": len(played.motion),
-        "duration_s": played.motion.duration, "seconds": dict.fromkeys(SECONDS), **figures.place(view),
-        "keys": figures.keys(view), **figures.skate_and_ground(view), **figures.polish(view, ik_miss),
-        **figures.seams_and_loops(view), **figures.poses(view),
-        "annotation_similarity": figures.annotation_similarity(view),
-        "warnings": figures.warnings(view, ik_miss, asked),
+        "duration_s": played.motion.duration, "seconds": dict.fromkeys(SECONDS), **figures.measure_path_errors(view),
+        "keys": figures.measure_key_moments(view), **figures.measure_feet(view), **figures.measure_corrections(view, ik_miss),
+        **figures.measure_transitions(view), **figures.measure_poses(view),
+        "annotation_similarity": figures.measure_annotation_similarity(view),
+        "warnings": figures.list_warnings(view, ik_miss, requested),
     }
-    return {**rounded(report), "warning_seconds": _seconds_of(report["warnings"])}
+    return {**round_values(report), "warning_seconds": _list_message_spans(report["warnings"])}
 
 
-def _seconds_of(lines: list[str]) -> list[list[list[float]]]:
+def _list_message_spans(lines: list[str]) -> list[list[list[float]]]:
     """List for each line the spans [first, last] in seconds that it refers to."""
-    return [[[round(edge, 3) for edge in span] for span in spans_of(line)] for line in lines]
+    return [[[round(edge, 3) for edge in span] for span in line_spans(line)] for line in lines]
 
 
-def rounded(value):
+def round_values(value):
     """Round all floats to five significant digits and convert to plain values.
 
     Args:
@@ -97,9 +97,9 @@ def rounded(value):
         The same with NaN and infinity as None and numpy numbers as Python's.
     """
     if isinstance(value, Mapping):
-        return {key: rounded(entry) for key, entry in value.items()}
+        return {key: round_values(entry) for key, entry in value.items()}
     if isinstance(value, (list, tuple)):
-        return [rounded(entry) for entry in value]
+        return [round_values(entry) for entry in value]
     if isinstance(value, (bool, np.bool_)):
         return bool(value)
     if isinstance(value, (int, np.integer)):
@@ -109,7 +109,7 @@ def rounded(value):
     return value
 
 
-def table(reports: Mapping[str, dict]) -> str:
+def format_table(reports: Mapping[str, dict]) -> str:
     """Format reports side by side as a Markdown table.
 
     Args:
@@ -119,11 +119,11 @@ def table(reports: Mapping[str, dict]) -> str:
         moments
         are numbered from 1, texts (warnings) are counted.
     """
-    columns = {name: flat(report) for name, report in reports.items()}
+    columns = {name: flatten_report(report) for name, report in reports.items()}
     rows = dict.fromkeys(figure for column in columns.values() for figure in column)
     lines = ["| figure | " + " | ".join(columns) + " |", "|---|" + "---|" * len(columns)]
     for row in rows:
-        lines.append(f"| {row} | " + " | ".join(cell(column.get(row)) for column in columns.values()) + " |")
+        lines.append(f"| {row} | " + " | ".join(format_cell(column.get(row)) for column in columns.values()) + " |")
     return "\n".join(lines) + "\n"
 
 
@@ -138,14 +138,14 @@ def check_depth(value, where: object) -> None:
     """
     level, depth = [value], 0
     while level:
-        if depth > DEEPEST:
-            raise InputError(where, f"nested more than {DEEPEST} levels deep", "a report", "write the report again")
+        if depth > MAX_DEPTH:
+            raise InputError(where, f"nested more than {MAX_DEPTH} levels deep", "a report", "write the report again")
         inner = [list(one.values()) if isinstance(one, Mapping) else one for one in level
                  if isinstance(one, (Mapping, list))]  # fmt: skip
         level, depth = [entry for entries in inner for entry in entries], depth + 1
 
 
-def flat(report: Mapping) -> dict[str, Any]:
+def flatten_report(report: Mapping) -> dict[str, Any]:
     """Flatten a report to one row per figure.
 
     Args:
@@ -156,23 +156,23 @@ def flat(report: Mapping) -> dict[str, Any]:
         InputError: see `check_depth`.
     """
     check_depth(report, "report")
-    return _flat(report, "")
+    return _flatten(report, "")
 
 
-def _flat(value, name: str) -> dict[str, Any]:
+def _flatten(value, name: str) -> dict[str, Any]:
     if name == "warnings":
         return {name: len(value)}
     if name == "warning_seconds":
         return {}
     if isinstance(value, Mapping):
-        return {k: v for key, entry in value.items() for k, v in _flat(entry, f"{name}.{key}" if name else key).items()}
+        return {k: v for key, entry in value.items() for k, v in _flatten(entry, f"{name}.{key}" if name else key).items()}
     if isinstance(value, list) and any(isinstance(entry, Mapping) for entry in value):
         pairs = [(f"{name} {i}", entry) for i, entry in enumerate(value, 1)]
-        return {k: v for label, entry in pairs for k, v in _flat(entry, label).items()}
+        return {k: v for label, entry in pairs for k, v in _flatten(entry, label).items()}
     return {name: value}
 
 
-def cell(value) -> str:
+def format_cell(value) -> str:
     """Format one figure for a Markdown table.
 
     Args:
@@ -180,7 +180,7 @@ def cell(value) -> str:
     Returns:
         The text.
     """
-    return _shown(value, "-").replace("|", "\\|")
+    return _format_value(value, "-").replace("|", "\\|")
 
 
 class Row(NamedTuple):
@@ -209,21 +209,21 @@ def judge_figures(report: Mapping) -> Iterator[Row]:
     Returns:
         A row for each figure that is known or has a target.
     """
-    table = flat(report)
+    table = flatten_report(report)
     fps = float(report.get("fps") or 30.0)
     for name, value in table.items():
         group, _, leaf = name.rpartition(".")
-        target = target_of(name, fps)
+        target = find_target(name, fps)
         if leaf.startswith("source_") or leaf == "own" or (value is None and target is None):
             continue
         own = table.get(f"{group}.source_{leaf}", table.get(f"{group}.own") if leaf == "mean" else None)
-        met = target.met(value, table) if target and isinstance(value, (int, float)) else None
-        status = "" if met is None else ("met" if met else "missed")
-        aim = target.text(table) if target else ""
-        yield Row(name, _shown(value), _shown(own, ""), aim, status)
+        is_met = target.is_met(value, table) if target and isinstance(value, (int, float)) else None
+        status = "" if is_met is None else ("met" if is_met else "missed")
+        target_text = target.describe(table) if target else ""
+        yield Row(name, _format_value(value), _format_value(own, ""), target_text, status)
 
 
-def _shown(value, unknown: str = "–") -> str:
+def _format_value(value, unknown: str = "–") -> str:
     if value is None:
         return unknown
     if isinstance(value, list):

@@ -10,7 +10,7 @@ from typing import BinaryIO
 from ..base.errors import InputError
 
 
-def opened(path: str | os.PathLike, kind: str, largest: int | None = None) -> BinaryIO:
+def open_file(path: str | os.PathLike, kind: str, max_bytes: int | None = None) -> BinaryIO:
     """Open a file for reading bytes.
 
     Args:
@@ -28,14 +28,14 @@ def opened(path: str | os.PathLike, kind: str, largest: int | None = None) -> Bi
     except FileNotFoundError:
         raise InputError(path, "no such file", kind, "check the path") from None
     except (OSError, ValueError) as error:
-        raise _refused(path, kind, error) from None
-    if largest is not None and size > largest:
+        raise _build_read_error(path, kind, error) from None
+    if max_bytes is not None and size > max_bytes:
         handle.close()
-        raise InputError(path, f"has {size} bytes", f"{kind} of at most {largest}", "choose another file")
+        raise InputError(path, f"has {size} bytes", f"{kind} of at most {max_bytes}", "choose another file")
     return handle
 
 
-def content(path: str | os.PathLike, kind: str, largest: int | None = None) -> bytes:
+def read_bytes(path: str | os.PathLike, kind: str, max_bytes: int | None = None) -> bytes:
     """Read all bytes of a file.
 
     Args:
@@ -45,14 +45,14 @@ def content(path: str | os.PathLike, kind: str, largest: int | None = None) -> b
     Raises:
         InputError: if it cannot be read or is too large.
     """
-    with opened(path, kind, largest) as handle:
+    with open_file(path, kind, max_bytes) as handle:
         try:
             return handle.read()
         except OSError as error:
-            raise _refused(path, kind, error) from None
+            raise _build_read_error(path, kind, error) from None
 
 
-def utf8(path: str | os.PathLike, kind: str, largest: int | None = None) -> str:
+def read_utf8(path: str | os.PathLike, kind: str, max_bytes: int | None = None) -> str:
     """Read all text of a UTF-8 file, without a byte order mark.
 
     Args:
@@ -63,12 +63,12 @@ def utf8(path: str | os.PathLike, kind: str, largest: int | None = None) -> str:
         InputError: if it cannot be read, is too large or is not UTF-8.
     """
     try:
-        return content(path, kind, largest).decode("utf-8-sig")
+        return read_bytes(path, kind, max_bytes).decode("utf-8-sig")
     except UnicodeDecodeError:
         raise InputError(path, "is not UTF-8 text", kind, "choose another file, or save it as UTF-8") from None
 
 
-def _refused(path: str | os.PathLike, kind: str, error: OSError | ValueError) -> InputError:
+def _build_read_error(path: str | os.PathLike, kind: str, error: OSError | ValueError) -> InputError:
     if Path(path).is_dir():  # Windows reports a folder as a permission error
         return InputError(path, "is a folder", kind, "choose a file in it")
     return InputError(path, f"cannot be read ({getattr(error, 'strerror', None) or error})", f"{kind} that is readable")

@@ -16,10 +16,10 @@ from ..motion.track.match_data import REFEREE, Match, MatchPlayer
 NOT_PLAYED = frozenset(kind.name for kind in EVENT_KINDS if kind.touch == "none")
 """Kinds of events without a ball touch."""
 
-CERTAIN = frozenset(kind.name for kind in EVENT_KINDS if kind.touch == "certain")
+CERTAIN_TOUCHES = frozenset(kind.name for kind in EVENT_KINDS if kind.touch == "certain")
 """Kinds of events that are certainly a ball touch."""
 
-_OTHER = {"home": "away", "away": "home"}
+_OTHER_TEAM = {"home": "away", "away": "home"}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,12 +48,12 @@ class MatchEvent:
     part: str = ""
     side: str = ""
     details: tuple[str, ...] = ()
-    said: str = ""
+    original_text: str = ""
     success: bool | None = None
     place: tuple[float, ...] = (float("nan"), float("nan"))
 
     @property
-    def played(self) -> bool:
+    def may_be_touch(self) -> bool:
         """Whether the event is known to be, or may be, a ball touch."""
         return self.kind not in NOT_PLAYED
 
@@ -76,7 +76,7 @@ class MatchEvents:
 
 
 @dataclass(frozen=True)
-class Who:
+class EventPlayer:
     """A player as events name them.
 
     Attributes:
@@ -92,7 +92,7 @@ class Who:
     name: str = ""
 
     @classmethod
-    def spelled(cls, said: str, team: str = "") -> "Who":
+    def from_text(cls, text: str, team: str = "") -> "EventPlayer":
         """Parse one cell: "home_7", "away 11", "Player7", or a name or an id.
 
         Args:
@@ -101,17 +101,17 @@ class Who:
         Returns:
             The player.
         """
-        match = re.fullmatch(r"(?i)(home|away|player)?[ _-]*#?(\d{1,2})", said.strip())
+        match = re.fullmatch(r"(?i)(home|away|player)?[ _-]*#?(\d{1,2})", text.strip())
         ground = match[1].lower() if match and match[1] and match[1].lower() != "player" else team
-        return cls(said.strip(), ground, int(match[2]) if match else -1, said.strip())
+        return cls(text.strip(), ground, int(match[2]) if match else -1, text.strip())
 
     @property
-    def said(self) -> str:
+    def display_name(self) -> str:
         """The player's name for messages."""
         return self.name or f"{self.team} {self.number if self.number >= 0 else self.id}".strip()
 
 
-def same_players(everybody: Sequence[Who], match: Match | None) -> tuple[dict[Who, tuple[str, str]], list[str]]:
+def assign_players(event_players: Sequence[EventPlayer], match: Match | None) -> tuple[dict[EventPlayer, tuple[str, str]], list[str]]:
     """Assign the players of events to the players of a match.
 
     Feeds may exchange home and away: the assignment that finds more players is used.
@@ -125,31 +125,31 @@ def same_players(everybody: Sequence[Who], match: Match | None) -> tuple[dict[Wh
     if match is None:
         return {}, []
     players = [player for player in match.players if player.team != REFEREE]
-    straight = {who: found for who in everybody if (found := _found(who, players, who.team))}
-    turned = {who: found for who in everybody if (found := _found(who, players, _OTHER.get(who.team, "")))}
+    as_named = {who: found for who in event_players if (found := _find_player(who, players, who.team))}
+    exchanged = {who: found for who in event_players if (found := _find_player(who, players, _OTHER_TEAM.get(who.team, "")))}
     notes = []
-    best = straight
-    if len(turned) > len(straight):
-        best = turned
+    best = as_named
+    if len(exchanged) > len(as_named):
+        best = exchanged
         notes.append("home and away are exchanged in the events")
-    lost = [who.said for who in everybody if who not in best]
-    if lost:
-        notes.append(f"{len(lost)} of {len(everybody)} players of the events are not tracked: {', '.join(lost[:6])}")
+    missing = [who.display_name for who in event_players if who not in best]
+    if missing:
+        notes.append(f"{len(missing)} of {len(event_players)} players of the events are not tracked: {', '.join(missing[:6])}")
     return {who: (player.id, player.team) for who, player in best.items()}, notes
 
 
-def _found(who: Who, players: Sequence[MatchPlayer], team: str) -> MatchPlayer | None:
+def _find_player(who: EventPlayer, players: Sequence[MatchPlayer], team: str) -> MatchPlayer | None:
     """Find the one player who matches: by id, then within the team by number, then by name."""
     by_id = [player for player in players if player.id == who.id and team in ("", player.team)]
-    own = [player for player in players if team in ("", player.team)]
-    by_number = [player for player in own if who.number >= 0 and player.number == who.number] if team else []
-    name = _plain(who.name)
-    by_name = [player for player in own if name and _plain(player.name) == name]
-    by_last = [player for player in own if name and _plain(player.name).split()[-1:] == name.split()[-1:]]
+    teammates = [player for player in players if team in ("", player.team)]
+    by_number = [player for player in teammates if who.number >= 0 and player.number == who.number] if team else []
+    name = _normalize_name(who.name)
+    by_name = [player for player in teammates if name and _normalize_name(player.name) == name]
+    by_last = [player for player in teammates if name and _normalize_name(player.name).split()[-1:] == name.split()[-1:]]
     return next((found[0] for found in (by_id, by_number, by_name, by_last) if len(found) == 1), None)
 
 
-def _plain(name: str) -> str:
+def _normalize_name(name: str) -> str:
     """Convert a name to lower case without accents."""
     flat = unicodedata.normalize("NFKD", name)
     return " ".join("".join(letter for letter in flat if not unicodedata.combining(letter)).lower().split())

@@ -16,9 +16,9 @@ from ..annotation.event_words import KINDS
 from ..annotation.striking import BODY_PARTS
 from ..base.errors import InputError
 from ..motion.track.match_data import Match
-from .event_data import MatchEvent, Who
-from .tables import number, read_rows
-from .tracking.feed import Provider, find_provider, load_through_kloppy, read_head
+from .event_data import MatchEvent, EventPlayer
+from .tables import parse_number, read_rows
+from .tracking.feed import Provider, find_provider, load_with_kloppy, read_head
 from .tracking.match_arrays import USUAL_PITCH
 
 _TABLE_KINDS = {  # event types of plain tables -> kind
@@ -42,9 +42,9 @@ class EventProvider(Provider):
         has_foot_side: whether the data has left and right feet; without them kloppy says "right" for both.
     """
 
-    second: bytes = b""
+    second_pattern: bytes = b""
     read_table: Callable | None = None
-    tells_foot: bool = True
+    has_foot_side: bool = True
 
     def has_table(self, path: Path) -> bool:
         """Return whether a file of this provider is one for `read_table`.
@@ -55,7 +55,7 @@ class EventProvider(Provider):
         return self.read_table is not None and (not self.arguments or path.suffix.lower() == ".csv")
 
 
-def guessed_event_provider(path: Path) -> EventProvider:
+def detect_event_provider(path: Path) -> EventProvider:
     """Detect the provider of a file from its content.
 
     Args:
@@ -67,12 +67,12 @@ def guessed_event_provider(path: Path) -> EventProvider:
     """
     found = find_provider(path, EVENT_PROVIDERS)
     if found is None:
-        what = "unknown format" if read_head(path).strip() else "the file is empty"
-        raise InputError(path, what, f"events of one of {', '.join(EVENT_PROVIDERS)}", "choose the provider")
+        problem = "unknown format" if read_head(path).strip() else "the file is empty"
+        raise InputError(path, problem, f"events of one of {', '.join(EVENT_PROVIDERS)}", "choose the provider")
     return found
 
 
-def other_file(path: Path, provider: EventProvider, meta: str | os.PathLike | None) -> Path | None:
+def find_second_file(path: Path, provider: EventProvider, meta: str | os.PathLike | None) -> Path | None:
     """Find the lineups or metadata that a file of events needs.
 
     Args:
@@ -84,22 +84,22 @@ def other_file(path: Path, provider: EventProvider, meta: str | os.PathLike | No
     Raises:
         InputError: if it is missing.
     """
-    if not provider.second or provider.has_table(path):
+    if not provider.second_pattern or provider.has_table(path):
         return None
     if meta is not None:
         if not Path(meta).is_file():
             raise InputError(meta, "no such file", "lineups or metadata of the events", "check the path")
         return Path(meta)
-    names = [re.sub(re.escape(ours), theirs, path.name, flags=re.IGNORECASE) for ours, theirs in provider.renamed]
+    names = [re.sub(re.escape(old), new, path.name, flags=re.IGNORECASE) for old, new in provider.renamed]
     folders = [path.parent, path.parent.parent / "lineups"]
     names = [name for one in names for name in (one, str(Path(one).with_suffix(".xml")))] + [path.name]
-    for beside in (folder / name for folder in folders for name in names):
-        if beside.is_file() and beside != path:
-            return beside
-    fitting = [one for one in sorted(path.parent.glob("*.[xj]*")) if one != path
-               and re.match(provider.second, read_head(one))]  # fmt: skip
-    if len(fitting) == 1:
-        return fitting[0]
+    for candidate in (folder / name for folder in folders for name in names):
+        if candidate.is_file() and candidate != path:
+            return candidate
+    matching = [one for one in sorted(path.parent.glob("*.[xj]*")) if one != path
+               and re.match(provider.second_pattern, read_head(one))]  # fmt: skip
+    if len(matching) == 1:
+        return matching[0]
     expected = f"a file such as {names[0]}" if names[0] != path.name else "the provider's lineups or metadata"
     raise InputError(path, f"the second file for {provider.name} is missing", expected, "add it, or choose it")
 
@@ -116,14 +116,14 @@ def load_events(path: Path, provider: EventProvider, meta: Path | None):
     Raises:
         InputError: if kloppy is not installed or cannot read the files.
     """
-    known = {"events": str(path), "meta": str(meta)}
-    arguments = {key: known[name] for key, name in provider.arguments.items()}
+    files = {"events": str(path), "meta": str(meta)}
+    arguments = {key: files[name] for key, name in provider.arguments.items()}
     others = f" and their {meta.name}" if meta else ""
-    return load_through_kloppy(path, provider.name, provider.loader, arguments=arguments,
-                               form=f"{provider.name} events", others=others)
+    return load_with_kloppy(path, provider.name, provider.loader, arguments=arguments,
+                               expected=f"{provider.name} events", others=others)
 
 
-def pitch_size(match: Match | None) -> tuple[float, float]:
+def find_pitch_size(match: Match | None) -> tuple[float, float]:
     """Return the size of the tracking's pitch, or of a usual one.
 
     Args:
@@ -149,33 +149,33 @@ def read_plain_events(path: Path, match: Match | None):
     """
     rows = []
     for place, row in read_rows(path, ("time_s", "type", "player")):
-        time, period = number(row["time_s"], "time_s", place), 1
+        time, period = parse_number(row["time_s"], "time_s", place), 1
         if row.get("period"):
-            period = int(number(row["period"], "period", place))
+            period = int(parse_number(row["period"], "period", place))
         elif match is not None:
             half = max((half for half in match.halves if time >= half.start - 5.0), key=lambda half: half.start,
                        default=match.halves[0])  # fmt: skip
-            time, period = time - half.zero, half.number
-        said, detail = row["type"].lower(), row.get("detail", "").lower()
-        kind = said if said in KINDS else _TABLE_KINDS.get(said, "other")
+            time, period = time - half.clock_zero, half.number
+        event_type, detail = row["type"].lower(), row.get("detail", "").lower()
+        kind = event_type if event_type in KINDS else _TABLE_KINDS.get(event_type, "other")
         words = detail.replace("/", " ").replace("_", " ")
-        part = row.get("part", "").lower() or _part_in(words, said)
+        part = row.get("part", "").lower() or _find_part(words, event_type)
         if part and part not in BODY_PARTS:
             raise InputError(place, f"part {part!r}", f"one of {', '.join(BODY_PARTS)}, or blank")
         sides = f"{row.get('side', '')} {words}".split() if part == "foot" else ()
         side = next((one for one in ("left", "right") if one in sides), "")
-        details = ("throw-in",) if "throw in" in f"{said} {words}".replace("-", " ") else ()
-        xy = tuple(number(row.get(name, ""), name, place, blank=True) for name in ("x", "y"))
+        details = ("throw-in",) if "throw in" in f"{event_type} {words}".replace("-", " ") else ()
+        xy = tuple(parse_number(row.get(name, ""), name, place, blank=True) for name in ("x", "y"))
         success = {"true": True, "1": True, "false": False, "0": False}.get(row.get("success", "").lower())
         event = MatchEvent(time=time, period=period, player="", team="", kind=kind, part="hand" if details else part,
-                           side=side, details=details, said=said, success=success, place=xy)
-        rows.append((event, Who.spelled(row["player"]) if row["player"] else None))
+                           side=side, details=details, original_text=event_type, success=success, place=xy)
+        rows.append((event, EventPlayer.from_text(row["player"]) if row["player"] else None))
     return rows
 
 
-def _part_in(words: str, said: str) -> str:
+def _find_part(words: str, event_type: str) -> str:
     """Find the body part that a detail names."""
-    if _HEAD & {*words.split(), said}:
+    if _HEAD & {*words.split(), event_type}:
         return "head"
     return "foot" if "foot" in words else ""
 
@@ -193,22 +193,22 @@ def read_metrica_events(path: Path, match: Match | None):
     """
     rows = []
     needed = ("Team", "Type", "Subtype", "Period", "Start Time [s]", "From", "Start X", "Start Y")
-    length, width = pitch_size(match)
-    begins: dict[int, float] = {}
+    length, width = find_pitch_size(match)
+    period_starts: dict[int, float] = {}
     for place, row in read_rows(path, needed):
-        period = int(number(row["Period"], "Period", place))
-        time = number(row["Start Time [s]"], "Start Time [s]", place)
-        time -= begins.setdefault(period, 0.0 if period == 1 else time)
-        said = f"{row['Type']} {row['Subtype']}".strip().lower()
-        named = (row["Type"].lower(), "other")[row["Type"].lower() not in (*KINDS, *_TABLE_KINDS)]
-        kind = next((kind for word, kind in _METRICA_SUBTYPES.items() if word in said), _TABLE_KINDS.get(named, named))
-        part = "head" if "head" in said else "hand" if "throw in" in said else ""
-        details = ("throw-in",) * (part == "hand") + ("lost",) * (kind == "aerial" and "lost" in said)
-        x, y = (number(row[name], name, place, blank=True) for name in ("Start X", "Start Y"))
+        period = int(parse_number(row["Period"], "Period", place))
+        time = parse_number(row["Start Time [s]"], "Start Time [s]", place)
+        time -= period_starts.setdefault(period, 0.0 if period == 1 else time)
+        event_type = f"{row['Type']} {row['Subtype']}".strip().lower()
+        type_name = (row["Type"].lower(), "other")[row["Type"].lower() not in (*KINDS, *_TABLE_KINDS)]
+        kind = next((kind for word, kind in _METRICA_SUBTYPES.items() if word in event_type), _TABLE_KINDS.get(type_name, type_name))
+        part = "head" if "head" in event_type else "hand" if "throw in" in event_type else ""
+        details = ("throw-in",) * (part == "hand") + ("lost",) * (kind == "aerial" and "lost" in event_type)
+        x, y = (parse_number(row[name], name, place, blank=True) for name in ("Start X", "Start Y"))
         team = row["Team"].lower() if row["Team"].lower() in ("home", "away") else ""
         event = MatchEvent(time=time, period=period, player="", team=team, kind=kind, part=part, side="",
-                           details=details, said=said, success=None, place=((x - 0.5) * length, (0.5 - y) * width))
-        rows.append((event, Who.spelled(row["From"], team) if row["From"] else None))
+                           details=details, original_text=event_type, success=None, place=((x - 0.5) * length, (0.5 - y) * width))
+        rows.append((event, EventPlayer.from_text(row["From"], team) if row["From"] else None))
     return rows
 
 
@@ -221,24 +221,24 @@ _LINEUPS = (("events", "lineups"), ("event", "lineup"))
 EVENT_PROVIDERS: dict[str, EventProvider] = {record.name: record for record in (
     EventProvider(
         name="opta", title="Opta", files="F24 or F73 with F7", renamed=(("f24", "f7"), ("F24", "F7"), ("f73", "f7")),
-        patterns=(_XML + rb"(<!--.{0,400}?-->\s*)?<Games\b",), second=_XML + rb"<SoccerFeed\b",
+        patterns=(_XML + rb"(<!--.{0,400}?-->\s*)?<Games\b",), second_pattern=_XML + rb"<SoccerFeed\b",
         arguments={"f24_data": "events", "f7_data": "meta"},
     ),
     EventProvider(
         name="sportec", title="Sportec (DFL)", files="events with the tracking's metadata",
         patterns=(_XML + rb"<PutDataRequest\b.{0,2000}<Event\b",),
-        second=_XML + rb"<PutDataRequest\b.{0,900}<MatchInf", loader="load_event", arguments=_WITH_METADATA,
+        second_pattern=_XML + rb"<PutDataRequest\b.{0,900}<MatchInf", loader="load_event", arguments=_WITH_METADATA,
         renamed=(("events", "meta"), ("events_raw", "matchinformation")),
     ),
     EventProvider(
         name="statsbomb", title="StatsBomb", files="events with their lineups", renamed=_LINEUPS,
-        patterns=(rb'(?s)\s*\[\s*\{.{0,600}"possession"',), second=rb'(?s)\s*\[\s*\{.{0,300}"lineup"',
+        patterns=(rb'(?s)\s*\[\s*\{.{0,600}"possession"',), second_pattern=rb'(?s)\s*\[\s*\{.{0,300}"lineup"',
         arguments=_WITH_LINEUPS,
     ),
     EventProvider(
         name="metrica", title="Metrica", files="events with the tracking's metadata; CSV alone",
         patterns=(rb"Team,Type,Subtype,Period", rb'(?s)\s*\{\s*"data"\s*:\s*\[.{0,600}"subtypes"'),
-        second=_XML + rb"<main\b.{0,900}<Metadata\b", loader="load_event", arguments=_WITH_METADATA,
+        second_pattern=_XML + rb"<main\b.{0,900}<Metadata\b", loader="load_event", arguments=_WITH_METADATA,
         renamed=(("events", "metadata"), ("events.json", "metadata.xml")), read_table=read_metrica_events,
     ),
     EventProvider(
@@ -252,13 +252,13 @@ EVENT_PROVIDERS: dict[str, EventProvider] = {record.name: record for record in (
     EventProvider(
         name="statsperform", title="Stats Perform", files="MA3 with MA1", renamed=(("ma3", "ma1"), ("MA3", "MA1")),
         patterns=(_XML + rb"<matchEvents\b", rb'(?s)\s*\{\s*"matchInfo"'),
-        second=_XML + rb'(<match\b|\{.{0,9000}"(lineUp|liveData)")', loader="load_event",
+        second_pattern=_XML + rb'(<match\b|\{.{0,9000}"(lineUp|liveData)")', loader="load_event",
         arguments={"ma3_data": "events", "ma1_data": "meta"},
     ),
     EventProvider(
         name="impect", title="Impect", files="events with their lineups", renamed=_LINEUPS, arguments=_WITH_LINEUPS,
-        patterns=(rb'(?s)\s*\[\s*\{.{0,400}"gameTimeInSec"',), second=rb'(?s)\s*\{.{0,900}"squadHome"',
-        tells_foot=False,
+        patterns=(rb'(?s)\s*\[\s*\{.{0,400}"gameTimeInSec"',), second_pattern=rb'(?s)\s*\{.{0,900}"squadHome"',
+        has_foot_side=False,
     ),
     EventProvider(
         name="csv", title="CSV",

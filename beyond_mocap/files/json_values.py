@@ -8,7 +8,7 @@ import math
 from ..base.errors import InputError
 
 
-def object_of(said: str, name: str, page: str):
+def parse_json(text: str, name: str, page: str):
     """Parse a JSON text, without duplicate names and without NaN.
 
     Args:
@@ -21,14 +21,14 @@ def object_of(said: str, name: str, page: str):
         InputError: with line and column, if the text is invalid.
     """
     try:
-        return json.loads(said, object_pairs_hook=_once, parse_constant=_no_number)
+        return json.loads(text, object_pairs_hook=_build_unique_object, parse_constant=_reject_constant)
     except json.JSONDecodeError as error:
         raise InputError(f"{name}:{error.lineno}:{error.colno}", error.msg, "JSON", f"see {page}") from None
     except (ValueError, RecursionError) as error:
         raise InputError(name, str(error) or "nested too deeply", "JSON", f"see {page}") from None
 
 
-def _once(pairs) -> dict:
+def _build_unique_object(pairs) -> dict:
     """Build an object in which no name is repeated."""
     out = dict(pairs)
     if len(out) != len(pairs):
@@ -37,8 +37,8 @@ def _once(pairs) -> dict:
     return out
 
 
-def _no_number(said: str):
-    raise ValueError(f"{said} is not a number")
+def _reject_constant(constant: str):
+    raise ValueError(f"{constant} is not a number")
 
 
 def check_object(value, where: str) -> None:
@@ -51,7 +51,7 @@ def check_object(value, where: str) -> None:
         InputError: if it is not.
     """
     if not isinstance(value, dict):
-        raise InputError(where, shown(value), "an object {...}")
+        raise InputError(where, describe_value(value), "an object {...}")
 
 
 def check_names(value, where: str, known, needed) -> None:
@@ -71,10 +71,10 @@ def check_names(value, where: str, known, needed) -> None:
             raise InputError(where, f"no {name!r}", f"{', '.join(needed)}")
     for name in value:
         if name not in known:
-            raise InputError(where, shown(name), f"one of {', '.join(sorted(known))}", "check the spelling")
+            raise InputError(where, describe_value(name), f"one of {', '.join(sorted(known))}", "check the spelling")
 
 
-def number(value, where: str) -> float:
+def check_number(value, where: str) -> float:
     """Check that a value is a finite number.
 
     Args:
@@ -86,15 +86,15 @@ def number(value, where: str) -> float:
         InputError: if it is not.
     """
     try:
-        good = isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
+        is_valid = isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
     except OverflowError:
-        good = False
-    if not good:
-        raise InputError(where, shown(value), "a number")
+        is_valid = False
+    if not is_valid:
+        raise InputError(where, describe_value(value), "a number")
     return float(value)
 
 
-def whole_number(value, where: str) -> int:
+def check_whole_number(value, where: str) -> int:
     """Check that a value is a whole number.
 
     Args:
@@ -105,12 +105,12 @@ def whole_number(value, where: str) -> int:
     Raises:
         InputError: if it is not.
     """
-    if isinstance(value, bool) or not isinstance(value, int) and number(value, where) != int(value):
-        raise InputError(where, shown(value), "a whole number")
+    if isinstance(value, bool) or not isinstance(value, int) and check_number(value, where) != int(value):
+        raise InputError(where, describe_value(value), "a whole number")
     return int(value)
 
 
-def truth(value, where: str) -> bool:
+def check_bool(value, where: str) -> bool:
     """Check that a value is true or false.
 
     Args:
@@ -122,11 +122,11 @@ def truth(value, where: str) -> bool:
         InputError: if it is not.
     """
     if not isinstance(value, bool):
-        raise InputError(where, shown(value), "true or false")
+        raise InputError(where, describe_value(value), "true or false")
     return value
 
 
-def text(value, where: str) -> str:
+def check_text(value, where: str) -> str:
     """Check that a value is a text.
 
     Args:
@@ -138,11 +138,11 @@ def text(value, where: str) -> str:
         InputError: if it is not.
     """
     if not isinstance(value, str):
-        raise InputError(where, shown(value), "a text")
+        raise InputError(where, describe_value(value), "a text")
     return value
 
 
-def numbers(value, where: str, count: int, expected: str) -> tuple:
+def check_numbers(value, where: str, count: int, expected: str) -> tuple:
     """Check that a value is a list of finite numbers.
 
     Args:
@@ -156,11 +156,11 @@ def numbers(value, where: str, count: int, expected: str) -> tuple:
         InputError: if it is not.
     """
     if not isinstance(value, (list, tuple)) or len(value) != count:
-        raise InputError(where, shown(value), expected)
-    return tuple(number(one, where) for one in value)
+        raise InputError(where, describe_value(value), expected)
+    return tuple(check_number(one, where) for one in value)
 
 
-def entries(value, where: str) -> list:
+def check_list(value, where: str) -> list:
     """Check that a value is a list.
 
     Args:
@@ -172,11 +172,11 @@ def entries(value, where: str) -> list:
         InputError: if it is not.
     """
     if not isinstance(value, (list, tuple)):
-        raise InputError(where, shown(value), "a list [...]")
+        raise InputError(where, describe_value(value), "a list [...]")
     return list(value)
 
 
-def shown(value) -> str:
+def describe_value(value) -> str:
     """Format a value as JSON, shortened to 40 characters, for errors.
 
     Args:
@@ -185,7 +185,7 @@ def shown(value) -> str:
         The text.
     """
     try:
-        said = json.dumps(value, ensure_ascii=True, default=str)
+        formatted = json.dumps(value, ensure_ascii=True, default=str)
     except RecursionError:  # a value that can just be read may be too deep to write
         return "a value nested too deeply"
-    return said if len(said) <= 40 else said[:37] + "..."
+    return formatted if len(formatted) <= 40 else formatted[:37] + "..."

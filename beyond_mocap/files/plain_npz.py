@@ -17,14 +17,14 @@ from ..base.errors import InputError
 HEADER = "header"
 """Name of the array that holds a text as UTF-8 bytes."""
 
-_BROKEN = (zipfile.BadZipFile, zlib.error, struct.error, EOFError, OSError, ValueError, KeyError, IndexError, TypeError,
+_READ_ERRORS = (zipfile.BadZipFile, zlib.error, struct.error, EOFError, OSError, ValueError, KeyError, IndexError, TypeError,
            AttributeError, NotImplementedError, RuntimeError, OverflowError, MemoryError, SyntaxError,
            tokenize.TokenError)  # fmt: skip
 """Errors of zipfile and numpy for truncated, damaged or malicious files."""
 
 
-def plain_arrays(
-    data: bytes, kind: str, types: tuple[np.dtype, ...], unpacked: int, others: Mapping[str, str] | None = None
+def read_plain_arrays(
+    data: bytes, kind: str, types: tuple[np.dtype, ...], max_bytes: int, other_kinds: Mapping[str, str] | None = None
 ) -> dict[str, np.ndarray]:
     """Read all arrays of a file, with finite numbers only.
 
@@ -42,23 +42,23 @@ def plain_arrays(
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             members = archive.infolist()
-            if sum(member.file_size for member in members) > unpacked:
-                raise InputError("the arrays", f"more than {unpacked:,} bytes", kind, "choose another file")
+            if sum(member.file_size for member in members) > max_bytes:
+                raise InputError("the arrays", f"more than {max_bytes:,} bytes", kind, "choose another file")
             names = [member.filename.removesuffix(".npy") for member in members]
             if HEADER not in names:
-                found = (what for name, what in (others or {}).items() if name in names)
+                found = (what for name, what in (other_kinds or {}).items() if name in names)
                 raise InputError("the file", next(found, "an .npz with other content"), kind, "choose another file")
             if len(set(names)) < len(names):
                 raise InputError("the arrays", "two have the same name", kind, "choose another file")
-            return {name: _array(archive.read(member), name, types) for name, member in zip(names, members)}
+            return {name: _read_array(archive.read(member), name, types) for name, member in zip(names, members)}
     except InputError:
         raise
-    except _BROKEN:
+    except _READ_ERRORS:
         raise InputError("the file", "damaged, truncated or of another kind", kind,
                          "copy it again or choose another file") from None  # fmt: skip
 
 
-def _array(data: bytes, name: str, types: tuple[np.dtype, ...]) -> np.ndarray:
+def _read_array(data: bytes, name: str, types: tuple[np.dtype, ...]) -> np.ndarray:
     """Read one array from the bytes of a .npy.
 
     Only plain numbers of exactly the stated count are accepted, so neither objects nor false sizes are trusted.
@@ -79,7 +79,7 @@ def _array(data: bytes, name: str, types: tuple[np.dtype, ...]) -> np.ndarray:
     return array
 
 
-def header_text(arrays: dict[str, np.ndarray], page: str) -> str:
+def take_header_text(arrays: dict[str, np.ndarray], page: str) -> str:
     """Take the text of a file out of its arrays.
 
     Args:

@@ -17,16 +17,16 @@ from types import MappingProxyType
 import numpy as np
 
 from ..base.errors import InputError
-from ..motion.skeleton import frozen_array
+from ..motion.skeleton import freeze_array
 from ..motion.track.ball_path import BallPath
-from .content import content
+from .content import read_bytes
 from .whole import atomic_write
 
 BALL_COLUMNS = ("time_s", "x_m", "y_m", "z_m", "measured")
-_FARTHEST = 1e4  # metres; larger coordinates are in a wrong unit
+_MAX_METRES = 1e4  # metres; larger coordinates are in a wrong unit
 _SEPARATORS = {";": "semicolons", "\t": "tabs", "|": "bars", ":": "colons", " ": "spaces"}
 _WITH_COMMA = re.compile(r"^([+-]?\d*),(\d*(?:[eE][+-]?\d+)?)$")
-_LATEST = 1e11  # seconds: feeds count from kick-off, some from 1970
+_MAX_SECONDS = 1e11  # seconds: feeds count from kick-off, some from 1970
 
 TOUCH_COLUMNS = (
     "time_s", "uncertainty_s", "player", "part", "kind", "x_m", "y_m", "z_m",
@@ -42,7 +42,7 @@ def write_ball(path: str | os.PathLike, ball: BallPath) -> None:
         ball: the ball's trajectory.
     """
     rows = zip(ball.times, *np.asarray(ball.positions).T, np.asarray(ball.measured).astype(int))
-    text = format_csv(BALL_COLUMNS, ((f"{t:.6f}", _metres(x), _metres(y), _metres(z), m) for t, x, y, z, m in rows))
+    text = format_csv(BALL_COLUMNS, ((f"{t:.6f}", _format_metres(x), _format_metres(y), _format_metres(z), m) for t, x, y, z, m in rows))
     atomic_write(path, text)
 
 
@@ -59,7 +59,7 @@ def read_ball(path: str | os.PathLike) -> BallPath:
     rows = list(read_rows(path, BALL_COLUMNS))
     positions = np.column_stack([parse_column(rows, name, blank=True) for name in BALL_COLUMNS[1:4]])
     times, measured = parse_column(rows, "time_s"), parse_flags(rows, "measured")
-    return BallPath(frozen_array(times), frozen_array(positions), frozen_array(measured, bool))
+    return BallPath(freeze_array(times), freeze_array(positions), freeze_array(measured, bool))
 
 
 def write_touches(path: str | os.PathLike, touches: Iterable) -> None:
@@ -84,10 +84,10 @@ def write_report(path: str | os.PathLike, report: dict) -> None:
         path: the file.
         report: the report.
     """
-    atomic_write(path, json.dumps(plain(report), indent=1, ensure_ascii=False, allow_nan=False) + "\n")
+    atomic_write(path, json.dumps(to_plain(report), indent=1, ensure_ascii=False, allow_nan=False) + "\n")
 
 
-def plain(value):
+def to_plain(value):
     """Convert a value to JSON's own types.
 
     Args:
@@ -96,13 +96,13 @@ def plain(value):
         The same with arrays, tuples and sets as lists, numpy numbers as numbers, NaN and infinity as None.
     """
     if isinstance(value, dict):
-        return {str(key): plain(item) for key, item in value.items()}
+        return {str(key): to_plain(item) for key, item in value.items()}
     if isinstance(value, np.ndarray):
-        return plain(value.tolist())
+        return to_plain(value.tolist())
     if isinstance(value, (list, tuple, set, frozenset)):
-        return [plain(item) for item in (sorted(value) if isinstance(value, (set, frozenset)) else value)]
+        return [to_plain(item) for item in (sorted(value) if isinstance(value, (set, frozenset)) else value)]
     if isinstance(value, np.generic):
-        return plain(value.item())
+        return to_plain(value.item())
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return value if value is None or isinstance(value, (bool, int, float, str)) else str(value)
@@ -126,11 +126,11 @@ def read_rows(
     Raises:
         InputError: if the file is missing, binary or empty, lacks a column, or a row has too few cells.
     """
-    text = _text(path)
-    separator = next((one for one in separators if not _missing(_header(text, one, others), required)), ",")
+    text = _read_text(path)
+    separator = next((one for one in separators if not _find_missing(_parse_header(text, one, others), required)), ",")
     reader = csv.reader(io.StringIO(text, newline=""), delimiter=separator)
     try:
-        names = _named(next(reader, []), others)
+        names = _normalize_names(next(reader, []), others)
         _check_header(names, required, path)
         for cells in reader:
             place = f"{path}:{reader.line_num}"
@@ -147,7 +147,7 @@ def read_rows(
         raise InputError(f"{path}:{reader.line_num}", str(error), "comma-separated values") from None
 
 
-def number(text: str, name: str, place: str, blank: bool = False) -> float:
+def parse_number(text: str, name: str, place: str, blank: bool = False) -> float:
     """Parse a finite number from a cell.
 
     Args:
@@ -168,15 +168,15 @@ def number(text: str, name: str, place: str, blank: bool = False) -> float:
         value = math.nan
     if not math.isfinite(value):
         raise InputError(place, f"{name} {text!r}", "a number", "correct the cell" + " or leave it blank" * blank)
-    if name.endswith("_m") and abs(value) > _FARTHEST:
+    if name.endswith("_m") and abs(value) > _MAX_METRES:
         raise InputError(place, f"{name} {text}", "metres from the pitch's centre", "check the unit")
-    if name == "time_s" and abs(value) > _LATEST:
+    if name == "time_s" and abs(value) > _MAX_SECONDS:
         raise InputError(place, f"{name} {text}", "seconds", "check the unit")
     return value
 
 
-def _text(path: str | os.PathLike) -> str:
-    data = content(path, "a CSV file")
+def _read_text(path: str | os.PathLike) -> str:
+    data = read_bytes(path, "a CSV file")
     if not data.strip():
         raise InputError(path, "the file is empty", "a CSV file with a header", "export it again")
     try:
@@ -187,28 +187,28 @@ def _text(path: str | os.PathLike) -> str:
         raise InputError(path, "binary content", "a CSV file", "export it as UTF-8 text") from None
 
 
-def _header(text: str, separator: str, others: Mapping[str, str]) -> list[str]:
+def _parse_header(text: str, separator: str, others: Mapping[str, str]) -> list[str]:
     """Parse the names of the columns with this separator."""
     try:
-        return _named(next(csv.reader(io.StringIO(text, newline=""), delimiter=separator), []), others)
+        return _normalize_names(next(csv.reader(io.StringIO(text, newline=""), delimiter=separator), []), others)
     except csv.Error:
         return []
 
 
-def _named(names: Sequence[str], others: Mapping[str, str]) -> list[str]:
+def _normalize_names(names: Sequence[str], others: Mapping[str, str]) -> list[str]:
     """Strip the names of columns; one of `others` becomes its alternative unless that exists itself."""
     names = [name.strip() for name in names]
     return [others[name] if name in others and others[name] not in names else name for name in names]
 
 
-def _missing(names: Sequence[str], required: Sequence[str]) -> list[str]:
+def _find_missing(names: Sequence[str], required: Sequence[str]) -> list[str]:
     return [name for name in required if name not in names]
 
 
 def _check_header(names: list[str], required: Sequence[str], path) -> None:
-    if missing := _missing(names, required):
-        shown = ",".join(names)[:80]
-        found = f"no column {', '.join(missing)} in {shown!r}"
+    if missing := _find_missing(names, required):
+        listed = ",".join(names)[:80]
+        found = f"no column {', '.join(missing)} in {listed!r}"
         if len(names) == 1 and (separator := next((one for one in _SEPARATORS if one in names[0]), None)):
             found += f", which is separated by {_SEPARATORS[separator]}"
         raise InputError(f"{path}:1", found, f"a header with {','.join(required)}", "rename the columns, use commas")
@@ -228,7 +228,7 @@ def parse_column(rows, name: str, blank: bool = False) -> np.ndarray:
     Raises:
         InputError: with the line, if a cell is invalid.
     """
-    return np.array([number(row[name], name, place, blank) for place, row in rows], dtype=float)
+    return np.array([parse_number(row[name], name, place, blank) for place, row in rows], dtype=float)
 
 
 def parse_flags(rows, name: str) -> np.ndarray:
@@ -248,7 +248,7 @@ def parse_flags(rows, name: str) -> np.ndarray:
     return np.array([row[name] == "1" for _, row in rows], dtype=bool)
 
 
-def _metres(value: float) -> str:
+def _format_metres(value: float) -> str:
     return f"{value:.4f}" if math.isfinite(value) else ""
 
 

@@ -13,7 +13,7 @@ from ..base.errors import InputError
 
 
 @contextlib.contextmanager
-def beside(path: str | os.PathLike, ending: str = ".part") -> Iterator[Path]:
+def atomic_path(path: str | os.PathLike, ending: str = ".part") -> Iterator[Path]:
     """Context manager: a temporary path beside `path` to write to, which replaces `path` if the block succeeds.
 
     If the block fails, the temporary file is removed. A symbolic link stays; the file that it points to is written.
@@ -27,20 +27,20 @@ def beside(path: str | os.PathLike, ending: str = ".part") -> Iterator[Path]:
     path = Path(os.path.realpath(path)) if os.path.islink(path) else Path(path)
     if path.exists() and not path.is_file() and not path.is_dir():  # renaming would replace a device
         raise InputError(path, "is a device or a pipe", "a regular file", "choose another file")
-    part = path.with_name(f".{path.name}.{os.getpid()}.{threading.get_ident()}{ending}")
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.{threading.get_ident()}{ending}")
     try:
-        yield part
-        os.replace(part, path)
+        yield temporary
+        os.replace(temporary, path)
     except OSError as error:
-        what = f"cannot be written ({error.strerror or error})"
-        raise InputError(path, what, "a writable folder", "choose another place") from None
+        problem = f"cannot be written ({error.strerror or error})"
+        raise InputError(path, problem, "a writable folder", "choose another place") from None
     finally:
         with contextlib.suppress(OSError):
-            part.unlink()
+            temporary.unlink()
 
 
 @contextlib.contextmanager
-def whole_folder(path: str | os.PathLike) -> Iterator[Path]:
+def atomic_folder(path: str | os.PathLike) -> Iterator[Path]:
     """Context manager: a hidden folder in `path` to write to; its content moves up into `path` if the block succeeds.
 
     If the block fails, the content is removed, and `path` too if it was new. Parent folders are created.
@@ -51,26 +51,26 @@ def whole_folder(path: str | os.PathLike) -> Iterator[Path]:
         InputError: if `path` is not empty or cannot be written.
     """
     path = Path(path)
-    part, new = path / f".{os.getpid()}.{threading.get_ident()}.part", not path.exists()
-    if not new and not path.is_dir():
+    temporary, is_new = path / f".{os.getpid()}.{threading.get_ident()}.part", not path.exists()
+    if not is_new and not path.is_dir():
         raise InputError(path, "is a file", "an empty or new folder", "choose another place")
-    if not new and (found := next(path.iterdir(), None)):
-        what = f"the folder is not empty ({found.name})"
-        raise InputError(path, what, "an empty or new folder", "choose another place")
+    if not is_new and (found := next(path.iterdir(), None)):
+        problem = f"the folder is not empty ({found.name})"
+        raise InputError(path, problem, "an empty or new folder", "choose another place")
     try:
-        part.mkdir(parents=True)
-        yield part
-        for one in sorted(part.iterdir()):
+        temporary.mkdir(parents=True)
+        yield temporary
+        for one in sorted(temporary.iterdir()):
             os.replace(one, path / one.name)
     except OSError as error:
-        what = f"cannot be written ({error.strerror or error})"
-        raise InputError(path, what, "a writable folder", "choose another place") from None
+        problem = f"cannot be written ({error.strerror or error})"
+        raise InputError(path, problem, "a writable folder", "choose another place") from None
     except InputError as error:  # name the file by its final path
-        where, _, rest = str(error).replace(str(part), str(path)).partition(": ")
-        raise InputError(where, rest) from None
+        where, _, message = str(error).replace(str(temporary), str(path)).partition(": ")
+        raise InputError(where, message) from None
     finally:
-        shutil.rmtree(part, ignore_errors=True)
-        if new:
+        shutil.rmtree(temporary, ignore_errors=True)
+        if is_new:
             with contextlib.suppress(OSError):  # not empty: the block succeeded
                 path.rmdir()
 
@@ -87,5 +87,5 @@ def atomic_write(path: str | os.PathLike, content: str | bytes) -> None:
     Raises:
         InputError: see `atomic_path`.
     """
-    with beside(path) as part:
-        part.write_bytes(content.encode("utf-8", "backslashreplace") if isinstance(content, str) else content)
+    with atomic_path(path) as temporary:
+        temporary.write_bytes(content.encode("utf-8", "backslashreplace") if isinstance(content, str) else content)

@@ -14,17 +14,17 @@ from difflib import get_close_matches
 import numpy as np
 
 from ..annotation import DISCRETE, LOCOMOTION
-from ..annotation.gaits import direction_words, wanted_offset
+from ..annotation.gaits import choose_directions, compute_heading_offset
 from ..annotation.vocabulary import DIRECTIONS
 from ..base.errors import InputError
 from ..motion.track import SampledTrack
 from .clip import Clip
-from .library import Library, gait_word
+from .library import Library, find_gait_label
 
 _WHERE = "chosen gaits"
 
 
-def automatic_words(library: Library, gait: np.ndarray, track: SampledTrack) -> list[tuple[str, ...]]:
+def build_automatic_labels(library: Library, gait: np.ndarray, track: SampledTrack) -> list[tuple[str, ...]]:
     """Build the labels of each frame's gait.
 
     Where the library has the gait in the direction in which a body that faces the ball would move (`annotation.gaits`),
@@ -40,14 +40,14 @@ def automatic_words(library: Library, gait: np.ndarray, track: SampledTrack) -> 
     """
     recorded = {row.words for clip in library.clips for row in clip.annotations}
     words: list[tuple[str, ...]] = []
-    for number, direction in zip(gait, direction_words(wanted_offset(track), track.fps)):
+    for number, direction in zip(gait, choose_directions(compute_heading_offset(track), track.fps)):
         own = library.gaits[number].words
-        turned = tuple(direction if word == DIRECTIONS[0] else word for word in own)
-        words.append(turned if turned in recorded else own)
+        in_direction = tuple(direction if word == DIRECTIONS[0] else word for word in own)
+        words.append(in_direction if in_direction in recorded else own)
     return words
 
 
-def with_chosen_gaits(library: Library, chosen: Mapping[str, str]) -> Library:
+def apply_chosen_gaits(library: Library, chosen: Mapping[str, str]) -> Library:
     """Apply the user's choice of clips for gaits.
 
     The rows of that label in the chosen clip alone define the gait's speed, and no other clip's locomotion carries the
@@ -65,7 +65,7 @@ def with_chosen_gaits(library: Library, chosen: Mapping[str, str]) -> Library:
     if not chosen:
         return library
     for word, path in chosen.items():
-        _check(library, word, path)
+        _check_choice(library, word, path)
     frames = library.frames
     actions = [i for i, word in enumerate(frames.vocabulary) if word in DISCRETE]
     locomotion = ~frames.words[:, actions].any(axis=1)
@@ -73,21 +73,21 @@ def with_chosen_gaits(library: Library, chosen: Mapping[str, str]) -> Library:
     for word, path in chosen.items():
         others = np.array([clip.path != path for clip in library.clips])[frames.clip]
         words[others & locomotion, frames.vocabulary.index(word)] = False
-    out = replace(library, frames=replace(frames, words=words), chosen=tuple(chosen.items()))
+    out = replace(library, frames=replace(frames, words=words), chosen_gaits=tuple(chosen.items()))
     _check_order(out)
     return out
 
 
-def _check(library: Library, word: str, path: str) -> None:
+def _check_choice(library: Library, word: str, path: str) -> None:
     """Check one choice: a gait, a clip of the library, and a row of that gait alone."""
     if word not in LOCOMOTION:
         raise InputError(_WHERE, f"{word!r} as a gait", f"one of {', '.join(LOCOMOTION)}")
-    clips = {clip.path: clip for clip in library.clips if not clip.made}
+    clips = {clip.path: clip for clip in library.clips if not clip.is_synthetic}
     if path not in clips:
         near = get_close_matches(path, clips, 3, 0.3) or sorted(clips)[:3]
         raise InputError(_WHERE, f"no clip {path!r} in {library.folder}", f"a path below it, such as {', '.join(near)}")
-    if not _shows(clips[path], word):
-        others = [other for other, clip in clips.items() if _shows(clip, word)][:3]
+    if not _has_gait(clips[path], word):
+        others = [other for other, clip in clips.items() if _has_gait(clip, word)][:3]
         raise InputError(
             _WHERE, f"{path} has no row with only the label {word!r}",
             f"a clip that has one, such as {', '.join(others)}" if others else "a clip that has one",
@@ -95,15 +95,15 @@ def _check(library: Library, word: str, path: str) -> None:
         )
 
 
-def _shows(clip: Clip, word: str) -> bool:
-    return any(gait_word(row) == word for row in clip.annotations)
+def _has_gait(clip: Clip, word: str) -> bool:
+    return any(find_gait_label(row) == word for row in clip.annotations)
 
 
 def _check_order(library: Library) -> None:
     """Check that the chosen clips' speeds are in the gaits' own order, which thresholds need."""
-    speeds = {gait.word: gait.speed for gait in library.gaits}
-    lost = [word for word, _ in library.chosen if word not in speeds]
-    if lost:
-        told = ", ".join(f"{word} {speed:.1f} m/s" for word, speed in speeds.items())
-        what = f"the clip for {lost[0]} is not faster than a slower gait ({told})"
+    speeds = {gait.label: gait.speed for gait in library.gaits}
+    dropped = [word for word, _ in library.chosen_gaits if word not in speeds]
+    if dropped:
+        speeds_text = ", ".join(f"{word} {speed:.1f} m/s" for word, speed in speeds.items())
+        what = f"the clip for {dropped[0]} is not faster than a slower gait ({speeds_text})"
         raise InputError(_WHERE, what, "another clip for one of them")

@@ -9,19 +9,19 @@ from pathlib import Path
 from typing import Callable, Iterable
 
 from ..annotation import ClipAnnotation
-from ..base.errors import Cancelled, InputError
+from ..base.errors import UserCancelledError, InputError
 from ..files.bvh import bvh
 from ..synthetic.landing import ends_in_flight
 from . import cache, landings, one_skeleton, repair
 from .cache import write_synthetic_clips
 from .clip import Clip
 from .clusters import BLOCK_LENGTHS, cluster_blocks
-from .features import FPS, describe_clips
+from .features import FPS, build_frames
 from .library import Library, Progress
-from .scan import Annotations, readable_clips
+from .scan import Annotations, find_readable_clips
 
 
-def build(
+def build_library(
     folder: str | Path, *, rebuild: bool = False, cache_dir: str | Path | None = None,
     skeleton: str | Path | None = None, unit: float | None = None, seed: int = 0, threads: int = 1,
     progress: Progress | None = None, cancelled: Callable[[], bool] | None = None,
@@ -49,57 +49,57 @@ def build(
     """
     folder = Path(folder)
     report = progress or (lambda fraction, text: None)
-    place, where = cache.place(folder, cache_dir)
-    paths, conversions, waiting = readable_clips(folder, place)
-    files = [conversions.readable(path) for path in paths]
+    place, cache_note = cache.find_cache_folder(folder, cache_dir)
+    paths, conversions, waiting = find_readable_clips(folder, place)
+    files = [conversions.find_readable_file(path) for path in paths]
     annotations = Annotations(folder, paths)
-    chosen = Path(skeleton) if skeleton else None
-    key = cache.fingerprint(folder, files, annotations.sources(paths), chosen, unit=unit, seed=seed)
+    skeleton_file = Path(skeleton) if skeleton else None
+    key = cache.compute_fingerprint(folder, files, annotations.list_sources(paths), skeleton_file, unit=unit, seed=seed)
     if not rebuild:
         report(0.0, "Reading the cache")
-        found = cache.load(place, key)
+        found = cache.load_library(place, key)
         if found is not None:
-            write_synthetic_clips(place, _completed(found["clips"]), missing_only=True)
+            write_synthetic_clips(place, _list_completed(found["clips"]), missing_only=True)
             found["notes"] += tuple(waiting)
-            return Library(folder=str(folder), kept=(place, key), **found)
-    notes: list[str] = [where] if where else []
-    clips = _read_clips(folder, paths, files, annotations=annotations, chosen=chosen, unit=unit, threads=threads,
+            return Library(folder=str(folder), cache_location=(place, key), **found)
+    notes: list[str] = [cache_note] if cache_note else []
+    clips = _read_clips(folder, paths, files, annotations=annotations, chosen=skeleton_file, unit=unit, threads=threads,
                         notes=notes, report=report, cancelled=cancelled)
-    built = _index(str(folder), clips, tuple(notes), seed=seed, report=report, cancelled=cancelled)
-    write_synthetic_clips(place, _completed(built.clips))
-    if not cache.save(place, key, built):
-        told = (
+    library = _index_clips(str(folder), clips, tuple(notes), seed=seed, report=report, cancelled=cancelled)
+    write_synthetic_clips(place, _list_completed(library.clips))
+    if not cache.save_library(place, key, library):
+        note = (
             f"{place} cannot be written: the library is rebuilt each time; "
             "choose a cache folder that you can write to"
         )
-        built = replace(built, notes=(*built.notes, told))
+        library = replace(library, notes=(*library.notes, note))
     report(1.0, "Library ready")
-    return replace(built, kept=(place, key), notes=(*built.notes, *waiting))
+    return replace(library, cache_location=(place, key), notes=(*library.notes, *waiting))
 
 
-def _completed(clips: Iterable[Clip]) -> list[Clip]:
+def _list_completed(clips: Iterable[Clip]) -> list[Clip]:
     """List the clips that continue after their recording's end."""
-    return [clip for clip in clips if clip.recorded is not None]
+    return [clip for clip in clips if clip.recorded_count is not None]
 
 
 def _read_clips(folder, paths, files, annotations, chosen, unit, threads, notes, report, cancelled) -> tuple[Clip, ...]:
     """Read all recordings, repair them, bring them to one skeleton, put each on the floor, and add the twins."""
-    read, unpopped, level = zip(*_read_files(paths, files, unit, threads=threads, report=report, cancelled=cancelled))
-    notes += _unit_notes(read)
-    example = bvh.read(chosen, unit).motion if chosen is not None else None
-    carried = one_skeleton.bring(paths, [motion for motion, _ in level], example, notes)
-    mended, rows = [], []
-    for number, (path, (motion, standing, moved)) in enumerate(zip(paths, carried)):
-        _check(cancelled)
+    read, without_pops, levelled = zip(*_read_files(paths, files, unit, threads=threads, report=report, cancelled=cancelled))
+    notes += _collect_unit_notes(read)
+    example = bvh.read_bvh(chosen, unit).motion if chosen is not None else None
+    unified = one_skeleton.unify_skeletons(paths, [motion for motion, _ in levelled], example, notes)
+    repaired, rows = [], []
+    for number, (path, (motion, standing, was_retargeted)) in enumerate(zip(paths, unified)):
+        _check_cancelled(cancelled)
         report(0.4 + 0.3 * number / len(paths), f"Repairing and mirroring {path.name}")
-        one = repair.grounded(motion, standing, moved)
-        mended.append(replace(one, drift=one.drift + level[number][1]))
-        rows.append(_rows(path, annotations.of(path, motion.fps), len(motion)))
-    notes += repair.describe_repairs([(one, pops) for one, (_, pops) in zip(mended, unpopped)])
-    originals = _landed([path.relative_to(folder).as_posix() for path in paths], mended, rows, notes)
-    told = [repair.Mended(pops, one.drift, *one.slide) for one, (_, pops) in zip(mended, unpopped)]
-    originals = [replace(clip, mended=what) for clip, what in zip(originals, told)]
-    clips = [clip for original in originals for clip in (original, original.twin())]
+        one = repair.repair_floor_and_feet(motion, standing, was_retargeted)
+        repaired.append(replace(one, drift=one.drift + levelled[number][1]))
+        rows.append(_limit_rows(path, annotations.read_rows(path, motion.fps), len(motion)))
+    notes += repair.describe_repairs([(one, pops) for one, (_, pops) in zip(repaired, without_pops)])
+    originals = _complete_landings([path.relative_to(folder).as_posix() for path in paths], repaired, rows, notes)
+    figures = [repair.RepairFigures(pops, one.drift, *one.slide) for one, (_, pops) in zip(repaired, without_pops)]
+    originals = [replace(clip, repair_figures=what) for clip, what in zip(originals, figures)]
+    clips = [clip for original in originals for clip in (original, original.build_twin())]
     if not any(clip.annotations for clip in clips):
         raise InputError(
             folder, "no annotation for any clip", "NAME.txt beside NAME.bvh or an annotations.csv",
@@ -115,16 +115,16 @@ def _read_files(paths, files, unit, threads, report, cancelled) -> list[tuple]:
     """
 
     def read_one(path: Path, file: Path):
-        source = bvh.read(file, unit if file == path else None)
-        unpopped = repair.without_pops(source.motion)
-        return source, unpopped, repair.without_drift(unpopped[0])
+        source = bvh.read_bvh(file, unit if file == path else None)
+        unpopped = repair.remove_pops(source.motion)
+        return source, unpopped, repair.remove_drift(unpopped[0])
 
     read = []
     with ThreadPoolExecutor(max(1, threads)) as pool:
         waiting = [pool.submit(read_one, *both) for both in zip(paths, files)]
         try:
             for number, (path, one) in enumerate(zip(paths, waiting)):
-                _check(cancelled)
+                _check_cancelled(cancelled)
                 report(0.4 * number / len(paths), f"Reading {path.name}")
                 read.append(one.result())
         finally:
@@ -132,23 +132,23 @@ def _read_files(paths, files, unit, threads, report, cancelled) -> list[tuple]:
     return read
 
 
-def _landed(names: list[str], mended: list[repair.Repaired], rows, notes: list[str]) -> list[Clip]:
+def _complete_landings(names: list[str], repaired: list[repair.RepairedClip], rows, notes: list[str]) -> list[Clip]:
     """Build the clips; those that end in flight get a landing and getting up."""
-    flying = [ends_in_flight(one.motion) for one in mended]
-    ways = landings.ways_up([(one.motion, own, one.standing) for one, own in zip(mended, rows)]) if any(flying) else []
+    flying = [ends_in_flight(one.motion) for one in repaired]
+    getting_ups = landings.collect_getting_ups([(one.motion, own, one.heel_toe_contacts) for one, own in zip(repaired, rows)]) if any(flying) else []
     clips, ends = [], []
-    for name, one, own, flies in zip(names, mended, rows, flying):
+    for name, one, own, flies in zip(names, repaired, rows, flying):
         if flies:
-            ends.append(landings.completed(one.motion, own, one.standing, ways))
+            ends.append(landings.complete_clip(one.motion, own, one.heel_toe_contacts, getting_ups))
             clips.append(Clip(path=name, mirrored=False, motion=ends[-1].motion, annotations=ends[-1].rows,
-                              standing=ends[-1].standing, recorded=ends[-1].recorded))
+                              heel_toe_contacts=ends[-1].heel_toe_contacts, recorded_count=ends[-1].recorded_count))
         else:
-            clips.append(Clip(path=name, mirrored=False, motion=one.motion, annotations=own, standing=one.standing))
-    notes += landings.describe_landings(ends, ways)
+            clips.append(Clip(path=name, mirrored=False, motion=one.motion, annotations=own, heel_toe_contacts=one.heel_toe_contacts))
+    notes += landings.describe_landings(ends, getting_ups)
     return clips
 
 
-def _rows(path: Path, rows: tuple[ClipAnnotation, ...], count: int) -> tuple[ClipAnnotation, ...]:
+def _limit_rows(path: Path, rows: tuple[ClipAnnotation, ...], count: int) -> tuple[ClipAnnotation, ...]:
     """Cut rows to the clip; InputError for one that starts, or has its key moment, after the clip's end."""
     for row in rows:
         if row.start >= count:
@@ -159,7 +159,7 @@ def _rows(path: Path, rows: tuple[ClipAnnotation, ...], count: int) -> tuple[Cli
     return tuple(replace(row, end=min(row.end, count - 1)) for row in rows)
 
 
-def _unit_notes(read) -> list[str]:
+def _collect_unit_notes(read) -> list[str]:
     """Collect the reader's notes: each kind of sentence once (numbers aside), with the number of clips that it applies
     to.
     """
@@ -167,24 +167,24 @@ def _unit_notes(read) -> list[str]:
     for source in read:
         for note in source.notes:
             kinds.setdefault(re.sub(r"(?<=hips )[\d.]+", "", note), []).append(note)
-    return [f"{told[0]} (similar in {len(told)} clips)" if len(told) > 1 else told[0] for told in kinds.values()]
+    return [f"{notes[0]} (similar in {len(notes)} clips)" if len(notes) > 1 else notes[0] for notes in kinds.values()]
 
 
-def _index(folder: str, clips, notes, seed, report, cancelled) -> Library:
+def _index_clips(folder: str, clips, notes, seed, report, cancelled) -> Library:
     """Index the clips: features, labels and clusters."""
-    _check(cancelled)
+    _check_cancelled(cancelled)
     report(0.7, "Describing frames")
-    frames = describe_clips(clips)
+    frames = build_frames(clips)
     clusters = {}
     for number, length in enumerate(BLOCK_LENGTHS):
-        _check(cancelled)
+        _check_cancelled(cancelled)
         report(0.8 + 0.06 * number, f"Clustering blocks of {length} frames")
         clusters[length] = cluster_blocks(frames, length, seed)
     return Library(folder=folder, skeleton=clips[0].motion.skeleton, clips=clips, frames=frames, clusters=clusters,
                    fps=FPS, notes=notes)
 
 
-def _check(cancelled) -> None:
+def _check_cancelled(cancelled) -> None:
     """Raise Cancelled if the work was cancelled."""
     if cancelled is not None and cancelled():
-        raise Cancelled("library: cancelled")
+        raise UserCancelledError("library: cancelled")

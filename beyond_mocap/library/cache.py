@@ -26,7 +26,7 @@ from ..motion.skeleton import Skeleton
 from .clip import Clip
 from .clusters import Clusters
 from .features import Frames
-from .repair import Mended
+from .repair import RepairFigures
 from .scan import CACHE_FOLDER
 
 # raised whenever what is computed or stored changes, so that old caches are not used
@@ -34,7 +34,7 @@ VERSION = 24
 _FRAME_ARRAYS = tuple(field.name for field in fields(Frames) if field.name != "vocabulary")
 
 
-def fingerprint(folder: Path, clips, sources, skeleton: Path | None, **options) -> str:
+def compute_fingerprint(folder: Path, clips, sources, skeleton: Path | None, **options) -> str:
     """Compute a hash of names and contents of all files that a build reads, the options, and this module's VERSION."""
     parts: list[str | bytes] = [json.dumps([VERSION, str(np.__version__), options], sort_keys=True)]
     for path in [*clips, *sources, *([skeleton] if skeleton else [])]:
@@ -46,7 +46,7 @@ def fingerprint(folder: Path, clips, sources, skeleton: Path | None, **options) 
     return byte_digest(*parts, size=64).hex()[:32]
 
 
-def place(folder: Path, cache_dir: str | Path | None) -> tuple[Path, str]:
+def find_cache_folder(folder: Path, cache_dir: str | Path | None) -> tuple[Path, str]:
     """Find the folder of the cache, and a note for the user where that is not beside the recordings.
 
     Args:
@@ -65,16 +65,16 @@ def place(folder: Path, cache_dir: str | Path | None) -> tuple[Path, str]:
     if os.access(beside if beside.is_dir() else folder, os.W_OK):
         return beside, ""
     base = os.environ.get("LOCALAPPDATA") or os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
-    elsewhere = own_folder(Path(base) / "beyond_mocap", folder)
+    elsewhere = find_own_folder(Path(base) / "beyond_mocap", folder)
     return elsewhere, f"{folder} cannot be written: its cache is in {elsewhere}"
 
 
-def own_folder(base: Path, folder: Path) -> Path:
+def find_own_folder(base: Path, folder: Path) -> Path:
     """Return the folder below `base` that belongs to the library of `folder` alone."""
     return base / byte_digest(str(folder.absolute()), size=64).hex()[:16]
 
 
-def save(place: Path, key: str, library, name: str = "library") -> bool:
+def save_library(place: Path, key: str, library, name: str = "library") -> bool:
     """Save `library` as `place`/`name`.npz; returns False if the folder cannot be written."""
     arrays = {f"frames.{part}": getattr(library.frames, part) for part in _FRAME_ARRAYS}
     for length, clusters in library.clusters.items():
@@ -82,25 +82,25 @@ def save(place: Path, key: str, library, name: str = "library") -> bool:
             arrays[f"clusters.{length}.{part}"] = getattr(clusters, part)
     arrays["root"] = np.concatenate([clip.motion.root_positions for clip in library.clips])
     arrays["rotations"] = np.concatenate([clip.motion.rotations for clip in library.clips])
-    arrays["standing"] = np.concatenate([clip.standing for clip in library.clips])
+    arrays["standing"] = np.concatenate([clip.heel_toe_contacts for clip in library.clips])
     arrays["offsets"], arrays["end_offsets"] = library.skeleton.offsets, library.skeleton.end_offsets
-    arrays["header"] = np.frombuffer(json.dumps(_header(key, library)).encode(), np.uint8)
+    arrays["header"] = np.frombuffer(json.dumps(_build_header(key, library)).encode(), np.uint8)
     try:
         place.mkdir(parents=True, exist_ok=True)
-        handle, beside = tempfile.mkstemp(suffix=".part", dir=place)
+        handle, partial_file = tempfile.mkstemp(suffix=".part", dir=place)
     except OSError:
         return False
     try:
         with os.fdopen(handle, "wb") as file:
             np.savez(file, **arrays)
-        os.replace(beside, place / f"{name}.npz")
+        os.replace(partial_file, place / f"{name}.npz")
         return True
     except OSError:
-        Path(beside).unlink(missing_ok=True)
+        Path(partial_file).unlink(missing_ok=True)
         return False
 
 
-def _header(key: str, library) -> dict:
+def _build_header(key: str, library) -> dict:
     """Build the header: everything that is not an array."""
     skeleton = library.skeleton
     return {
@@ -109,12 +109,12 @@ def _header(key: str, library) -> dict:
         "lengths": list(library.clusters),
         "clips": [
             [clip.path, clip.mirrored, clip.motion.fps, len(clip.motion), [asdict(row) for row in clip.annotations],
-             clip.recorded, asdict(clip.mended) if clip.mended else None] for clip in library.clips
+             clip.recorded_count, asdict(clip.repair_figures) if clip.repair_figures else None] for clip in library.clips
         ],
     }  # fmt: skip
 
 
-def load(place: Path, key: str, name: str = "library") -> dict | None:
+def load_library(place: Path, key: str, name: str = "library") -> dict | None:
     """Load the fields of a cached library.
 
     Args:
@@ -129,12 +129,12 @@ def load(place: Path, key: str, name: str = "library") -> dict | None:
             header = json.loads(arrays["header"].tobytes())
             if header["key"] != key:
                 return None
-            return _restore(header, {part: arrays[part] for part in arrays.files})
+            return _restore_fields(header, {part: arrays[part] for part in arrays.files})
     except Exception:  # a damaged file can raise any of zipfile's, numpy's, json's and our own exceptions
         return None
 
 
-def _restore(header: dict, arrays: dict) -> dict:
+def _restore_fields(header: dict, arrays: dict) -> dict:
     """Restore the fields of a library but its folder."""
     names, parents, ends = (header[part] for part in ("names", "parents", "end_parents"))
     skeleton = Skeleton(names, parents, arrays["offsets"], ends, arrays["end_offsets"])
@@ -143,9 +143,9 @@ def _restore(header: dict, arrays: dict) -> dict:
         part = slice(start, start + count)
         motion = Motion(skeleton, arrays["root"][part], arrays["rotations"][part], fps)
         rows = tuple(ClipAnnotation(row["start"], row["end"], row["key"], tuple(row["words"])) for row in rows)
-        mended = mended and Mended(**mended)
+        mended = mended and RepairFigures(**mended)
         clips.append(Clip(path=path, mirrored=mirrored, motion=motion, annotations=rows,
-                          standing=arrays["standing"][part], recorded=recorded, mended=mended))
+                          heel_toe_contacts=arrays["standing"][part], recorded_count=recorded, repair_figures=mended))
         start += count
     frames = Frames(
         vocabulary=tuple(header["vocabulary"]), **{name: arrays[f"frames.{name}"] for name in _FRAME_ARRAYS}
@@ -160,7 +160,7 @@ def _restore(header: dict, arrays: dict) -> dict:
     }  # fmt: skip
 
 
-def write_synthetic_clips(place: Path, made: Iterable[Clip], missing_only: bool = False) -> None:
+def write_synthetic_clips(place: Path, clips: Iterable[Clip], missing_only: bool = False) -> None:
     """Write synthetic clips, and recordings with a synthetic end, as BVH beside the cache.
 
     Readers of a take's provenance find them there. A folder that cannot be written is left alone.
@@ -171,10 +171,10 @@ def write_synthetic_clips(place: Path, made: Iterable[Clip], missing_only: bool 
         missing_only: write only files that do not exist.
     """
     try:
-        for clip in made:
+        for clip in clips:
             file = place / Path(clip.source_at(len(clip.motion) - 1)).relative_to(CACHE_FOLDER)
             if not clip.mirrored and not (missing_only and file.exists()):
                 file.parent.mkdir(parents=True, exist_ok=True)
-                bvh.write(file, clip.motion)
+                bvh.write_bvh(file, clip.motion)
     except OSError:
         return

@@ -11,7 +11,7 @@ from ..motion.mirror import mirror
 from ..motion.motion import Motion
 from . import repair
 from .landings import LANDING_FOLDER
-from .made import MADE_FOLDER
+from .made import SYNTHETIC_FOLDER
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -34,42 +34,42 @@ class Clip:
     mirrored: bool
     motion: Motion
     annotations: tuple[ClipAnnotation, ...]
-    standing: np.ndarray
-    recorded: int | None = None
-    mended: repair.Mended | None = None
+    heel_toe_contacts: np.ndarray
+    recorded_count: int | None = None
+    repair_figures: repair.RepairFigures | None = None
 
     @property
-    def made(self) -> bool:
+    def is_synthetic(self) -> bool:
         """Whether the clip is synthetic (`library.synthetic_clips`) and not a recording."""
-        return self.path.startswith(MADE_FOLDER)
+        return self.path.startswith(SYNTHETIC_FOLDER)
 
     @property
     def recording(self) -> Motion:
         """The recorded part of the motion."""
-        return self.motion if self.recorded is None else self.motion.frames(0, self.recorded)
+        return self.motion if self.recorded_count is None else self.motion.frames(0, self.recorded_count)
 
     def source_at(self, frame: float) -> str:
         """Return the file that contains `frame` (the clip's own rate), as a path below the library.
 
         It is the recording, or for frames after its end the synthetic file with the same frames.
         """
-        made = self.recorded is not None and frame > self.recorded - 1
-        if not made:
+        is_synthetic = self.recorded_count is not None and frame > self.recorded_count - 1
+        if not is_synthetic:
             return self.path
         return LANDING_FOLDER + self.path + ("" if self.path.lower().endswith(".bvh") else ".bvh")
 
     @property
     def contacts(self) -> np.ndarray:
         """(T, 2) bool: left and right foot flat on the ground."""
-        return self.standing.all(axis=2)
+        return self.heel_toe_contacts.all(axis=2)
 
-    def words_at(self, frame: float) -> frozenset[str]:
+    def labels_at(self, frame: float) -> frozenset[str]:
         """Return the labels of every row that covers `frame` (the clip's own rate)."""
         return frozenset(word for row in self.annotations if row.start <= frame <= row.end for word in row.words)
 
-    def twin(self) -> "Clip":
+    def build_twin(self) -> "Clip":
         """Build the same clip with left and right exchanged, labels too (Faustino §3.1.2)."""
         rows = tuple(replace(row, words=tuple(swap_sides(row.words))) for row in self.annotations)
-        standing = self.standing[:, ::-1]
+        heel_toe_contacts = self.heel_toe_contacts[:, ::-1]
         return Clip(path=self.path, mirrored=not self.mirrored, motion=mirror(self.motion), annotations=rows,
-                    standing=standing, recorded=self.recorded, mended=self.mended)
+                    heel_toe_contacts=heel_toe_contacts, recorded_count=self.recorded_count, repair_figures=self.repair_figures)

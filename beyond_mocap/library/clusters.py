@@ -14,12 +14,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .features import Frames, principal_components
+from .features import Frames, compute_principal_components
 
 BLOCK_LENGTHS = (32, 16, 8)
 CLUSTERS = 100
 SAMPLES_PER_BLOCK = 8
-MOST_FITTED = 20000  # blocks that k-means is fitted to; the others are only assigned
+MAX_FITTED = 20000  # blocks that k-means is fitted to; the others are only assigned
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +39,7 @@ class Clusters:
     label: np.ndarray
     medoid: np.ndarray
 
-    def members(self, cluster: int) -> np.ndarray:
+    def list_members(self, cluster: int) -> np.ndarray:
         """List the first frames of the blocks in `cluster`."""
         return self.start[self.label == cluster]
 
@@ -49,9 +49,9 @@ class Clusters:
         return int(self.label[place]) if place < len(self.start) and self.start[place] == frame else -1
 
 
-def block_starts(frames: Frames, length: int) -> np.ndarray:
+def find_block_starts(frames: Frames, length: int) -> np.ndarray:
     """Find the first frames of all blocks of `length` frames that lie within one clip."""
-    return np.flatnonzero(frames.left_in_clip >= length - 1)
+    return np.flatnonzero(frames.remaining_in_clip >= length - 1)
 
 
 def cluster_blocks(frames: Frames, length: int, seed: int = 0) -> Clusters:
@@ -65,19 +65,19 @@ def cluster_blocks(frames: Frames, length: int, seed: int = 0) -> Clusters:
         100 clusters (fewer of fewer blocks); empty where no block fits.
     Source: Faustino 2024, section 3.2.
     """
-    start = block_starts(frames, length)
+    start = find_block_starts(frames, length)
     if not len(start):
         nothing = np.zeros(0, int)
         return Clusters(length, nothing, nothing, nothing)
     step = max(1, length // SAMPLES_PER_BLOCK)
     offsets = np.arange(0, length, step)
     blocks = frames.features[start[:, None] + offsets].reshape(len(start), -1)
-    mean, basis = principal_components(blocks)
-    label, medoid = _kmeans(np.ascontiguousarray((blocks - mean) @ basis), min(CLUSTERS, len(start)), seed)
+    mean, basis = compute_principal_components(blocks)
+    label, medoid = _run_kmeans(np.ascontiguousarray((blocks - mean) @ basis), min(CLUSTERS, len(start)), seed)
     return Clusters(length, start, label, medoid)
 
 
-def _kmeans(points: np.ndarray, count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
+def _run_kmeans(points: np.ndarray, count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
     """Run k-means: labels (M,) and the point nearest to each centre (count,); empty clusters are dropped.
 
     One thread only: with more, scikit-learn adds partial sums in the order threads finish, and the bits differ.
@@ -86,7 +86,7 @@ def _kmeans(points: np.ndarray, count: int, seed: int) -> tuple[np.ndarray, np.n
     from sklearn.exceptions import ConvergenceWarning
     from threadpoolctl import threadpool_limits
 
-    step = -(-len(points) // MOST_FITTED)
+    step = -(-len(points) // MAX_FITTED)
     with threadpool_limits(limits=1), warnings.catch_warnings():
         warnings.simplefilter("ignore", ConvergenceWarning)  # fewer different blocks than clusters give fewer clusters
         fit = KMeans(min(count, len(points[::step])), n_init=1, max_iter=60, tol=1e-3, random_state=seed)

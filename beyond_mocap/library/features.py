@@ -15,10 +15,10 @@ import numpy as np
 
 from ..base.time_series import time_derivative
 from ..motion import quaternion
-from ..motion.humanoid import heading_from_positions, identify
-from ..motion.motion import at_frames, pose_kinematics
+from ..motion.humanoid import compute_heading_from_positions, identify_joints
+from ..motion.motion import sample_frames, compute_pose
 from ..motion.skeleton import Skeleton
-from ..motion.track import zero_phase_hann
+from ..motion.track import smooth_zero_phase_hann
 
 FPS = 30.0  # frames per second of every library
 HORIZON = 0.12  # seconds: weighs m/s and m/s^2 against metres
@@ -66,7 +66,7 @@ class Frames:
         return len(self.clip)
 
     @property
-    def left_in_clip(self) -> np.ndarray:
+    def remaining_in_clip(self) -> np.ndarray:
         """(N,) frames that follow in the same clip."""
         return (self.first + self.count)[self.clip] - 1 - np.arange(len(self))
 
@@ -76,11 +76,11 @@ class Frames:
         return np.linalg.norm(self.velocity, axis=1)
 
 
-def feature_joints(skeleton: Skeleton) -> np.ndarray:
+def select_feature_joints(skeleton: Skeleton) -> np.ndarray:
     """Select the joints of the features: all but those that coincide with their parent and the fingers beyond the
     hands.
     """
-    body = identify(skeleton)
+    body = identify_joints(skeleton)
     hands = {limb.hand for limb in (body.left, body.right) if limb.hand is not None}
     fingers: set[int] = set()
     for joint, parent in enumerate(skeleton.parents):
@@ -90,7 +90,7 @@ def feature_joints(skeleton: Skeleton) -> np.ndarray:
     return np.array([j for j in range(len(skeleton)) if j not in fingers and (j == 0 or lengths[j] > 1e-4)])
 
 
-def raw_features(positions: np.ndarray, heading: np.ndarray, fps: float) -> np.ndarray:
+def compute_raw_features(positions: np.ndarray, heading: np.ndarray, fps: float) -> np.ndarray:
     """Compute one clip's features before PCA.
 
     The root's own position is left out except for its height (Faustino: "the position being the world center"). Divided
@@ -108,17 +108,17 @@ def raw_features(positions: np.ndarray, heading: np.ndarray, fps: float) -> np.n
     acceleration = time_derivative(velocity, fps)
     relative = positions.copy()
     relative[:, :, :2] -= positions[:, :1, :2]
-    turn = quaternion.about_up(-heading)[:, None]
+    rotation = quaternion.from_up_angle(-heading)[:, None]
     parts = [
-        quaternion.rotate(turn, relative),
-        quaternion.rotate(turn, velocity) * HORIZON,
-        quaternion.rotate(turn, acceleration) * (0.5 * HORIZON**2),
+        quaternion.rotate(rotation, relative),
+        quaternion.rotate(rotation, velocity) * HORIZON,
+        quaternion.rotate(rotation, acceleration) * (0.5 * HORIZON**2),
     ]
     flat = np.concatenate([part.reshape(len(part), -1) for part in parts], axis=1)
     return flat[:, 2:] / np.sqrt(positions.shape[1])
 
 
-def principal_components(values: np.ndarray, energy: float = ENERGY) -> tuple[np.ndarray, np.ndarray]:
+def compute_principal_components(values: np.ndarray, energy: float = ENERGY) -> tuple[np.ndarray, np.ndarray]:
     """Compute the fewest principal components that hold a share of the variance.
 
     Args:
@@ -132,11 +132,11 @@ def principal_components(values: np.ndarray, energy: float = ENERGY) -> tuple[np
     covariance = centred.T @ centred
     variance, vectors = np.linalg.eigh(covariance.astype(float))
     variance, vectors = np.maximum(variance[::-1], 0.0), vectors[:, ::-1]
-    kept = int(np.searchsorted(np.cumsum(variance), energy * variance.sum())) + 1
-    return mean, vectors[:, :kept].astype(values.dtype)
+    count = int(np.searchsorted(np.cumsum(variance), energy * variance.sum())) + 1
+    return mean, vectors[:, :count].astype(values.dtype)
 
 
-def describe_clips(clips, like: Frames | None = None) -> Frames:
+def build_frames(clips, reference: Frames | None = None) -> Frames:
     """Build the frames of clips at FPS with all labels that they carry.
 
     Args:
@@ -148,40 +148,40 @@ def describe_clips(clips, like: Frames | None = None) -> Frames:
     from threadpoolctl import threadpool_limits
 
     with threadpool_limits(limits=1):  # with more threads, sums of products have another order and other bits
-        return _describe(clips, like)
+        return _build_frames(clips, reference)
 
 
-def _describe(clips, like: Frames | None) -> Frames:
+def _build_frames(clips, reference: Frames | None) -> Frames:
     """Build the columns of all clips and reduce their features."""
     skeleton = clips[0].motion.skeleton
     vocabulary = tuple(sorted({word for clip in clips for row in clip.annotations for word in row.words}))
-    joints, body = feature_joints(skeleton), identify(skeleton)
+    joints, body = select_feature_joints(skeleton), identify_joints(skeleton)
     toes = [body.left.toe_or_foot, body.right.toe_or_foot]
     parts: dict[str, list[np.ndarray]] = {name: [] for name in _COLUMNS}
     counts = []
     for index, clip in enumerate(clips):
-        source, positions = sampled_positions(clip.motion, FPS)
-        facing = np.unwrap(heading_from_positions(skeleton, positions))
-        path = zero_phase_hann(positions[:, 0, :2], FPS, SMOOTH_SECONDS)
+        source, positions = sample_positions(clip.motion, FPS)
+        facing = np.unwrap(compute_heading_from_positions(skeleton, positions))
+        path = smooth_zero_phase_hann(positions[:, 0, :2], FPS, SMOOTH_SECONDS)
         counts.append(len(source))
         columns = (
             np.full(len(source), index), source, positions[:, 0], facing, path,
-            quaternion.turned_level(time_derivative(path, FPS), -facing),
-            _feet(positions, toes, path, facing),
-            most_jerk(positions, FPS),
-            raw_features(positions[:, joints], facing, FPS).astype(np.float32),
-            words_matrix(clip, source, vocabulary),
+            quaternion.rotate_level(time_derivative(path, FPS), -facing),
+            _compute_feet(positions, toes, path, facing),
+            compute_max_jerk(positions, FPS),
+            compute_raw_features(positions[:, joints], facing, FPS).astype(np.float32),
+            build_label_matrix(clip, source, vocabulary),
         )  # fmt: skip
         for name, column in zip(_COLUMNS, columns):
             parts[name].append(column)
     merged = {name: np.concatenate(columns) for name, columns in parts.items()}
-    mean, basis = (like.mean, like.basis) if like is not None else principal_components(merged["features"])
+    mean, basis = (reference.mean, reference.basis) if reference is not None else compute_principal_components(merged["features"])
     merged["features"] = (merged["features"] - mean) @ basis
     count = np.array(counts)
     return Frames(first=np.cumsum(count) - count, count=count, mean=mean, basis=basis, vocabulary=vocabulary, **merged)
 
 
-def words_matrix(clip, source: np.ndarray, vocabulary: tuple[str, ...]) -> np.ndarray:
+def build_label_matrix(clip, source: np.ndarray, vocabulary: tuple[str, ...]) -> np.ndarray:
     """Mark which labels of `vocabulary` a clip carries: (T, V) bool, at fractional frames `source` (T,) of its own
     rate.
     """
@@ -194,7 +194,7 @@ def words_matrix(clip, source: np.ndarray, vocabulary: tuple[str, ...]) -> np.nd
     return out
 
 
-def joined(a: Frames, b: Frames) -> Frames:
+def join_frames(a: Frames, b: Frames) -> Frames:
     """Join the frames of `a` and `b`, which has the components of `a`; clip numbers of `b` continue those of `a`."""
     vocabulary = tuple(sorted({*a.vocabulary, *b.vocabulary}))
     words = np.zeros((len(a) + len(b), len(vocabulary)), bool)
@@ -211,13 +211,13 @@ def joined(a: Frames, b: Frames) -> Frames:
 _COLUMNS = ("clip", "source", "root", "heading", "path", "velocity", "feet", "jerk", "features", "words")
 
 
-def _feet(positions: np.ndarray, toes: list[int], path: np.ndarray, facing: np.ndarray) -> np.ndarray:
+def _compute_feet(positions: np.ndarray, toes: list[int], path: np.ndarray, facing: np.ndarray) -> np.ndarray:
     """Compute `Frames.feet` (T, 4) m from positions (T, J, 3) m, path (T, 2) m and facing (T,) radians."""
-    away = (quaternion.turned_level(positions[:, toe, :2] - path, -facing) for toe in toes)
+    away = (quaternion.rotate_level(positions[:, toe, :2] - path, -facing) for toe in toes)
     return np.concatenate(list(away), axis=1).astype(np.float32)
 
 
-def most_jerk(positions: np.ndarray, fps: float) -> np.ndarray:
+def compute_max_jerk(positions: np.ndarray, fps: float) -> np.ndarray:
     """Compute the jerk (T,) m/s^3 of the joint that jerks most.
 
     It is the third difference from one frame before to two after, constant at the ends.
@@ -234,9 +234,9 @@ def most_jerk(positions: np.ndarray, fps: float) -> np.ndarray:
     return np.pad(np.sqrt((third**2).sum(axis=-1).max(axis=-1)) * fps**3, (1, 2), mode="edge")
 
 
-def sampled_positions(motion, fps: float) -> tuple[np.ndarray, np.ndarray]:
+def sample_positions(motion, fps: float) -> tuple[np.ndarray, np.ndarray]:
     """Sample a motion at `fps`: fractional frames (T,) of its own rate, and joint positions (T, J, 3) m, world."""
     count = int(np.floor(motion.duration * fps + 1e-6)) + 1
     source = np.arange(count) * (motion.fps / fps)
-    root, rotations = at_frames(motion, source)
-    return source, pose_kinematics(motion.skeleton, root, rotations)[0]
+    root, rotations = sample_frames(motion, source)
+    return source, compute_pose(motion.skeleton, root, rotations)[0]

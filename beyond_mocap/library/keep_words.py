@@ -16,19 +16,19 @@ from pathlib import Path
 
 from ..annotation import ClipAnnotation, KeyMoment, Span, Timeline, read_annotation_csv
 from ..annotation.text import read_text
-from ..annotation.timeline import checked_words
-from ..annotation.vocabulary import vocabulary_words
+from ..annotation.timeline import check_labels
+from ..annotation.vocabulary import list_vocabulary
 from ..base.errors import InputError
 from ..files.bvh import bvh
 from ..files.whole import atomic_write
 from ..motion.motion import Motion
 from .scan import TABLE_NAME, Annotations
-from .word_sources import Sources, cells, comment, sources_in_table, sources_in_text
+from .word_sources import Sources, format_cells, format_comment, read_table_sources, read_text_sources
 
 TEXT, TABLE = "TEXT", "TABLE"
 
 
-def as_timeline(rows: Sequence[ClipAnnotation], fps: float) -> Timeline:
+def to_timeline(rows: Sequence[ClipAnnotation], fps: float) -> Timeline:
     """Convert a clip's rows to the form in which labels are edited: seconds from its first frame.
 
     A row of one frame that is a key moment becomes that moment alone.
@@ -40,7 +40,7 @@ def as_timeline(rows: Sequence[ClipAnnotation], fps: float) -> Timeline:
     return Timeline(tuple(spans), tuple(KeyMoment(row.key / fps, row.words) for row in rows if row.key is not None))
 
 
-def within(rows: Sequence[ClipAnnotation], count: int) -> tuple[ClipAnnotation, ...]:
+def limit_rows(rows: Sequence[ClipAnnotation], count: int) -> tuple[ClipAnnotation, ...]:
     """Cut rows to a clip of `count` frames; those that lie outside are left out."""
     out = []
     for row in rows:
@@ -50,22 +50,22 @@ def within(rows: Sequence[ClipAnnotation], count: int) -> tuple[ClipAnnotation, 
     return tuple(out)
 
 
-def read_words(clip: Path, folder: Path, fps: float) -> tuple[ClipAnnotation, ...]:
+def read_labels(clip: Path, folder: Path, fps: float) -> tuple[ClipAnnotation, ...]:
     """Read a clip's rows as a library in `folder` does; InputError where a file is broken."""
-    return Annotations(folder, [clip]).of(clip, fps)
+    return Annotations(folder, [clip]).read_rows(clip, fps)
 
 
 def read_sources(clip: Path, folder: Path, rows: tuple[ClipAnnotation, ...], fps: float) -> Sources:
     """Read the sources of the rows from `read_labels`; rows that a person wrote have none."""
-    form, target = place(clip, folder)
+    form, target = find_label_file(clip, folder)
     if not target.is_file():
         return {}
     if form == TEXT:
-        return sources_in_text(target, rows, fps)
-    return sources_in_table(target, _name_in(target, clip), rows)
+        return read_text_sources(target, rows, fps)
+    return read_table_sources(target, _build_table_name(target, clip), rows)
 
 
-def place(clip: Path, folder: Path) -> tuple[str, Path]:
+def find_label_file(clip: Path, folder: Path) -> tuple[str, Path]:
     """Find where the labels of a clip belong.
 
     An existing text has priority, then a table with rows for the clip, then a table in the clip's folder.
@@ -76,22 +76,22 @@ def place(clip: Path, folder: Path) -> tuple[str, Path]:
     Returns:
         TEXT and `NAME.txt`, or TABLE and the table.
     """
-    beside = clip.with_suffix(".txt")
-    if beside.is_file():
-        return TEXT, beside
+    text_file = clip.with_suffix(".txt")
+    if text_file.is_file():
+        return TEXT, text_file
     tables = Annotations(folder, [clip]).tables
     absolute = Path(os.path.normpath(clip.absolute()))
     for parent in absolute.parents:
         if parent in tables and tables[parent].get(absolute.relative_to(parent).as_posix()):
             return TABLE, parent / TABLE_NAME
-    return (TABLE, absolute.parent / TABLE_NAME) if absolute.parent in tables else (TEXT, beside)
+    return (TABLE, absolute.parent / TABLE_NAME) if absolute.parent in tables else (TEXT, text_file)
 
 
-def text_of(rows: Sequence[ClipAnnotation], sources: Sources | None = None) -> str:
+def format_rows(rows: Sequence[ClipAnnotation], sources: Sources | None = None) -> str:
     """Format rows as text, in frames of the clip, with a comment behind those in `sources`."""
     lines = []
     for row in rows:
-        words = " ".join(row.words) + comment(row, sources or {})
+        words = " ".join(row.words) + format_comment(row, sources or {})
         if row.key is None or row.end > row.start:
             lines.append((row.start, f"{row.start}f {max(row.end, row.start + 1)}f {words}"))
         if row.key is not None:
@@ -99,7 +99,7 @@ def text_of(rows: Sequence[ClipAnnotation], sources: Sources | None = None) -> s
     return "".join(line + "\n" for _, line in sorted(lines, key=lambda line: line[0]))
 
 
-def keep(
+def write_labels(
     clip: Path, folder: Path, rows: Sequence[ClipAnnotation], fps: float, overwrite: bool = False,
     sources: Sources | None = None,
 ) -> Path:
@@ -117,31 +117,31 @@ def keep(
     Raises:
         InputError: if there are different labels and `overwrite` is not set, or if the file cannot be written.
     """
-    form, target = place(clip, folder)
-    if has_words(clip, folder, fps) and not overwrite:
+    form, target = find_label_file(clip, folder)
+    if has_labels(clip, folder, fps) and not overwrite:
         what = "already has other labels for this clip"
         raise InputError(target, what, "a clip without labels", "allow overwriting")
     if form == TEXT:
-        atomic_write(target, text_of(rows, sources))
+        atomic_write(target, format_rows(rows, sources))
     else:
-        atomic_write(target, _table(target, _name_in(target, clip), rows, fps, sources or {}))
+        atomic_write(target, _format_table(target, _build_table_name(target, clip), rows, fps, sources or {}))
     return target
 
 
-def _name_in(table: Path, clip: Path) -> str:
+def _build_table_name(table: Path, clip: Path) -> str:
     """Build the clip's name as a table's column `file` spells it."""
     return Path(os.path.normpath(clip.absolute())).relative_to(table.parent).as_posix()
 
 
-def has_words(clip: Path, folder: Path, fps: float) -> bool:
+def has_labels(clip: Path, folder: Path, fps: float) -> bool:
     """Whether anything is written about a clip where its labels belong; a text that cannot be read counts too."""
-    form, target = place(clip, folder)
+    form, target = find_label_file(clip, folder)
     if form == TEXT:
         return target.is_file() and bool(target.read_bytes().strip())
-    return bool(read_words(clip, folder, fps))
+    return bool(read_labels(clip, folder, fps))
 
 
-def _table(table: Path, name: str, rows: Sequence[ClipAnnotation], fps: float, sources: Sources) -> str:
+def _format_table(table: Path, name: str, rows: Sequence[ClipAnnotation], fps: float, sources: Sources) -> str:
     """Format the table with these rows in place of those of the clip; other rows and columns stay as they are."""
     read_annotation_csv(table)  # raises InputError for a broken table instead of damaging it further
     text = read_text(table)
@@ -152,21 +152,21 @@ def _table(table: Path, name: str, rows: Sequence[ClipAnnotation], fps: float, s
     writer.writeheader()
     old = list(reader)
     first = next((number for number, row in enumerate(old) if row["file"].strip() == name), len(old))
-    kept = [row for row in old if row["file"].strip() != name]
+    other_rows = [row for row in old if row["file"].strip() != name]
     new = [{"file": name, "fps": f"{fps:g}", "start_frame": row.start, "end_frame": row.end,
             "key_frame": "" if row.key is None else row.key, "labels": " ".join(row.words),
-            **cells(row, sources)} for row in rows]
+            **format_cells(row, sources)} for row in rows]
     before = len([row for row in old[:first] if row["file"].strip() != name])
-    writer.writerows([*kept[:before], *new, *kept[before:]])
+    writer.writerows([*other_rows[:before], *new, *other_rows[before:]])
     return out.getvalue()
 
 
-def plain_words(words: Sequence[str]) -> tuple[str, ...]:
+def parse_labels(words: Sequence[str]) -> tuple[str, ...]:
     """Parse the labels of an annotation, also of several in one text. InputError for an invalid one."""
-    return checked_words(" ".join(words).split(), "words")
+    return check_labels(" ".join(words).split(), "words")
 
 
-def free_place(folder: Path, name: str) -> Path:
+def find_free_file(folder: Path, name: str) -> Path:
     """Find the file for a new clip. InputError if the folder is missing, or the name is invalid or taken."""
     if not folder.is_dir():
         raise InputError(folder, "is not a folder", "a library's folder", "create the folder first")
@@ -194,18 +194,18 @@ def add_clip(
     Raises:
         InputError: if a file cannot be written, for an invalid label, or a key outside the motion.
     """
-    clip, words = free_place(folder, name), plain_words(words)
+    clip, words = find_free_file(folder, name), parse_labels(words)
     key = None if key_seconds is None else round(key_seconds * motion.fps)
     if key is not None and not 0 <= key < len(motion):
         raise InputError(clip, f"a key moment at {key_seconds:.3f} s", f"0 to {motion.duration:.3f} s")
     rows = [ClipAnnotation(key, key, key, words)] if key is not None else []
     if words and key is None:
         rows = [ClipAnnotation(0, len(motion) - 1, None, words)]
-    if words and has_words(clip, folder, motion.fps):
+    if words and has_labels(clip, folder, motion.fps):
         raise InputError(clip.with_suffix(".txt"), "already has labels", "a new name", "rename the clip")
-    bvh.write(clip, motion)
+    bvh.write_bvh(clip, motion)
     if words:
-        keep(clip, folder, rows, motion.fps)
-    strangers = sorted(set(words) - vocabulary_words())
-    told = [f"{clip}: {' '.join(words) or 'no labels'}"]
-    return [*told, *(f"{word}: a label of this library only" for word in strangers)]
+        write_labels(clip, folder, rows, motion.fps)
+    unknown = sorted(set(words) - list_vocabulary())
+    lines = [f"{clip}: {' '.join(words) or 'no labels'}"]
+    return [*lines, *(f"{word}: a label of this library only" for word in unknown)]

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from ..annotation import CONTINUOUS, DISCRETE, VOCABULARY, nearest, spoken
+from ..annotation import CONTINUOUS, DISCRETE, VOCABULARY, find_nearest_labels, sort_labels
 from ..annotation.ball_contact import shows_foot_on_ball
 from ..annotation.labels import list_labels
 from ..annotation.vocabulary import SIDES
@@ -34,10 +34,10 @@ class Key:
     frame: float
     start: float
     end: float
-    words: frozenset[str]
+    labels: frozenset[str]
 
 
-def keys_of(clips) -> tuple[Key, ...]:
+def collect_keys(clips) -> tuple[Key, ...]:
     """Collect the key moments of all clips, in their order.
 
     A key's labels are its row's and those of every other row that covers its frame, except for their sides: a kick with
@@ -48,17 +48,17 @@ def keys_of(clips) -> tuple[Key, ...]:
     for index, clip in enumerate(clips):
         for row in clip.annotations:
             if row.key is not None:
-                found.append(Key(index, float(row.key), float(row.start), float(row.end), _key_words(clip, row)))
+                found.append(Key(index, float(row.key), float(row.start), float(row.end), _collect_key_labels(clip, row)))
     return tuple(found)
 
 
-def _key_words(clip, row) -> frozenset[str]:
+def _collect_key_labels(clip, row) -> frozenset[str]:
     """Collect the labels of a clip at the key frame of a row."""
     others = (other.words for other in clip.annotations if other is not row and other.start <= row.key <= other.end)
     return frozenset(row.words) | (frozenset(word for words in others for word in words) - _SIDES)
 
 
-def serving(keys: Iterable[Key], words) -> tuple[Key, ...]:
+def select_keys(keys: Iterable[Key], words) -> tuple[Key, ...]:
     """Select the keys that carry all requested labels, and of these the ones with the fewest other actions.
 
     A dive is also a jump, but a requested jump should be no dive where there is another.
@@ -69,13 +69,13 @@ def serving(keys: Iterable[Key], words) -> tuple[Key, ...]:
     Returns:
         The keys; empty where none serves.
     """
-    wanted = frozenset(words)
-    found = [key for key in keys if wanted <= key.words]
-    others = [len((key.words & (DISCRETE | _SAME_MOVE)) - wanted) for key in found]
+    requested = frozenset(words)
+    found = [key for key in keys if requested <= key.labels]
+    others = [len((key.labels & (DISCRETE | _SAME_MOVE)) - requested) for key in found]
     return tuple(key for key, count in zip(found, others) if count == min(others))
 
 
-def nearest_serving(keys: tuple[Key, ...], words) -> tuple[Key, ...]:
+def select_nearest_keys(keys: tuple[Key, ...], words) -> tuple[Key, ...]:
     """Select the keys whose labels are nearest to the requested ones: most shared labels, then fewest extra ones.
 
     None where the action itself is not shared (a kick is no answer to a slide, and a right kick none to a right
@@ -88,24 +88,24 @@ def nearest_serving(keys: tuple[Key, ...], words) -> tuple[Key, ...]:
     Returns:
         The keys; empty where none is near.
     """
-    wanted = frozenset(words)
-    actions = _actions(wanted) | (wanted & _SAME_MOVE)
-    near = [key for key in keys if actions & key.words or _same_contact(wanted, key.words)]
-    scores = [(len(wanted & key.words) + _same_contact(wanted, key.words), -len(key.words - wanted)) for key in near]
+    requested = frozenset(words)
+    actions = _select_actions(requested) | (requested & _SAME_MOVE)
+    near = [key for key in keys if actions & key.labels or _score_same_contact(requested, key.labels)]
+    scores = [(len(requested & key.labels) + _score_same_contact(requested, key.labels), -len(key.labels - requested)) for key in near]
     return tuple(key for key, score in zip(near, scores) if score == max(scores))
 
 
-def _actions(words: frozenset[str]) -> frozenset[str]:
+def _select_actions(words: frozenset[str]) -> frozenset[str]:
     """Select the labels of what is done, not which side or pace: roots of App. A, else all but modifiers."""
     return words & DISCRETE or words - CONTINUOUS - VOCABULARY["modifier"].keys() or words
 
 
-def _same_contact(a: frozenset[str], b: frozenset[str]) -> float:
+def _score_same_contact(a: frozenset[str], b: frozenset[str]) -> float:
     """Score half a label if both show a foot on the ball."""
     return 0.5 if shows_foot_on_ball(a) and shows_foot_on_ball(b) else 0.0
 
 
-def standing_in(choices: tuple[Key, ...], made: tuple[Key, ...], words) -> tuple[Key, ...]:
+def select_substitutes(choices: tuple[Key, ...], synthetic: tuple[Key, ...], words) -> tuple[Key, ...]:
     """Select the synthetic key moments that may substitute for recorded ones.
 
     They show the same act of the same side, with all of the requested labels that a recorded one carries.
@@ -117,16 +117,16 @@ def standing_in(choices: tuple[Key, ...], made: tuple[Key, ...], words) -> tuple
     Returns:
         The substitutes.
     """
-    wanted = frozenset(words)
-    met = {(_act(one), wanted & one.words) for one in choices}
-    return tuple(key for key in made if any(act == _act(key) and asked <= key.words for act, asked in met))
+    requested = frozenset(words)
+    substituted = {(_select_act(one), requested & one.labels) for one in choices}
+    return tuple(key for key in synthetic if any(act == _select_act(key) and labels <= key.labels for act, labels in substituted))
 
 
-def _act(key: Key) -> frozenset[str]:
-    return key.words & (DISCRETE | _SIDES)
+def _select_act(key: Key) -> frozenset[str]:
+    return key.labels & (DISCRETE | _SIDES)
 
 
-def nearest_words(keys: tuple[Key, ...], words, count: int = 3) -> tuple[str, ...]:
+def list_nearest_labels(keys: tuple[Key, ...], words, count: int = 3) -> tuple[str, ...]:
     """List the label combinations of the library's key moments nearest to `words`, as text, best first."""
-    choices = sorted({spoken(key.words) for key in keys})
-    return tuple(" ".join(choice) for choice in nearest(tuple(words), choices, count))
+    choices = sorted({sort_labels(key.labels) for key in keys})
+    return tuple(" ".join(choice) for choice in find_nearest_labels(tuple(words), choices, count))

@@ -14,8 +14,8 @@ import numpy as np
 
 from ..annotation import LOCOMOTION, ClipAnnotation
 from ..motion.motion import Motion
-from ..synthetic.landing import ends_in_flight, landed
-from ..synthetic.moves import getting_up
+from ..synthetic.landing import ends_in_flight, add_landing
+from ..synthetic.moves import build_get_up
 from .scan import CACHE_FOLDER
 
 LANDING_FOLDER = f"{CACHE_FOLDER}/made-landing/"
@@ -24,7 +24,7 @@ _FEET_DOWN = 0.35  # seconds at the start of getting up in which the body still 
 
 
 @dataclass(frozen=True, eq=False)
-class WayUp:
+class GettingUp:
     """A movement from lying to standing.
 
     Attributes:
@@ -35,13 +35,13 @@ class WayUp:
     """
 
     motion: Motion
-    standing: np.ndarray
-    words: tuple[str, ...]
-    made: bool = False
+    heel_toe_contacts: np.ndarray
+    labels: tuple[str, ...]
+    is_synthetic: bool = False
 
 
 @dataclass(frozen=True, eq=False)
-class Completed:
+class CompletedClip:
     """A clip with its synthetic end.
 
     Attributes:
@@ -53,24 +53,24 @@ class Completed:
 
     motion: Motion
     rows: tuple[ClipAnnotation, ...]
-    standing: np.ndarray
-    recorded: int
+    heel_toe_contacts: np.ndarray
+    recorded_count: int
 
 
-def ways_up(clips: Sequence[tuple[Motion, tuple[ClipAnnotation, ...], np.ndarray]]) -> list[WayUp]:
+def collect_getting_ups(clips: Sequence[tuple[Motion, tuple[ClipAnnotation, ...], np.ndarray]]) -> list[GettingUp]:
     """Collect every movement of getting up among clips (motion, rows, contacts) of one skeleton.
 
     A synthetic one is returned where they show none.
     """
     found = [
-        WayUp(motion.frames(int(row.start), int(row.end) + 1), standing[int(row.start) : int(row.end) + 1], row.words)
+        GettingUp(motion.frames(int(row.start), int(row.end) + 1), standing[int(row.start) : int(row.end) + 1], row.words)
         for motion, rows, standing in clips for row in rows
         if "getting_up" in row.words and row.end - row.start > motion.fps and not ends_in_flight(motion)
     ]
-    return found or [_made_way([(motion, rows) for motion, rows, _ in clips])]
+    return found or [_build_getting_up([(motion, rows) for motion, rows, _ in clips])]
 
 
-def _made_way(clips) -> WayUp:
+def _build_getting_up(clips) -> GettingUp:
     """Build a synthetic getting up for the skeleton of clips (motion, rows).
 
     Its upright stance is that of the longest stretch of slow locomotion: waiting goalkeepers, like runners, lean.
@@ -78,11 +78,11 @@ def _made_way(clips) -> WayUp:
     upright = [motion.frames(row.start, row.end + 1) for motion, rows in clips for row in rows
                if row.key is None and _UPRIGHT & set(row.words)]  # fmt: skip
     example = max(upright, key=lambda motion: motion.duration, default=clips[0][0])
-    gesture = getting_up(example.skeleton, _MADE_FPS, example=example).motion
-    return WayUp(gesture, np.zeros((len(gesture), 2, 2), bool), ("getting_up", "back"), made=True)
+    gesture = build_get_up(example.skeleton, _MADE_FPS, example=example).motion
+    return GettingUp(gesture, np.zeros((len(gesture), 2, 2), bool), ("getting_up", "back"), is_synthetic=True)
 
 
-def completed(motion: Motion, rows, standing: np.ndarray, ways: Sequence[WayUp]) -> Completed:
+def complete_clip(motion: Motion, rows, heel_toe_contacts: np.ndarray, getting_ups: Sequence[GettingUp]) -> CompletedClip:
     """Complete a clip that ends in flight with landing and getting up.
 
     Args:
@@ -93,23 +93,23 @@ def completed(motion: Motion, rows, standing: np.ndarray, ways: Sequence[WayUp])
     Returns:
         The completed clip.
     """
-    whole = landed(motion, [way.motion for way in ways])
-    way = ways[whole.way]
-    down = np.zeros((len(whole.motion), 2, 2), bool)
-    down[: whole.recorded] = standing[: whole.recorded]
-    up = way.standing[np.rint(whole.way_frames).astype(int)]
-    up[: int(_FEET_DOWN * motion.fps)] = False
-    down[whole.rising : whole.rising + len(up)] = up
-    last = len(whole.motion) - 1
-    made = (
-        ClipAnnotation(whole.touched, whole.rising - 1, None, ("ground",)),
-        ClipAnnotation(whole.rising, last, None, tuple(way.words)),
+    landing = add_landing(motion, [getting_up.motion for getting_up in getting_ups])
+    getting_up = getting_ups[landing.get_up_index]
+    contacts = np.zeros((len(landing.motion), 2, 2), bool)
+    contacts[: landing.recorded_count] = heel_toe_contacts[: landing.recorded_count]
+    getting_up_contacts = getting_up.heel_toe_contacts[np.rint(landing.get_up_frames).astype(int)]
+    getting_up_contacts[: int(_FEET_DOWN * motion.fps)] = False
+    contacts[landing.rise_frame : landing.rise_frame + len(getting_up_contacts)] = getting_up_contacts
+    last = len(landing.motion) - 1
+    synthetic_rows = (
+        ClipAnnotation(landing.touch_frame, landing.rise_frame - 1, None, ("ground",)),
+        ClipAnnotation(landing.rise_frame, last, None, tuple(getting_up.labels)),
     )
-    kept = tuple(_longer(row, whole.recorded, last) for row in rows if row.start < whole.recorded)
-    return Completed(whole.motion, (*kept, *made), down, whole.recorded)
+    recorded_rows = tuple(_extend_row(row, landing.recorded_count, last) for row in rows if row.start < landing.recorded_count)
+    return CompletedClip(landing.motion, (*recorded_rows, *synthetic_rows), contacts, landing.recorded_count)
 
 
-def _longer(row: ClipAnnotation, recorded: int, last: int) -> ClipAnnotation:
+def _extend_row(row: ClipAnnotation, recorded: int, last: int) -> ClipAnnotation:
     """Extend the row of a key moment that reaches the recording's end over the synthetic part, which is its exit."""
     if row.end < recorded - 1:
         return row
@@ -117,11 +117,11 @@ def _longer(row: ClipAnnotation, recorded: int, last: int) -> ClipAnnotation:
     return replace(row, end=recorded - 1 if key is None else last, key=key)
 
 
-def describe_landings(completed_clips: Sequence[Completed], ways: Sequence[WayUp]) -> list[str]:
+def describe_landings(completed_clips: Sequence[CompletedClip], getting_ups: Sequence[GettingUp]) -> list[str]:
     """Describe the completed clips in one line; no line where there are none."""
     if not completed_clips:
         return []
-    seconds = np.median([(len(one.motion) - one.recorded) / one.motion.fps for one in completed_clips])
-    by = "synthetic, since no clip shows it" if ways[0].made else "from the library's own clips"
+    seconds = np.median([(len(one.motion) - one.recorded_count) / one.motion.fps for one in completed_clips])
+    by = "synthetic, since no clip shows it" if getting_ups[0].is_synthetic else "from the library's own clips"
     what = f"landing and getting up ({by}) added, {seconds:.1f} s each"
     return [f"{len(completed_clips)} clips end in flight: {what}"]

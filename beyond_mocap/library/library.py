@@ -13,7 +13,7 @@ from typing import Any, Callable
 
 import numpy as np
 
-from ..annotation import LOCOMOTION, ClipAnnotation, recorded_thresholds
+from ..annotation import LOCOMOTION, ClipAnnotation, estimate_gait_thresholds
 from ..annotation.gaits import STANDING
 from ..annotation.vocabulary import DIRECTIONS
 from ..base.errors import InputError
@@ -22,9 +22,9 @@ from . import cache
 from .cache import write_synthetic_clips
 from .clip import Clip
 from .clusters import Clusters
-from .features import FPS, Frames, describe_clips, joined
-from .keys import Key, keys_of
-from .made import KICK, TAKE, TAKES_FROM, gaps, locomotion, made_clips, touch_speed
+from .features import FPS, Frames, build_frames, join_frames
+from .keys import Key, collect_keys
+from .made import KICK_LABELS, RECEIVE_LABELS, MIN_RECEIVE_SPEED, find_speed_gaps, select_locomotion, iter_synthetic_clips, measure_touch_speed
 
 Progress = Callable[[float, str], None]
 
@@ -39,8 +39,8 @@ class Gait:
         speed: mean, m/s.
     """
 
-    word: str
-    words: tuple[str, ...]
+    label: str
+    labels: tuple[str, ...]
     speed: float
 
 
@@ -67,16 +67,16 @@ class Library:
     clusters: dict[int, Clusters]
     fps: float = FPS
     notes: tuple[str, ...] = ()
-    kept: tuple[Path, str] | None = None
-    chosen: tuple[tuple[str, str], ...] = ()
+    cache_location: tuple[Path, str] | None = None
+    chosen_gaits: tuple[tuple[str, str], ...] = ()
 
     @cached_property
     def keys(self) -> tuple[Key, ...]:
         """Key moments of all clips."""
-        return keys_of(self.clips)
+        return collect_keys(self.clips)
 
     @cached_property
-    def words(self) -> frozenset[str]:
+    def labels(self) -> frozenset[str]:
         """Every label that a clip carries."""
         return frozenset(word for clip in self.clips for row in clip.annotations for word in row.words)
 
@@ -92,8 +92,8 @@ class Library:
         column = {word: i for i, word in enumerate(frames.vocabulary)}
         labelled = np.full(len(frames), -1)
         for number, gait in enumerate(gaits):
-            labelled[frames.words[:, column[gait.word]]] = number
-        return recorded_thresholds(np.array([gait.speed for gait in gaits]), frames.speed, labelled)
+            labelled[frames.words[:, column[gait.label]]] = number
+        return estimate_gait_thresholds(np.array([gait.speed for gait in gaits]), frames.speed, labelled)
 
     @cached_property
     def stance_seconds(self) -> np.ndarray:
@@ -101,20 +101,20 @@ class Library:
 
         A body that is played faster or slower than the track drags that foot for as long.
         """
-        return np.concatenate([_stance_seconds(clip, self._own_frames(i)) for i, clip in enumerate(self.clips)])
+        return np.concatenate([_measure_stance_seconds(clip, self._select_clip_frames(i)) for i, clip in enumerate(self.clips)])
 
     @cached_property
-    def feet_standing(self) -> np.ndarray:
+    def feet_in_contact(self) -> np.ndarray:
         """(N, 2) bool: left and right foot on the ground, heel or toe."""
-        stands = (clip.standing.any(axis=2)[_nearest(clip, self._own_frames(i))] for i, clip in enumerate(self.clips))
-        return np.concatenate(list(stands))
+        contacts = (clip.heel_toe_contacts.any(axis=2)[_round_to_frames(clip, self._select_clip_frames(i))] for i, clip in enumerate(self.clips))
+        return np.concatenate(list(contacts))
 
-    def _own_frames(self, clip: int) -> np.ndarray:
+    def _select_clip_frames(self, clip: int) -> np.ndarray:
         first = self.frames.first[clip]
         return self.frames.source[first : first + self.frames.count[clip]]
 
     @cached_property
-    def extended(self) -> "Library":
+    def with_synthetic_clips(self) -> "Library":
         """The recordings followed by the synthetic clips of `library.synthetic_clips`.
 
         These add the speeds between and above the recordings, and kicks and received balls on the run. They are
@@ -122,26 +122,26 @@ class Library:
         first use and cached. The result has no clusters. InputError where no recording shows locomotion.
         """
         measure_gaits(self)  # a library without locomotion raises InputError
-        found = cache.load(*self.kept, "made") if self.kept else None
-        made = Library(folder="", **found) if found else None
-        if made is None:
-            made = _made(self)
-            if self.kept:
-                write_synthetic_clips(self.kept[0], made.clips)
-                cache.save(*self.kept, made, "made")
+        cached = cache.load_library(*self.cache_location, "made") if self.cache_location else None
+        synthetic = Library(folder="", **cached) if cached else None
+        if synthetic is None:
+            synthetic = _build_synthetic_library(self)
+            if self.cache_location:
+                write_synthetic_clips(self.cache_location[0], synthetic.clips)
+                cache.save_library(*self.cache_location, synthetic, "made")
         else:
-            write_synthetic_clips(self.kept[0], made.clips, missing_only=True)
-        if not made.clips:
+            write_synthetic_clips(self.cache_location[0], synthetic.clips, missing_only=True)
+        if not synthetic.clips:
             return self
-        frames = joined(self.frames, made.frames)
-        return replace(self, clips=(*self.clips, *made.clips), frames=frames, clusters={})
+        frames = join_frames(self.frames, synthetic.frames)
+        return replace(self, clips=(*self.clips, *synthetic.clips), frames=frames, clusters={})
 
     @cached_property
-    def gaps(self) -> tuple[tuple[float, float], ...]:
+    def speed_gaps(self) -> tuple[tuple[float, float], ...]:
         """(from, to) m/s of the speeds that recorded locomotion does not reach."""
-        return gaps(self.frames.speed[locomotion(self.frames, self.clips)], self.fps)
+        return find_speed_gaps(self.frames.speed[select_locomotion(self.frames, self.clips)], self.fps)
 
-    def lacks(self, speed: np.ndarray, at_keys: np.ndarray, takes: np.ndarray) -> bool:
+    def needs_synthetic_clips(self, speed: np.ndarray, key_speeds: np.ndarray, takes: np.ndarray) -> bool:
         """Whether a track needs the synthetic clips.
 
         It does if it stays in a speed gap for a fifth of a second or more, or has key moments that are faster than any
@@ -155,13 +155,13 @@ class Library:
         Returns:
             True if it does.
         """
-        inside = sum(int(np.sum((speed > low) & (speed < high))) for low, high in self.gaps)
-        kick, take = (touch_speed(self.frames, self.clips, self.keys, act) for act in (KICK, TAKE))
-        too_fast = 1.3 * np.where(takes & np.isfinite(take), max(take, TAKES_FROM), kick)
-        return inside >= 0.2 * self.fps or bool(np.any(at_keys > too_fast))
+        inside = sum(int(np.sum((speed > low) & (speed < high))) for low, high in self.speed_gaps)
+        kick, take = (measure_touch_speed(self.frames, self.clips, self.keys, act) for act in (KICK_LABELS, RECEIVE_LABELS))
+        too_fast = 1.3 * np.where(takes & np.isfinite(take), max(take, MIN_RECEIVE_SPEED), kick)
+        return inside >= 0.2 * self.fps or bool(np.any(key_speeds > too_fast))
 
     @cached_property
-    def fastest(self) -> float:
+    def max_speed(self) -> float:
         """The highest speed that a clip reaches, m/s."""
         return float(self.frames.speed.max())
 
@@ -171,32 +171,32 @@ class Library:
         return sum(clip.motion.duration for clip in self.clips if not clip.mirrored) / 60.0
 
 
-def _made(library: Library) -> Library:
+def _build_synthetic_library(library: Library) -> Library:
     """Build the clips that the recordings lack (`library.synthetic_clips`), described like them."""
-    speeds = {gait.word: gait.speed for gait in library.gaits if gait.word != STANDING}
+    speeds = {gait.label: gait.speed for gait in library.gaits if gait.label != STANDING}
     clips = []
-    for made in made_clips(library.clips, library.frames, library.fps, speeds, library.keys):
-        clip = Clip(path=made.name, mirrored=False, motion=made.motion, annotations=made.rows, standing=made.standing)
-        clips += [clip, clip.twin()]
+    for synthetic in iter_synthetic_clips(library.clips, library.frames, library.fps, speeds, library.keys):
+        clip = Clip(path=synthetic.name, mirrored=False, motion=synthetic.motion, annotations=synthetic.rows, heel_toe_contacts=synthetic.heel_toe_contacts)
+        clips += [clip, clip.build_twin()]
     if not clips:
         return replace(library, clips=())
-    frames = describe_clips(clips, library.frames)
+    frames = build_frames(clips, library.frames)
     return replace(library, clips=tuple(clips), frames=frames, clusters={}, notes=())
 
 
-def _stance_seconds(clip: Clip, source: np.ndarray) -> np.ndarray:
+def _measure_stance_seconds(clip: Clip, source: np.ndarray) -> np.ndarray:
     """Measure the stance durations (T,) of one clip at its frames `source` (T,)."""
-    stands = clip.standing.any(axis=2)
-    length = np.stack([_run_lengths(stands[:, side]) for side in (0, 1)], axis=1).min(axis=1) / clip.motion.fps
-    return length[_nearest(clip, source)]
+    contacts = clip.heel_toe_contacts.any(axis=2)
+    length = np.stack([_measure_run_lengths(contacts[:, side]) for side in (0, 1)], axis=1).min(axis=1) / clip.motion.fps
+    return length[_round_to_frames(clip, source)]
 
 
-def _nearest(clip: Clip, source: np.ndarray) -> np.ndarray:
+def _round_to_frames(clip: Clip, source: np.ndarray) -> np.ndarray:
     """Round to the clip's whole frames nearest to `source` (T,)."""
-    return np.clip(np.round(source).astype(int), 0, len(clip.standing) - 1)
+    return np.clip(np.round(source).astype(int), 0, len(clip.heel_toe_contacts) - 1)
 
 
-def _run_lengths(flags: np.ndarray) -> np.ndarray:
+def _measure_run_lengths(flags: np.ndarray) -> np.ndarray:
     """Measure the length of the run of True that each frame (T,) lies in, 0 for False."""
     edges = np.flatnonzero(np.diff(flags, prepend=not flags[0], append=not flags[-1]))
     lengths = np.diff(edges)
@@ -223,13 +223,13 @@ def measure_gaits(library: Library) -> tuple[Gait, ...]:
     metres: dict[str, Any] = {word: Counter() for word in LOCOMOTION}
     frames = library.frames
     step = np.linalg.norm(np.diff(frames.path, axis=0), axis=1)
-    chosen = dict(library.chosen)
-    recorded = {word for clip in library.clips if not clip.made for row in clip.annotations for word in row.words}
+    chosen = dict(library.chosen_gaits)
+    recorded = {word for clip in library.clips if not clip.is_synthetic for row in clip.annotations for word in row.words}
     for index, clip in enumerate(library.clips):
         first, rate = frames.first[index], library.fps / clip.motion.fps
         for row in () if clip.mirrored else clip.annotations:
-            word = gait_word(row)
-            if word is None or (clip.made and word in recorded) or chosen.get(word, clip.path) != clip.path:
+            word = find_gait_label(row)
+            if word is None or (clip.is_synthetic and word in recorded) or chosen.get(word, clip.path) != clip.path:
                 continue
             low, high = first + int(np.ceil(row.start * rate)), first + int(row.end * rate)
             seconds[word][row.words] += (row.end - row.start) / clip.motion.fps
@@ -239,7 +239,7 @@ def measure_gaits(library: Library) -> tuple[Gait, ...]:
         if times:
             words = max(times, key=lambda w: (times[w], w))
             found.append(Gait(word, words, metres[word][words] / max(times[words], 1e-9)))
-    if not any(gait.word != STANDING for gait in found):
+    if not any(gait.label != STANDING for gait in found):
         raise InputError(
             library.folder, "no locomotion clip", "clips annotated walking, jogging, running or sprinting",
             "label the clips that show locomotion",
@@ -248,7 +248,7 @@ def measure_gaits(library: Library) -> tuple[Gait, ...]:
     return tuple(ordered)
 
 
-def gait_word(row: ClipAnnotation) -> str | None:
+def find_gait_label(row: ClipAnnotation) -> str | None:
     """Return the gait of a row that shows a gait and at most a direction; None for a key moment, an action or a
     dribble.
     """

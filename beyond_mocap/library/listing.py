@@ -13,24 +13,24 @@ from pathlib import Path
 
 import numpy as np
 
-from ..annotation import ClipAnnotation, spoken
+from ..annotation import ClipAnnotation, sort_labels
 from ..base.errors import InputError
 from . import cache
 from .clip import Clip
 from .library import Library
-from .scan import Annotations, Conversions, is_foreign, own_recordings
+from .scan import Annotations, Conversions, is_foreign, list_own_recordings
 
 GOOD, FAIR, POOR, UNKNOWN = range(4)
 # m/s by which heels and toes in contact slide: fair and poor from sqrt(a^2 + (b v)^2) on at the speed v, as feet roll
-_SLIDES, _SLIDES_SHARE = (0.09, 0.18), 0.045
-_DRIFT = (0.10, 0.30)  # metres by which the floor rose or sank
-_JERKY = (2.0, 4.0)  # times the library's median at the same speed, in the clip's median
-_LEAST_JERK = 40.0  # m/s^3: a body at rest has almost none and is no reference
-_HEAD = 1 << 16  # bytes at the start of a file that contain its number of frames
+_SLIDE_LIMITS, _SLIDE_SPEED_SHARE = (0.09, 0.18), 0.045
+_DRIFT_LIMITS = (0.10, 0.30)  # metres by which the floor rose or sank
+_JERK_LIMITS = (2.0, 4.0)  # times the library's median at the same speed, in the clip's median
+_MIN_JERK = 40.0  # m/s^3: a body at rest has almost none and is no reference
+_HEAD_BYTES = 1 << 16  # bytes at the start of a file that contain its number of frames
 
 
 @dataclass(frozen=True, kw_only=True)
-class Listed:
+class ListedClip:
     """One clip of a list.
 
     Attributes:
@@ -44,35 +44,35 @@ class Listed:
     """
 
     path: str
-    words: tuple[str, ...]
-    moments: int
+    labels: tuple[str, ...]
+    key_moments: int
     seconds: float
     speed: float = float("nan")
-    fastest: float = float("nan")
-    mark: int = UNKNOWN
-    told: tuple[str, ...] = ()
+    max_speed: float = float("nan")
+    grade: int = UNKNOWN
+    details: tuple[str, ...] = ()
 
 
-def listed(library: Library) -> tuple[Listed, ...]:
+def list_clips(library: Library) -> tuple[ListedClip, ...]:
     """List all recordings of a built library, in its order; mirrored twins and synthetic clips are left out."""
     frames = library.frames
-    usual = _usual_jerk(frames.jerk, frames.speed)
-    ratio, speed = frames.jerk / usual[_speed_class(frames.speed)], frames.speed
+    usual_jerk = _compute_usual_jerk(frames.jerk, frames.speed)
+    ratio, speed = frames.jerk / usual_jerk[_classify_speed(frames.speed)], frames.speed
     out = []
     for number, clip in enumerate(library.clips):
-        if clip.mirrored or clip.made:
+        if clip.mirrored or clip.is_synthetic:
             continue
         part = slice(frames.first[number], frames.first[number] + frames.count[number])
         mean, fastest = float(speed[part].mean()), float(speed[part].max())
-        mark, told = _quality(clip, mean, float(np.median(ratio[part])))
+        mark, details = _grade_clip(clip, mean, float(np.median(ratio[part])))
         seconds = clip.recording.duration
-        words, keys = words_of(clip.annotations)
-        out.append(Listed(path=clip.path, words=words, moments=keys, seconds=seconds, speed=mean, fastest=fastest,
-                          mark=mark, told=told))
+        words, keys = collect_labels(clip.annotations)
+        out.append(ListedClip(path=clip.path, labels=words, key_moments=keys, seconds=seconds, speed=mean, max_speed=fastest,
+                          grade=mark, details=details))
     return tuple(out)
 
 
-def scanned(folder: str | Path, cache_dir: str | Path | None = None) -> tuple[Listed, ...]:
+def scan_clips(folder: str | Path, cache_dir: str | Path | None = None) -> tuple[ListedClip, ...]:
     """List all recordings below a folder without reading their motion.
 
     For a library that is not built, or that cannot be built because no clip has labels.
@@ -86,77 +86,77 @@ def scanned(folder: str | Path, cache_dir: str | Path | None = None) -> tuple[Li
         InputError: for a missing folder or a broken table.
     """
     folder = Path(folder)
-    paths = own_recordings(folder)
-    conversions = Conversions(folder, cache.place(folder, cache_dir)[0])
+    paths = list_own_recordings(folder)
+    conversions = Conversions(folder, cache.find_cache_folder(folder, cache_dir)[0])
     annotations = Annotations(folder, paths)
     out = []
     for path in paths:
-        frames, fps = _length(conversions.readable(path))
+        frames, fps = _read_length(conversions.find_readable_file(path))
         try:
-            rows = annotations.of(path, fps or 30.0)
+            rows = annotations.read_rows(path, fps or 30.0)
         except InputError:
             rows = ()
-        waits = is_foreign(path) and not conversions.stands(path)
-        told = ("not converted yet: press Build Library",) if waits else ()
+        needs_conversion = is_foreign(path) and not conversions.is_current(path)
+        details = ("not converted yet: press Build Library",) if needs_conversion else ()
         seconds = max(frames - 1, 0) / fps if fps else 0.0
-        words, keys = words_of(rows)
-        out.append(Listed(path=path.relative_to(folder).as_posix(), words=words, moments=keys, seconds=seconds,
-                          told=told))
+        words, keys = collect_labels(rows)
+        out.append(ListedClip(path=path.relative_to(folder).as_posix(), labels=words, key_moments=keys, seconds=seconds,
+                          details=details))
     return tuple(out)
 
 
-def words_of(rows: Sequence[ClipAnnotation]) -> tuple[tuple[str, ...], int]:
+def collect_labels(rows: Sequence[ClipAnnotation]) -> tuple[tuple[str, ...], int]:
     """Collect the labels of rows, key moments' first, as they are spoken, then those of the longest rows; and count the
     key
     moments.
     """
     ordered = sorted(rows, key=lambda row: (row.key is None, row.start - row.end))
-    words = dict.fromkeys(word for row in ordered for word in spoken(row.words))
+    words = dict.fromkeys(word for row in ordered for word in sort_labels(row.words))
     return tuple(words), sum(row.key is not None for row in rows)
 
 
-def _quality(clip: Clip, speed: float, jerk: float) -> tuple[int, tuple[str, ...]]:
+def _grade_clip(clip: Clip, speed: float, jerk: float) -> tuple[int, tuple[str, ...]]:
     """Grade a clip: the worst of its grades, and lines about the findings. speed: m/s; jerk: times the usual."""
-    marks, told = [_grade(jerk, _JERKY)], []
-    if clip.mended is not None:
-        mended = clip.mended
-        rolls = _SLIDES_SHARE * speed
-        marks += [_grade(mended.slides, tuple(np.hypot(_SLIDES, (rolls, 2.0 * rolls)))), _grade(mended.drift, _DRIFT)]
-        slid = f" (file: {100 * mended.slid:.0f})" if mended.slid > mended.slides + 0.01 else ""
-        told.append(f"feet slide: {100 * mended.slides:.0f} cm/s{slid}")
-        if mended.drift > 0.0:
-            told.append(f"floor levelled: {100 * mended.drift:.0f} cm")
-        if mended.pops:
-            told.append(f"jumps removed: {mended.pops}")
-    told.append(f"jerk: {jerk:.1f} x usual")
-    if clip.recorded is not None:
-        told.append("ends in flight: synthetic landing added")
+    marks, details = [_grade_value(jerk, _JERK_LIMITS)], []
+    if clip.repair_figures is not None:
+        figures = clip.repair_figures
+        rolling = _SLIDE_SPEED_SHARE * speed
+        marks += [_grade_value(figures.slides, tuple(np.hypot(_SLIDE_LIMITS, (rolling, 2.0 * rolling)))), _grade_value(figures.drift, _DRIFT_LIMITS)]
+        slid = f" (file: {100 * figures.slid:.0f})" if figures.slid > figures.slides + 0.01 else ""
+        details.append(f"feet slide: {100 * figures.slides:.0f} cm/s{slid}")
+        if figures.drift > 0.0:
+            details.append(f"floor levelled: {100 * figures.drift:.0f} cm")
+        if figures.pops:
+            details.append(f"jumps removed: {figures.pops}")
+    details.append(f"jerk: {jerk:.1f} x usual")
+    if clip.recorded_count is not None:
+        details.append("ends in flight: synthetic landing added")
     if not clip.annotations:
-        told.append("no labels: not used")
-    return max(marks), tuple(told)
+        details.append("no labels: not used")
+    return max(marks), tuple(details)
 
 
-def _grade(value: float, limits: tuple[float, float]) -> int:
+def _grade_value(value: float, limits: tuple[float, float]) -> int:
     return GOOD if value < limits[0] else FAIR if value < limits[1] else POOR
 
 
-def _speed_class(speed: np.ndarray) -> np.ndarray:
+def _classify_speed(speed: np.ndarray) -> np.ndarray:
     """Classify speeds by whole m/s, 8 and above in one class."""
     return np.minimum(speed.astype(int), 8)
 
 
-def _usual_jerk(jerk: np.ndarray, speed: np.ndarray) -> np.ndarray:
+def _compute_usual_jerk(jerk: np.ndarray, speed: np.ndarray) -> np.ndarray:
     """Compute the usual jerk (9,) m/s^3: the median of each speed class, of all frames where a class has few."""
-    kind, overall = _speed_class(speed), float(np.median(jerk))
+    kind, overall = _classify_speed(speed), float(np.median(jerk))
     usual = [np.median(jerk[kind == k]) if np.sum(kind == k) > 90 else overall for k in range(9)]
-    return np.maximum(usual, _LEAST_JERK)
+    return np.maximum(usual, _MIN_JERK)
 
 
-def _length(path: Path) -> tuple[int, float]:
+def _read_length(path: Path) -> tuple[int, float]:
     """Read the number of frames and frames per second from a BVH file's header; zeros where it has none."""
     try:
         with open(path, "rb") as file:
-            head = file.read(_HEAD).decode("ascii", "replace")
+            head = file.read(_HEAD_BYTES).decode("ascii", "replace")
     except OSError:
         return 0, 0.0
     frames, step = re.search(r"Frames:\s*(\d+)", head), re.search(r"Frame Time:\s*([\d.eE+-]+)", head)

@@ -14,18 +14,18 @@ import numpy as np
 
 from ..base.errors import InputError
 from ..motion import contacts
-from ..motion.humanoid import identify
+from ..motion.humanoid import identify_joints
 from ..motion.motion import Motion
 from ..motion.retargeting.retarget import Retargeter
 from ..motion.skeleton import Skeleton
 from . import repair
 
-SAME_BONES = 5e-3  # metres between offsets of equal bones
-_SAMPLE = 400  # frames from which a rig is analysed
+BONE_TOLERANCE = 5e-3  # metres between offsets of equal bones
+_SAMPLE_COUNT = 400  # frames from which a rig is analysed
 
 
-def bring(
-    paths: Sequence[Path], motions: Sequence[Motion], chosen: Motion | None, notes: list[str]
+def unify_skeletons(
+    paths: Sequence[Path], motions: Sequence[Motion], skeleton_example: Motion | None, notes: list[str]
 ) -> Iterator[tuple[Motion, np.ndarray, bool]]:
     """Bring clips to the library's skeleton.
 
@@ -44,25 +44,25 @@ def bring(
     Raises:
         InputError: naming the file, for a clip whose legs cannot be found.
     """
-    standing = [_named(path, lambda: contacts.points(motion)) for path, motion in zip(paths, motions)]
-    groups = _groups(motions)
-    skeleton = chosen.skeleton if chosen is not None else _commonest(motions, groups)
-    home = [i for i, motion in enumerate(motions) if motion.skeleton.same_bones(skeleton, SAME_BONES)]
-    example, feet = _sample([motions[i] for i in home], [standing[i] for i in home]) if home else (chosen, None)
+    contact_mask = [_run_for_file(path, lambda: contacts.detect_heel_toe_contacts(motion)) for path, motion in zip(paths, motions)]
+    groups = _group_by_skeleton(motions)
+    skeleton = skeleton_example.skeleton if skeleton_example is not None else _find_commonest_skeleton(motions, groups)
+    own_clips = [i for i, motion in enumerate(motions) if motion.skeleton.has_same_bones(skeleton, BONE_TOLERANCE)]
+    example, example_contacts = _sample_frames([motions[i] for i in own_clips], [contact_mask[i] for i in own_clips]) if own_clips else (skeleton_example, None)
     rigs = {}
     for group in groups:
-        if group[0] not in home:
-            sample, down = _sample([motions[i] for i in group], [standing[i] for i in group])
-            known: dict[str, Any] = {"example": example, "standing": down, "example_standing": feet}
-            rig = _named(paths[group[0]], lambda: Retargeter(sample, skeleton, **known))
+        if group[0] not in own_clips:
+            sample, sample_contacts = _sample_frames([motions[i] for i in group], [contact_mask[i] for i in group])
+            known: dict[str, Any] = {"example": example, "standing": sample_contacts, "example_standing": example_contacts}
+            rig = _run_for_file(paths[group[0]], lambda: Retargeter(sample, skeleton, **known))
             rigs.update(dict.fromkeys(group, rig))
     if rigs:
         others = sum(group[0] in rigs for group in groups)
         notes.append(f"{len(rigs)} clips of {others} other skeletons retargeted to the one with {len(skeleton)} joints")
-    return _brought(motions, standing, skeleton, rigs)
+    return _iter_unified(motions, contact_mask, skeleton, rigs)
 
 
-def bring_one(motion: Motion, target: Motion, bone_map: dict[str, str] | str | Path | None = None) -> Motion:
+def retarget_clip(motion: Motion, target: Motion, bone_map: dict[str, str] | str | Path | None = None) -> Motion:
     """Retarget one motion to the skeleton of `target`, with its feet planted; same rate and floor.
 
     On its own skeleton a motion is unchanged.
@@ -76,42 +76,42 @@ def bring_one(motion: Motion, target: Motion, bone_map: dict[str, str] | str | P
     Raises:
         InputError: as `Retargeter`.
     """
-    points, feet = _points_if_named(motion), _points_if_named(target)
+    contacts, target_contacts = _detect_contacts_if_known(motion), _detect_contacts_if_known(target)
     rig = Retargeter(
         motion, target.skeleton, bone_map, example=target,
-        standing=None if points is None else points.all(axis=2),
-        example_standing=None if feet is None else feet.all(axis=2),
+        standing=None if contacts is None else contacts.all(axis=2),
+        example_standing=None if target_contacts is None else target_contacts.all(axis=2),
     )
-    there = rig.carry(motion)
-    if points is None or feet is None or motion.skeleton.same_bones(target.skeleton, 1e-6):
-        return there
-    return repair.held(there, _standing_there(there, motion.skeleton, points))
+    retargeted = rig.retarget(motion)
+    if contacts is None or target_contacts is None or motion.skeleton.has_same_bones(target.skeleton, 1e-6):
+        return retargeted
+    return repair.plant_contacts(retargeted, _choose_contacts(retargeted, motion.skeleton, contacts))
 
 
-def _points_if_named(motion: Motion) -> np.ndarray | None:
+def _detect_contacts_if_known(motion: Motion) -> np.ndarray | None:
     """Detect contacts (T, 2, 2); None for a skeleton whose joints only a bone map identifies."""
     try:
-        return contacts.points(motion)
+        return contacts.detect_heel_toe_contacts(motion)
     except InputError:
         return None
 
 
-def _brought(motions, standing, skeleton: Skeleton, rigs) -> Iterator[tuple[Motion, np.ndarray, bool]]:
+def _iter_unified(motions, contacts, skeleton: Skeleton, rigs) -> Iterator[tuple[Motion, np.ndarray, bool]]:
     """Iterate over the clips on the library's skeleton, with contacts and whether they were retargeted."""
-    for number, (motion, points) in enumerate(zip(motions, standing)):
+    for number, (motion, points) in enumerate(zip(motions, contacts)):
         if number in rigs:
-            there = rigs[number].carry(motion)
-            yield there, _standing_there(there, motion.skeleton, points), True
+            retargeted = rigs[number].carry(motion)
+            yield retargeted, _choose_contacts(retargeted, motion.skeleton, points), True
         else:
             yield replace(motion, skeleton=skeleton), points, False
 
 
-def _standing_there(there: Motion, skeleton: Skeleton, points: np.ndarray) -> np.ndarray:
+def _choose_contacts(retargeted: Motion, skeleton: Skeleton, points: np.ndarray) -> np.ndarray:
     """Choose the contacts (T, 2, 2): the recording's own `points`, or new ones where only the new body has toes."""
-    return contacts.points(there) if _has_toes(there.skeleton) and not _has_toes(skeleton) else points
+    return contacts.detect_heel_toe_contacts(retargeted) if _has_toes(retargeted.skeleton) and not _has_toes(skeleton) else points
 
 
-def _named(path: Path, work):
+def _run_for_file(path: Path, work):
     """Run `work`; an error about its skeleton gets the file's name."""
     try:
         return work()
@@ -120,11 +120,11 @@ def _named(path: Path, work):
 
 
 def _has_toes(skeleton: Skeleton) -> bool:
-    body = identify(skeleton)
+    body = identify_joints(skeleton)
     return body.left.toe is not None and body.right.toe is not None
 
 
-def _groups(motions: Sequence[Motion]) -> list[list[int]]:
+def _group_by_skeleton(motions: Sequence[Motion]) -> list[list[int]]:
     """Group clips by skeleton, in the order of their first."""
     groups: dict[str, list[int]] = {}
     for number, motion in enumerate(motions):
@@ -132,23 +132,23 @@ def _groups(motions: Sequence[Motion]) -> list[list[int]]:
     return list(groups.values())
 
 
-def _commonest(motions: Sequence[Motion], groups: list[list[int]]) -> Skeleton:
+def _find_commonest_skeleton(motions: Sequence[Motion], groups: list[list[int]]) -> Skeleton:
     """Find the skeleton with most frames."""
     best = max(groups, key=lambda group: (sum(len(motions[i]) for i in group), -group[0]))
     return motions[best[0]].skeleton
 
 
-def _sample(motions: Sequence[Motion], standing: Sequence[np.ndarray]) -> tuple[Motion, np.ndarray]:
+def _sample_frames(motions: Sequence[Motion], contact_mask: Sequence[np.ndarray]) -> tuple[Motion, np.ndarray]:
     """Sample frames of all clips of one rig above one floor, and which feet (T, 2) are flat on the ground in them.
     """
     ends = np.cumsum([len(motion) for motion in motions])
-    frames = np.unique(np.linspace(0, ends[-1] - 1, _SAMPLE).astype(int))
-    roots, rotations, feet = [], [], []
-    for motion, points, end in zip(motions, standing, ends):
+    frames = np.unique(np.linspace(0, ends[-1] - 1, _SAMPLE_COUNT).astype(int))
+    roots, rotations, foot_contacts = [], [], []
+    for motion, points, end in zip(motions, contact_mask, ends):
         here = frames[(frames >= end - len(motion)) & (frames < end)] - (end - len(motion))
         if len(here):
-            roots.append(motion.root_positions[here] - [0.0, 0.0, contacts.ground_height(motion)])
+            roots.append(motion.root_positions[here] - [0.0, 0.0, contacts.measure_ground_height(motion)])
             rotations.append(motion.rotations[here])
-            feet.append(points.all(axis=2)[here])
+            foot_contacts.append(points.all(axis=2)[here])
     sample = Motion(motions[0].skeleton, np.concatenate(roots), np.concatenate(rotations), motions[0].fps)
-    return sample, np.concatenate(feet)
+    return sample, np.concatenate(foot_contacts)

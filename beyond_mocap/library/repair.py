@@ -22,12 +22,12 @@ import numpy as np
 from scipy.ndimage import minimum_filter1d
 
 from ..base.banded_least_squares import BandedLeastSquares
-from ..base.time_series import runs
+from ..base.time_series import find_runs
 from ..motion import contacts, quaternion
-from ..motion.foot_plant import plant
-from ..motion.humanoid import identify
+from ..motion.foot_plant import plant_feet
+from ..motion.humanoid import identify_joints
 from ..motion.motion import Motion, forward_kinematics
-from ..motion.track import zero_phase_hann
+from ..motion.track import smooth_zero_phase_hann
 
 # a rotation that jumps by more than this (radians) and by so many times what its neighbours move, and returns
 _POP = np.radians(12.0)
@@ -36,18 +36,18 @@ _POP_SECONDS = 0.04  # longer than a pop
 # limit of the slide of the balls of the feet in the middle of stances, sqrt(a^2 + (b v)^2) (m/s, mean over a clip at
 # mean speed v): optical recordings have 0.01 to 0.1 standing or walking and up to 0.067 v in runs, suits 0.12 to 0.25
 # at any speed
-_SLIDES, _SLIDES_SHARE = 0.13, 0.065
+_SLIDE_LIMIT, _SLIDE_SPEED_SHARE = 0.13, 0.065
 # stiffness of the floor's drift and of the corrected travel: about the seconds over which they can change
 _LOW_SECONDS, _DRIFT = 1.5, 0.13
 _FLOOR_SECONDS, _TRAVEL_SECONDS = 1.5, 0.2  # how slowly the floor's height and the sliding may change
-_FLOOR_MOST = 0.02  # metres of drift that are ignored: floors are uneven, and soles lie a little differently
-_KEEP_SPEED = 0.005  # weight of an unchanged speed against a foot in contact
-_SINKS = 0.10  # metres that a suit's pelvis may be too high above its feet
-_BALL = 0.7  # share of the distance from ankle to the foot's tip
+_MAX_FLOOR_DRIFT = 0.02  # metres of drift that are ignored: floors are uneven, and soles lie a little differently
+_SPEED_WEIGHT = 0.005  # weight of an unchanged speed against a foot in contact
+_MAX_PELVIS_DROP = 0.10  # metres that a suit's pelvis may be too high above its feet
+_BALL_SHARE = 0.7  # share of the distance from ankle to the foot's tip
 
 
 @dataclass(frozen=True, kw_only=True)
-class Repaired:
+class RepairedClip:
     """A repaired clip and what was changed.
 
     Attributes:
@@ -60,15 +60,15 @@ class Repaired:
     """
 
     motion: Motion
-    standing: np.ndarray
+    heel_toe_contacts: np.ndarray
     drift: float
     travel: float
     slide: tuple[float, float]
-    slid: bool
+    was_sliding: bool
 
 
 @dataclass(frozen=True)
-class Mended:
+class RepairFigures:
     """Figures of one clip's repair.
 
     Attributes:
@@ -83,7 +83,7 @@ class Mended:
     slides: float
 
 
-def without_pops(motion: Motion) -> tuple[Motion, int]:
+def remove_pops(motion: Motion) -> tuple[Motion, int]:
     """Remove rotations that jump for one or two frames and return.
 
     A joint pops where it is more than 12 degrees off the slerp of the frames around the gap, and more than four times
@@ -97,7 +97,7 @@ def without_pops(motion: Motion) -> tuple[Motion, int]:
     """
     rotations, count = np.array(motion.rotations), 0
     for width in range(1, 1 + min(2, int(_POP_SECONDS * motion.fps))):
-        here = _popped(rotations, width)
+        here = _detect_pops(rotations, width)
         for frame, joint in np.argwhere(here):
             before, after = rotations[frame - 1, joint], rotations[frame + width, joint]
             for step in range(width):
@@ -106,7 +106,7 @@ def without_pops(motion: Motion) -> tuple[Motion, int]:
     return (replace(motion, rotations=rotations), count) if count else (motion, 0)
 
 
-def without_drift(motion: Motion) -> tuple[Motion, float]:
+def remove_drift(motion: Motion) -> tuple[Motion, float]:
     """Remove a floor drift of more than _DRIFT metres.
 
     The floor is the lowest joint within _LOW_SECONDS (longer than a flight), smoothed. An inertial suit's floor can
@@ -122,14 +122,14 @@ def without_drift(motion: Motion) -> tuple[Motion, float]:
     width = max(1, int(round(_LOW_SECONDS * motion.fps)))
     floor = np.zeros((len(low), 1))
     for _ in range(3):  # on a slope the lowest point of a window lies at its end: the remainder is smaller each time
-        floor += zero_phase_hann(minimum_filter1d(low[:, None] - floor, width, axis=0), motion.fps, _LOW_SECONDS)
+        floor += smooth_zero_phase_hann(minimum_filter1d(low[:, None] - floor, width, axis=0), motion.fps, _LOW_SECONDS)
     drift = float(np.ptp(floor))
     if drift < _DRIFT:
         return motion, 0.0
     return replace(motion, root_positions=motion.root_positions - floor * [0.0, 0.0, 1.0]), drift
 
 
-def _popped(rotations: np.ndarray, width: int) -> np.ndarray:
+def _detect_pops(rotations: np.ndarray, width: int) -> np.ndarray:
     """Detect first frames of runs of `width` frames that jump and return: (T, J) bool; rotations (T, J, 4)."""
     out = np.zeros(rotations.shape[:2], bool)
     count = len(rotations) - width - 3
@@ -138,21 +138,21 @@ def _popped(rotations: np.ndarray, width: int) -> np.ndarray:
     # with the run starting at frame f: outer f - 2, before f - 1, after f + width, beyond f + width + 1
     outer, before = rotations[:count], rotations[1 : count + 1]
     after, beyond = rotations[width + 2 : width + 2 + count], rotations[width + 3 : width + 3 + count]
-    still = np.max([_angle(outer, before), _angle(before, after), _angle(after, beyond)], axis=0)
-    off = np.full(still.shape, np.inf)
+    still = np.max([_measure_angles(outer, before), _measure_angles(before, after), _measure_angles(after, beyond)], axis=0)
+    deviation = np.full(still.shape, np.inf)
     for step in range(width):
         here = rotations[2 + step : 2 + step + count]
-        off = np.minimum(off, np.minimum(_angle(here, before), _angle(here, after)))
-    out[2 : 2 + count] = (off > _POP) & (off > _POP_SHARE * still)
+        deviation = np.minimum(deviation, np.minimum(_measure_angles(here, before), _measure_angles(here, after)))
+    out[2 : 2 + count] = (deviation > _POP) & (deviation > _POP_SHARE * still)
     return out
 
 
-def _angle(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+def _measure_angles(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Measure the angles (...,) in radians between rotations (..., 4)."""
     return 2.0 * np.arccos(np.clip(np.abs(np.sum(a * b, axis=-1)), 0.0, 1.0))
 
 
-def grounded(motion: Motion, standing: np.ndarray | None = None, plants: bool = False) -> Repaired:
+def repair_floor_and_feet(motion: Motion, heel_toe_contacts: np.ndarray | None = None, always_plant: bool = False) -> RepairedClip:
     """Repair floor and feet: a level floor at height 0 under the soles (`contacts.measure_ground_height`), and planted
     feet.
 
@@ -166,87 +166,87 @@ def grounded(motion: Motion, standing: np.ndarray | None = None, plants: bool = 
     Returns:
         The repaired clip.
     """
-    standing = contacts.points(motion) if standing is None else standing
-    motion, drift = _levelled(motion, standing)
-    before, travel = slide(motion, standing), 0.0
-    slid = slides(motion, standing)
-    if slid:
-        motion, travel = _travelled(motion, standing)
-    if slid or plants:
-        motion = held(motion, standing)
-    level = motion.root_positions - [0.0, 0.0, contacts.ground_height(motion)]
-    return Repaired(motion=replace(motion, root_positions=level), standing=standing, drift=drift, travel=travel,
-                    slide=(before, slide(motion, standing)), slid=slid)
+    heel_toe_contacts = contacts.detect_heel_toe_contacts(motion) if heel_toe_contacts is None else heel_toe_contacts
+    motion, drift = _level_floor(motion, heel_toe_contacts)
+    before, travel = measure_slide(motion, heel_toe_contacts), 0.0
+    was_sliding = is_sliding(motion, heel_toe_contacts)
+    if was_sliding:
+        motion, travel = _correct_travel(motion, heel_toe_contacts)
+    if was_sliding or always_plant:
+        motion = plant_contacts(motion, heel_toe_contacts)
+    level = motion.root_positions - [0.0, 0.0, contacts.measure_ground_height(motion)]
+    return RepairedClip(motion=replace(motion, root_positions=level), heel_toe_contacts=heel_toe_contacts, drift=drift, travel=travel,
+                    slide=(before, measure_slide(motion, heel_toe_contacts)), was_sliding=was_sliding)
 
 
-def slides(motion: Motion, standing: np.ndarray) -> bool:
+def is_sliding(motion: Motion, heel_toe_contacts: np.ndarray) -> bool:
     """Whether feet in contact, by `heel_toe_contacts` (T, 2, 2), slide faster than in good recordings of that speed."""
-    way = np.linalg.norm(np.diff(motion.root_positions[:, :2], axis=0), axis=1)
-    speed = way.mean() * motion.fps if len(way) else 0.0
-    return _ball_slide(motion, standing) > np.hypot(_SLIDES, _SLIDES_SHARE * speed)
+    distances = np.linalg.norm(np.diff(motion.root_positions[:, :2], axis=0), axis=1)
+    speed = distances.mean() * motion.fps if len(distances) else 0.0
+    return _measure_ball_slide(motion, heel_toe_contacts) > np.hypot(_SLIDE_LIMIT, _SLIDE_SPEED_SHARE * speed)
 
 
-def held(motion: Motion, standing: np.ndarray) -> Motion:
+def plant_contacts(motion: Motion, heel_toe_contacts: np.ndarray) -> Motion:
     """Plant the feet where `heel_toe_contacts` (T, 2, 2) marks heels and toes in contact, at their own heights."""
-    planted = plant(motion.skeleton, motion.root_positions, motion.rotations, standing=standing, fps=motion.fps,
-                    sinks=_SINKS, levels=False)
+    planted = plant_feet(motion.skeleton, motion.root_positions, motion.rotations, heel_toe_contacts=heel_toe_contacts, fps=motion.fps,
+                    max_drop=_MAX_PELVIS_DROP, level_feet=False)
     return replace(motion, root_positions=planted.root, rotations=planted.rotations)
 
 
-def slide(motion: Motion, standing: np.ndarray) -> float:
+def measure_slide(motion: Motion, heel_toe_contacts: np.ndarray) -> float:
     """Measure the mean horizontal speed in m/s of heels and toes in contact, `heel_toe_contacts` (T, 2, 2); 0 without
     contact.
     """
-    body = identify(motion.skeleton)
+    body = identify_joints(motion.skeleton)
     places, _ = forward_kinematics(motion)
     points = np.stack([places[:, [limb.foot, limb.toe_or_foot], :2] for limb in (body.left, body.right)], axis=1)
-    firm = standing[1:] & standing[:-1]
-    return float(np.linalg.norm(np.diff(points, axis=0), axis=-1)[firm].mean() * motion.fps) if firm.any() else 0.0
+    in_contact = heel_toe_contacts[1:] & heel_toe_contacts[:-1]
+    return float(np.linalg.norm(np.diff(points, axis=0), axis=-1)[in_contact].mean() * motion.fps) if in_contact.any() else 0.0
 
 
-def _ball_slide(motion: Motion, standing: np.ndarray) -> float:
+def _measure_ball_slide(motion: Motion, heel_toe_contacts: np.ndarray) -> float:
     """Measure the mean speed in m/s of the balls of the feet in the middle of their stances; 0 without stances."""
-    speed = np.linalg.norm(np.diff(_balls(motion)[..., :2], axis=0), axis=-1) * motion.fps
-    weight = _inner(standing[..., 1])
-    firm = np.minimum(weight[1:], weight[:-1])
-    return float((speed * firm).sum() / max(firm.sum(), 1e-9))
+    speed = np.linalg.norm(np.diff(_compute_ball_positions(motion)[..., :2], axis=0), axis=-1) * motion.fps
+    weight = _weight_stance_middles(heel_toe_contacts[..., 1])
+    weights = np.minimum(weight[1:], weight[:-1])
+    return float((speed * weights).sum() / max(weights.sum(), 1e-9))
 
 
-def _balls(motion: Motion) -> np.ndarray:
+def _compute_ball_positions(motion: Motion) -> np.ndarray:
     """Compute the positions of the balls of both feet, (T, 2, 3) metres: toe joints, else between ankle and the foot's
     tip.
 
     They are in contact from the foot's landing to its push off; a heel rises meanwhile and shows little of floor and
     travel.
     """
-    skeleton, body = motion.skeleton, identify(motion.skeleton)
+    skeleton, body = motion.skeleton, identify_joints(motion.skeleton)
     places, world = forward_kinematics(motion)
     balls = []
     for limb in (body.left, body.right):
         ball = places[:, limb.toe_or_foot]
         if limb.toe is None:
-            ball = ball + quaternion.rotate(world[:, limb.foot], _BALL * skeleton.tip(limb.foot))
+            ball = ball + quaternion.rotate(world[:, limb.foot], _BALL_SHARE * skeleton.tip_offset(limb.foot))
         balls.append(ball)
     return np.stack(balls, axis=1)
 
 
-def _levelled(motion: Motion, standing: np.ndarray) -> tuple[Motion, float]:
+def _level_floor(motion: Motion, heel_toe_contacts: np.ndarray) -> tuple[Motion, float]:
     """Level the slow rise and fall of the floor under feet in contact; returns the motion and its range in metres."""
-    weight = _inner(standing[..., 1])
-    firm = np.flatnonzero(weight.any(axis=1))
-    if len(firm) < 2:
+    weight = _weight_stance_middles(heel_toe_contacts[..., 1])
+    frames_in_contact = np.flatnonzero(weight.any(axis=1))
+    if len(frames_in_contact) < 2:
         return motion, 0.0
-    heights = _balls(motion)[..., 2]
+    heights = _compute_ball_positions(motion)[..., 2]
     usual = [np.median(heights[:, side][weight[:, side] > 0.0]) if weight[:, side].any() else 0.0 for side in (0, 1)]
-    floor = _smooth((heights - usual) * weight, weight, _FLOOR_SECONDS, motion.fps, 1e-6)
-    floor = floor[np.clip(np.arange(len(floor)), firm[0], firm[-1])]
+    floor = _fit_smooth_curve((heights - usual) * weight, weight, _FLOOR_SECONDS, motion.fps, 1e-6)
+    floor = floor[np.clip(np.arange(len(floor)), frames_in_contact[0], frames_in_contact[-1])]
     drift = float(np.ptp(floor))
-    if drift < _FLOOR_MOST:
+    if drift < _MAX_FLOOR_DRIFT:
         return motion, 0.0
     return replace(motion, root_positions=motion.root_positions - floor[:, None] * [0.0, 0.0, 1.0]), drift
 
 
-def _travelled(motion: Motion, standing: np.ndarray) -> tuple[Motion, float]:
+def _correct_travel(motion: Motion, heel_toe_contacts: np.ndarray) -> tuple[Motion, float]:
     """Correct the pelvis's travel so that feet in contact stay; returns the motion and the last frame's shift in
     metres.
 
@@ -254,28 +254,28 @@ def _travelled(motion: Motion, standing: np.ndarray) -> tuple[Motion, float]:
     out
     unchanged, to half a per cent.
     """
-    velocity = np.diff(_balls(motion)[..., :2], axis=0) * motion.fps
-    weight = _inner(standing[..., 1])
-    firm = np.minimum(weight[1:], weight[:-1])
-    change = [-_smooth(velocity[..., axis] * firm, firm, _TRAVEL_SECONDS, motion.fps, _KEEP_SPEED) for axis in (0, 1)]
+    velocity = np.diff(_compute_ball_positions(motion)[..., :2], axis=0) * motion.fps
+    weight = _weight_stance_middles(heel_toe_contacts[..., 1])
+    weights = np.minimum(weight[1:], weight[:-1])
+    change = [-_fit_smooth_curve(velocity[..., axis] * weights, weights, _TRAVEL_SECONDS, motion.fps, _SPEED_WEIGHT) for axis in (0, 1)]
     moved = np.zeros((len(motion), 3))
     moved[1:, :2] = np.cumsum(np.stack(change, axis=1), axis=0) / motion.fps
     return replace(motion, root_positions=motion.root_positions + moved), float(np.linalg.norm(moved[-1]))
 
 
-def _inner(stands: np.ndarray) -> np.ndarray:
+def _weight_stance_middles(contacts: np.ndarray) -> np.ndarray:
     """Weight stances (T, 2): 1 in the middle third of every stance and 0 in its outer sixths, from `contacts` (T, 2)
     bool.
     """
-    weight = np.zeros(stands.shape)
-    for side, one in enumerate(stands.T):
-        for start, stop in runs(one):
+    weight = np.zeros(contacts.shape)
+    for side, one in enumerate(contacts.T):
+        for start, stop in find_runs(one):
             share = (np.arange(stop - start) + 0.5) / (stop - start)
             weight[start:stop, side] = np.clip(3.0 * np.minimum(share, 1.0 - share) - 0.5, 0.0, 1.0)
     return weight
 
 
-def _smooth(pushed: np.ndarray, weight: np.ndarray, seconds: float, fps: float, pull: float) -> np.ndarray:
+def _fit_smooth_curve(weighted_values: np.ndarray, weight: np.ndarray, seconds: float, fps: float, pull: float) -> np.ndarray:
     """Fit the curve f (T,) of least sum w (f - v)^2 + pull f^2 + stiffness |f''|^2.
 
     Args:
@@ -287,14 +287,14 @@ def _smooth(pushed: np.ndarray, weight: np.ndarray, seconds: float, fps: float, 
     Returns:
         (T,).
     """
-    squares = BandedLeastSquares(len(pushed), reach=2)
+    squares = BandedLeastSquares(len(weighted_values), reach=2)
     squares.add_value(weight.sum(axis=1) + pull)
     squares.add_difference(2, (seconds * fps) ** 4)
-    squares.right += pushed.sum(axis=1)
+    squares.right += weighted_values.sum(axis=1)
     return squares.solve()[:, 0]
 
 
-def describe_repairs(repaired: Sequence[tuple[Repaired, int]]) -> list[str]:
+def describe_repairs(repaired: Sequence[tuple[RepairedClip, int]]) -> list[str]:
     """Describe the repairs of a library's clips, one line per kind. repaired: each clip's repair and its number of
     pops.
     """
@@ -305,11 +305,11 @@ def describe_repairs(repaired: Sequence[tuple[Repaired, int]]) -> list[str]:
     drifts = [one.drift for one, _ in repaired if one.drift > 0.0]
     if drifts:
         lines.append(f"floor levelled in {len(drifts)} clips, by {np.median(drifts) * 100:.0f} cm (median)")
-    slid = [one for one, _ in repaired if one.slid]
-    if slid:
-        before, after = (np.mean([one.slide[i] for one in slid]) * 100 for i in (0, 1))
+    sliding = [one for one, _ in repaired if one.was_sliding]
+    if sliding:
+        before, after = (np.mean([one.slide[i] for one in sliding]) * 100 for i in (0, 1))
         lines.append(
-            f"feet planted in {len(slid)} clips: mean slide {before:.0f} cm/s before, {after:.0f} cm/s after; "
-            f"path corrected by {np.median([one.travel for one in slid]):.2f} m (median)"
+            f"feet planted in {len(sliding)} clips: mean slide {before:.0f} cm/s before, {after:.0f} cm/s after; "
+            f"path corrected by {np.median([one.travel for one in sliding]):.2f} m (median)"
         )
     return lines

@@ -49,21 +49,21 @@ def find_recordings(folder: str | Path, endings: tuple[str, ...] = (".bvh", *FOR
         raise InputError(folder, what, "a folder with BVH files", "choose the folder of your library")
     found: list[Path] = []
     seen: set[tuple[int, int]] = set()
-    for here, folders, files in os.walk(folder, followlinks=True):
-        status = os.stat(here)
+    for parent, folders, files in os.walk(folder, followlinks=True):
+        status = os.stat(parent)
         if (status.st_dev, status.st_ino) in seen:
             folders.clear()
             continue
         seen.add((status.st_dev, status.st_ino))
         folders[:] = sorted(name for name in folders if name != CACHE_FOLDER)
-        found += [Path(here) / name for name in files if name.lower().endswith(endings)]
+        found += [Path(parent) / name for name in files if name.lower().endswith(endings)]
     for path in found:
         if str(path.relative_to(folder)).encode("utf-8", "replace").decode() != str(path.relative_to(folder)):
             raise InputError(ascii(str(path)), "a name that is not UTF-8", "a name in UTF-8", "rename the file")
     return sorted(found, key=lambda path: path.relative_to(folder).as_posix())
 
 
-def own_recordings(folder: str | Path) -> list[Path]:
+def list_own_recordings(folder: str | Path) -> list[Path]:
     """List the recordings that are a library's clips, as `find_recordings`; of `kick.bvh` and `kick.fbx` only the
     former.
     """
@@ -72,7 +72,7 @@ def own_recordings(folder: str | Path) -> list[Path]:
     return [path for path in found if not is_foreign(path) or path.with_suffix("") not in plain]
 
 
-def readable_clips(folder: str | Path, place: str | Path) -> tuple[list[Path], Conversions, list[str]]:
+def find_readable_clips(folder: str | Path, place: str | Path) -> tuple[list[Path], Conversions, list[str]]:
     """Find the recordings of a library that can be read now.
 
     Args:
@@ -83,10 +83,10 @@ def readable_clips(folder: str | Path, place: str | Path) -> tuple[list[Path], C
     Raises:
         InputError: if none can be read.
     """
-    found, conversions = own_recordings(folder), Conversions(folder, place)
-    waiting = conversions.waiting(found)
-    late = set(waiting)
-    ready = [path for path in found if path not in late]
+    found, conversions = list_own_recordings(folder), Conversions(folder, place)
+    waiting = conversions.list_waiting(found)
+    waiting_set = set(waiting)
+    ready = [path for path in found if path not in waiting_set]
     if not ready and waiting:
         what = f"no BVH file in the folder, but {len(waiting)} that only Blender reads ({waiting[0].name})"
         raise InputError(folder, what, "at least one .bvh", "press Build Library in Blender")
@@ -103,13 +103,13 @@ def find_tables(folder: Path, clips: list[Path]) -> list[Path]:
     larger collection.
     """
     folder = Path(folder)
-    homes = {clip.parent for clip in clips}
-    places = {place for home in homes for place in (home, *home.parents) if place == folder or folder in place.parents}
-    places |= {folder, _absolute(folder).parent}
-    return sorted(place / TABLE_NAME for place in places if (place / TABLE_NAME).is_file())
+    clip_folders = {clip.parent for clip in clips}
+    folders = {place for home in clip_folders for place in (home, *home.parents) if place == folder or folder in place.parents}
+    folders |= {folder, _to_absolute(folder).parent}
+    return sorted(place / TABLE_NAME for place in folders if (place / TABLE_NAME).is_file())
 
 
-def _absolute(path: Path) -> Path:
+def _to_absolute(path: Path) -> Path:
     """Return the absolute path without `..`: with the library given as `..`, the folder above it is not its last part.
     """
     return Path(os.path.normpath(path.absolute()))
@@ -118,23 +118,23 @@ def _absolute(path: Path) -> Path:
 class Annotations:
     """The annotations of a library's clips, found as ../shared/contract.md describes under "Library annotations"."""
 
-    def __init__(self, folder: Path, clips: list[Path], but: Callable[[Mapping], bool] | None = None):
+    def __init__(self, folder: Path, clips: list[Path], skips: Callable[[Mapping], bool] | None = None):
         """Read every table that may apply, without the rows that `skips` selects (`read_annotation_csv`); InputError
         for
         a broken
         one.
         """
         tables = find_tables(folder, clips)
-        self.tables = {_absolute(table.parent): read_annotation_csv(table, but) for table in tables}
+        self.tables = {_to_absolute(table.parent): read_annotation_csv(table, skips) for table in tables}
 
-    def of(self, clip: Path, fps: float) -> tuple[ClipAnnotation, ...]:
+    def read_rows(self, clip: Path, fps: float) -> tuple[ClipAnnotation, ...]:
         """Read the rows of one clip: NAME.txt beside it, else the nearest table from its folder upward that has rows
         for it.
         """
         beside = clip.with_suffix(".txt")
         if beside.is_file():
             return tuple(read_clip_annotations(beside, fps))
-        clip = _absolute(clip)
+        clip = _to_absolute(clip)
         for place in clip.parents:
             if place in self.tables:
                 rows = self.tables[place].get(clip.relative_to(place).as_posix())
@@ -142,7 +142,7 @@ class Annotations:
                     return tuple(rows)
         return ()
 
-    def sources(self, clips: list[Path]) -> list[Path]:
+    def list_sources(self, clips: list[Path]) -> list[Path]:
         """List every file that was or would be read for annotations; the cache depends on them."""
         texts = [clip.with_suffix(".txt") for clip in clips]
         return [path for path in texts if path.is_file()] + [place / TABLE_NAME for place in sorted(self.tables)]
@@ -163,34 +163,34 @@ class Conversions:
 
     def __init__(self, folder: str | Path, place: str | Path):
         """Read the table of conversions; a damaged one counts as empty. place: the library's cache folder."""
-        self.folder, self.room = Path(folder), Path(place) / "converted"
+        self.folder, self.converted_folder = Path(folder), Path(place) / "converted"
         try:
-            table = json.loads((self.room / _TABLE).read_text("utf-8"))
+            table = json.loads((self.converted_folder / _TABLE).read_text("utf-8"))
             self._stamps = {str(name): list(stamp) for name, stamp in table.items()}
         except (OSError, ValueError, AttributeError, TypeError):
             self._stamps = {}
 
-    def readable(self, path: Path) -> Path:
+    def find_readable_file(self, path: Path) -> Path:
         """Return the BVH file to read for a recording: itself, or its conversion."""
-        return self.room / (self._name(path) + ".bvh") if is_foreign(path) else path
+        return self.converted_folder / (self._build_key(path) + ".bvh") if is_foreign(path) else path
 
-    def stands(self, path: Path) -> bool:
+    def is_current(self, path: Path) -> bool:
         """Whether a recording can be read in its current state."""
         if not is_foreign(path):
             return True
-        return self._stamps.get(self._name(path)) == stamp_of(path) and self.readable(path).is_file()
+        return self._stamps.get(self._build_key(path)) == read_stamp(path) and self.find_readable_file(path).is_file()
 
-    def waiting(self, paths: Sequence[Path]) -> list[Path]:
+    def list_waiting(self, paths: Sequence[Path]) -> list[Path]:
         """List the recordings among `paths` that need a conversion."""
-        return [path for path in paths if not self.stands(path)]
+        return [path for path in paths if not self.is_current(path)]
 
-    def prepare(self, path: Path) -> Path:
+    def prepare_file(self, path: Path) -> Path:
         """Create the folder for a conversion and return the file to write.
 
         Raises:
             InputError: if the folder cannot be written.
         """
-        target = self.readable(path)
+        target = self.find_readable_file(path)
         try:
             target.parent.mkdir(parents=True, exist_ok=True)
         except OSError as error:
@@ -198,12 +198,12 @@ class Conversions:
             raise InputError(target.parent, found, expected, "choose another cache folder") from None
         return target
 
-    def keep(self, path: Path, stamp: list[int]) -> None:
+    def record_conversion(self, path: Path, stamp: list[int]) -> None:
         """Record that a recording has been converted in the state of its `stamp`."""
-        self._stamps[self._name(path)] = stamp
-        atomic_write(self.room / _TABLE, json.dumps(self._stamps, indent=0, sort_keys=True))
+        self._stamps[self._build_key(path)] = stamp
+        atomic_write(self.converted_folder / _TABLE, json.dumps(self._stamps, indent=0, sort_keys=True))
 
-    def _name(self, path: Path) -> str:
+    def _build_key(self, path: Path) -> str:
         return path.relative_to(self.folder).as_posix()
 
 
@@ -216,7 +216,7 @@ def describe_waiting(waiting: Sequence[Path]) -> list[str]:
             "press Build Library in Blender to convert them"]
 
 
-def stamp_of(path: Path) -> list[int]:
+def read_stamp(path: Path) -> list[int]:
     """Read size and modification time of a file; zeros where it cannot be read."""
     try:
         status = os.stat(path)

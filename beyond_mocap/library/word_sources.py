@@ -14,12 +14,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..annotation import ClipAnnotation, clip_annotations, parse_timeline
+from ..annotation import ClipAnnotation, build_clip_annotations, parse_timeline
 from ..annotation.text import read_text
 
 RULES, LEARNED = "rules", "learned"
 
-Found = dict[ClipAnnotation, tuple[str, float]]
+FoundSources = dict[ClipAnnotation, tuple[str, float]]
 Sources = Mapping[ClipAnnotation, tuple[str, float]]
 """A row -> its source (RULES or LEARNED) and its confidence from 0 to 1."""
 
@@ -45,24 +45,24 @@ class Proposal:
     source: str = RULES
 
 
-def comment(row: ClipAnnotation, sources: Sources) -> str:
+def format_comment(row: ClipAnnotation, sources: Sources) -> str:
     """Format the comment behind a row's lines; empty where a person wrote the row."""
     found = sources.get(row)
     return f"  # {found[0]} {found[1]:.2f}" if found else ""
 
 
-def cells(row: ClipAnnotation, sources: Sources) -> dict[str, str]:
+def format_cells(row: ClipAnnotation, sources: Sources) -> dict[str, str]:
     """Format a table's cells in COLUMNS."""
     source, confidence = sources.get(row, ("", 0.0))
     return {"source": source, "confidence": f"{confidence:.2f}" if source else ""}
 
 
-def is_open(row: Mapping) -> bool:
+def is_unreviewed(row: Mapping) -> bool:
     """Whether a table's row (column -> text) was proposed and not accepted yet."""
     return (row.get("source") or "").strip() in (RULES, LEARNED) and bool((row.get("why") or "").strip())
 
 
-def sources_in_text(path: Path, rows: tuple[ClipAnnotation, ...], fps: float) -> Found:
+def read_text_sources(path: Path, rows: tuple[ClipAnnotation, ...], fps: float) -> FoundSources:
     """Read the sources of rows in a text file; of a row with two lines the key moment's counts.
 
     Args:
@@ -74,28 +74,28 @@ def sources_in_text(path: Path, rows: tuple[ClipAnnotation, ...], fps: float) ->
     Raises:
         InputError: if the file cannot be read.
     """
-    said = {}
+    comments = {}
     for line in read_text(path).splitlines():
         found = _COMMENT.search(line)
-        for row in clip_annotations(parse_timeline(line, str(path), fps), fps) if found else ():
-            said[(row.start, row.end) if row.key is None else row.key, frozenset(row.words)] = found
+        for row in build_clip_annotations(parse_timeline(line, str(path), fps), fps) if found else ():
+            comments[(row.start, row.end) if row.key is None else row.key, frozenset(row.words)] = found
     out = {}
     for row in rows:
-        found = said.get((row.key if row.key is not None else (row.start, row.end), frozenset(row.words)))
+        found = comments.get((row.key if row.key is not None else (row.start, row.end), frozenset(row.words)))
         if found:
             out[row] = (found[1], min(1.0, float(found[2])))
     return out
 
 
-def sources_in_table(path: Path, name: str, rows: tuple[ClipAnnotation, ...]) -> Found:
+def read_table_sources(path: Path, name: str, rows: tuple[ClipAnnotation, ...]) -> FoundSources:
     """Read the sources of a clip's rows in a table that has the columns; `name` as its column `file` spells it."""
-    spelled: dict[tuple, ClipAnnotation] = {
+    rows_by_text: dict[tuple, ClipAnnotation] = {
         (str(row.start), str(row.end), "" if row.key is None else str(row.key), " ".join(row.words)): row
         for row in rows
     }
     out = {}
     for line in csv.DictReader(io.StringIO(read_text(path), newline="")):
-        file, source, sure, *there = ((line.get(column) or "").strip() for column in ("file", *COLUMNS, *_ROW))
-        if file == name and source and re.fullmatch(r"[01](\.\d+)?", sure) and tuple(there) in spelled:
-            out[spelled[tuple(there)]] = (source, min(1.0, float(sure)))
+        file, source, sure, *cells = ((line.get(column) or "").strip() for column in ("file", *COLUMNS, *_ROW))
+        if file == name and source and re.fullmatch(r"[01](\.\d+)?", sure) and tuple(cells) in rows_by_text:
+            out[rows_by_text[tuple(cells)]] = (source, min(1.0, float(sure)))
     return out

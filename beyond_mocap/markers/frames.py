@@ -10,7 +10,7 @@ import numpy as np
 
 # Only the extent off its longest line determines how a cluster turns about that line. Below this share of its length
 # (root mean squares), half a millimetre of noise on a hand's breadth already rotates it by ten degrees.
-_OFF_THE_LINE = 0.03
+_MIN_WIDTH_SHARE = 0.03
 
 
 class RigidFit(NamedTuple):
@@ -29,10 +29,10 @@ class RigidFit(NamedTuple):
     rotation: np.ndarray
     shift: np.ndarray
     rms: np.ndarray
-    sound: np.ndarray
+    is_determined: np.ndarray
 
 
-def rigid_fit(model: np.ndarray, seen: np.ndarray, weights: np.ndarray | None = None) -> RigidFit:
+def fit_rigid(model: np.ndarray, seen: np.ndarray, weights: np.ndarray | None = None) -> RigidFit:
     """Fit the rigid motions that bring clusters nearest to the recorded markers, all frames at once.
 
     The cross-covariance of both clusters about their means (eq. 3.12-3.13) is factored into singular values, which give
@@ -47,7 +47,7 @@ def rigid_fit(model: np.ndarray, seen: np.ndarray, weights: np.ndarray | None = 
         Rotation, shift, rms and whether the fit is determined, over the leading axes.
     Source: Fredriksson section 3.4.2, equations (3.12) to (3.15).
     """
-    model, seen, weight = _counted(model, seen, weights)
+    model, seen, weight = _zero_unweighted(model, seen, weights)
     total = weight.sum(axis=-1)
     with np.errstate(invalid="ignore", divide="ignore"):
         share = weight / total[..., None]
@@ -66,21 +66,21 @@ def rigid_fit(model: np.ndarray, seen: np.ndarray, weights: np.ndarray | None = 
     rms = np.sqrt(np.einsum("...n,...nc,...nc->...", share, away, away))
     # rotating about the longest line changes the misfit by the sum of the two smaller singular values;
     # these are squared lengths, hence the squared share
-    sound = (size[..., 1] + sign * size[..., 2] > _OFF_THE_LINE**2 * size[..., 0]) & (np.sum(weight > 0.0, axis=-1) > 2)
+    sound = (size[..., 1] + sign * size[..., 2] > _MIN_WIDTH_SHARE**2 * size[..., 0]) & (np.sum(weight > 0.0, axis=-1) > 2)
     known = np.where(total > 0.0, 1.0, np.nan)  # NaN marks frames without a visible marker
     return RigidFit(rotation * known[..., None, None], shift * known[..., None], rms * known, sound)
 
 
-def _counted(model, seen, weights):
+def _zero_unweighted(model, seen, weights):
     """Return both clusters with zeros where a marker has no weight, and the weights (..., N), broadcast together."""
     model, seen = np.broadcast_arrays(np.asarray(model, dtype=float), np.asarray(seen, dtype=float))
-    there = np.isfinite(model).all(axis=-1) & np.isfinite(seen).all(axis=-1)
-    weight = np.where(there, 1.0 if weights is None else np.asarray(weights, dtype=float), 0.0)
+    visible = np.isfinite(model).all(axis=-1) & np.isfinite(seen).all(axis=-1)
+    weight = np.where(visible, 1.0 if weights is None else np.asarray(weights, dtype=float), 0.0)
     counts = (weight > 0.0)[..., None]
     return np.where(counts, model, 0.0), np.where(counts, seen, 0.0), np.where(weight > 0.0, weight, 0.0)
 
 
-def placed(fit: RigidFit, model: np.ndarray) -> np.ndarray:
+def place_points(fit: RigidFit, model: np.ndarray) -> np.ndarray:
     """Move points with fitted motions.
 
     Args:
@@ -92,7 +92,7 @@ def placed(fit: RigidFit, model: np.ndarray) -> np.ndarray:
     return np.einsum("...ij,...nj->...ni", fit.rotation, model) + fit.shift[..., None, :]
 
 
-def taken_back(fit: RigidFit, seen: np.ndarray) -> np.ndarray:
+def to_model_frame(fit: RigidFit, seen: np.ndarray) -> np.ndarray:
     """Convert points of the world to the model's own frame.
 
     Args:
@@ -104,7 +104,7 @@ def taken_back(fit: RigidFit, seen: np.ndarray) -> np.ndarray:
     return np.einsum("...ji,...nj->...ni", fit.rotation, seen - fit.shift[..., None, :])
 
 
-def mean_rotation(rotations: np.ndarray, weights: np.ndarray | None = None) -> np.ndarray:
+def compute_mean_rotation(rotations: np.ndarray, weights: np.ndarray | None = None) -> np.ndarray:
     """Compute the mean of rotation matrices: the rotation nearest to all by squared chords.
 
     The result equals the dominant eigenvector of the quaternions' outer products, computed from the sum of the

@@ -14,23 +14,23 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from .. import __version__
-from ..base.errors import Cancelled, InputError
-from ..base.settings import defaults, setting
+from ..base.errors import UserCancelledError, InputError
+from ..base.settings import collect_defaults, find_setting
 from ..motion.motion import Motion
-from .cleaning.clean import Cleaned, clean
+from .cleaning.clean import CleaningResult, clean_trial
 from .model.model import MarkerModel
-from .pose.pose import HeldBall, PoseSettings, Solved, solve
-from .pose.residuals import floor_under, seen_markers
-from .trial import MarkerTrial, evenly, list_some
+from .pose.pose import HeldBall, PoseSettings, PoseSolution, solve_poses
+from .pose.residuals import measure_floor, collect_markers
+from .trial import MarkerTrial, resample_evenly, list_some
 
-_DEFAULTS = defaults("markers")
-FILTERS = setting("markers", "filter").choice_names
-RELEASES = setting("markers", "release").choice_names
-_SMOOTHNESS = setting("markers", "smoothness")
-LEAST_MARKERS = 0.5  # share of a model's markers that a trial must contain
-_TOLD_FLOOR = 0.02  # metres from height 0 beyond which the floor height is reported
+_DEFAULTS = collect_defaults("markers")
+FILTERS = find_setting("markers", "filter").choice_names
+RELEASES = find_setting("markers", "release").choice_names
+_SMOOTHNESS = find_setting("markers", "smoothness")
+MIN_MARKER_SHARE = 0.5  # share of a model's markers that a trial must contain
+_REPORTED_FLOOR_HEIGHT = 0.02  # metres from height 0 beyond which the floor height is reported
 # Mean residuals in metres above which the fit is reported as poor: over all markers, and of one marker.
-_FAR_MEAN, _FAR_MARKER = 0.015, 0.04
+_POOR_MEAN_RESIDUAL, _POOR_MARKER_RESIDUAL = 0.015, 0.04
 
 Progress = Callable[[float, str], None]
 
@@ -76,7 +76,7 @@ class ReconstructSettings:
                 raise InputError(name, f"{getattr(self, name)!r}", f"one of {', '.join(choices)}")
         least, most = _SMOOTHNESS.least, _SMOOTHNESS.most
         if not least <= self.smoothness <= most:
-            raise InputError("smoothness", f"{self.smoothness} s", _SMOOTHNESS.limits_text(least, most))
+            raise InputError("smoothness", f"{self.smoothness} s", _SMOOTHNESS.describe_limits(least, most))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -102,8 +102,8 @@ class Reconstruction:
     model: MarkerModel
     trial: MarkerTrial
     raw: MarkerTrial
-    solved: Solved
-    cleaned: Cleaned
+    solved: PoseSolution
+    cleaned: CleaningResult
     release: object | None = None
     held: np.ndarray | None = None
     floor: float = 0.0
@@ -112,19 +112,19 @@ class Reconstruction:
     warnings: tuple[str, ...] = ()
 
     @property
-    def lowered(self) -> float:
+    def lowered_by(self) -> float:
         """Metres by which motion and trial are lower than the recorded markers."""
         return self.floor if self.grounded else 0.0
 
-    def on_floor(self) -> Motion:
+    def place_on_floor(self) -> Motion:
         """Return the motion with its floor at height 0, as clips of a library have it."""
-        return self.motion if self.grounded else moved_down(self.motion, self.floor)
+        return self.motion if self.grounded else move_down(self.motion, self.floor)
 
     def report(self) -> dict:
         """Return the figures of the reconstruction, as values for JSON."""
-        from .reconstruction_figures import figures
+        from .reconstruction_figures import collect_figures
 
-        return {"version": __version__, **figures(self)}
+        return {"version": __version__, **collect_figures(self)}
 
 
 def reconstruct(trial: MarkerTrial, static: MarkerTrial | None = None, model: MarkerModel | None = None,
@@ -150,43 +150,43 @@ def reconstruct(trial: MarkerTrial, static: MarkerTrial | None = None, model: Ma
     from threadpoolctl import threadpool_limits
 
     with threadpool_limits(limits=1):  # same bits on every machine; several threads slow small systems down
-        return _reconstruct(trial, static, model, settings=settings, road=_Road(progress, cancelled),
+        return _reconstruct_on_one_thread(trial, static, model, settings=settings, monitor=_RunMonitor(progress, cancelled),
                             cancelled=cancelled)
 
 
-def _reconstruct(trial, static, model, settings: ReconstructSettings, road: _Road, cancelled) -> Reconstruction:
+def _reconstruct_on_one_thread(trial, static, model, settings: ReconstructSettings, monitor: _RunMonitor, cancelled) -> Reconstruction:
     """Run `reconstruct` on a single thread."""
-    with road.step("clean", 0.1):
-        marker_set = set_of(trial, model, settings)
-        seen, still = (None if one is None else named_evenly(one, marker_set) for one in (trial, static))
+    with monitor.time_step("clean", 0.1):
+        marker_set = find_marker_set(trial, model, settings)
+        visible, still = (None if one is None else prepare_trial(one, marker_set) for one in (trial, static))
         if model is not None:
-            _check_fits(model, seen)
-        road.tell(_checked(seen, still, marker_set, model))
-        cleaned = _tidied(seen, marker_set, model, road.inner(0.0, 0.1), cancelled)
-        tidy, told = cleaned.trial, cleaned.for_pose()  # long filled gaps are for display, not evidence for the pose
-        road.tell(cleaned.report.lines)
-    with road.step("model", 0.45):
+            _check_model_fits(model, visible)
+        monitor.add_warnings(_check_trial(visible, still, marker_set, model))
+        cleaned = _clean_trial(visible, marker_set, model, monitor.build_inner_progress(0.0, 0.1), cancelled)
+        clean_markers, evidence = cleaned.trial, cleaned.build_pose_trial()  # long filled gaps are for display, not evidence for the pose
+        monitor.add_warnings(cleaned.report.lines)
+    with monitor.time_step("model", 0.45):
         if model is None:
-            still = None if still is None else _tidied(still, marker_set, None, None, cancelled).for_pose()
-            model = _calibrated(marker_set, told, still, road.inner(0.1, 0.45), cancelled)
-            road.tell(model.notes)
-    with road.step("pose", 0.85):
-        solved = _posed(model, told, marker_set, settings=settings, road=road, cancelled=cancelled)
-        road.tell([*solved.notes, *_far_off(solved, model)])
-    with road.step("filter", 0.92):
-        motion, held = _filtered(solved, model, seen, settings, road)
-    with road.step("floor", 0.94):
-        floor = _floor(model, tidy, settings, road)
+            still = None if still is None else _clean_trial(still, marker_set, None, None, cancelled).build_pose_trial()
+            model = _calibrate_model(marker_set, evidence, still, monitor.build_inner_progress(0.1, 0.45), cancelled)
+            monitor.add_warnings(model.notes)
+    with monitor.time_step("pose", 0.85):
+        solved = _solve_pose(model, evidence, marker_set, settings=settings, monitor=monitor, cancelled=cancelled)
+        monitor.add_warnings([*solved.notes, *_describe_poor_fit(solved, model)])
+    with monitor.time_step("filter", 0.92):
+        motion, held = _filter_motion(solved, model, visible, settings, monitor)
+    with monitor.time_step("floor", 0.94):
+        floor = _measure_floor(model, clean_markers, settings, monitor)
         down = floor if settings.floor else 0.0
-        motion, tidy, seen = moved_down(motion, down), _lowered(tidy, down), _lowered(seen, down)
-    with road.step("release", 1.0):
-        found = _release(seen, motion, model, marker_set=marker_set, settings=settings, road=road)
-    return Reconstruction(motion=motion, model=model, trial=tidy, raw=trial, solved=solved, cleaned=cleaned,
-                          release=found, held=held, floor=floor, grounded=settings.floor, seconds=road.seconds,
-                          warnings=tuple(road.warnings))
+        motion, clean_markers, visible = move_down(motion, down), _move_trial_down(clean_markers, down), _move_trial_down(visible, down)
+    with monitor.time_step("release", 1.0):
+        release = _find_release(visible, motion, model, marker_set=marker_set, settings=settings, monitor=monitor)
+    return Reconstruction(motion=motion, model=model, trial=clean_markers, raw=trial, solved=solved, cleaned=cleaned,
+                          release=release, held=held, floor=floor, grounded=settings.floor, seconds=monitor.seconds,
+                          warnings=tuple(monitor.warnings))
 
 
-class _Road:
+class _RunMonitor:
     """Collect progress, the seconds of each step and the warnings of a run, and check for cancellation."""
 
     def __init__(self, progress, cancelled):
@@ -196,17 +196,17 @@ class _Road:
         self.warnings: list[str] = []
 
     @contextmanager
-    def step(self, name: str, until: float):
+    def time_step(self, name: str, until: float):
         """Time one step; `until` is the share of the whole that is done after it."""
-        self.check()
+        self.check_cancelled()
         if self._progress:
             self._progress(self._done, name)
-        begun = time.perf_counter()
+        began = time.perf_counter()
         yield
-        self.seconds[name] = time.perf_counter() - begun
+        self.seconds[name] = time.perf_counter() - began
         self._done = until
 
-    def inner(self, low: float, high: float) -> Progress | None:
+    def build_inner_progress(self, low: float, high: float) -> Progress | None:
         """Return a progress callback that maps 0 to 1 onto `low` to `high` of the whole, or None."""
         if self._progress is None:
             return None
@@ -216,17 +216,17 @@ class _Road:
 
         return report
 
-    def tell(self, lines) -> None:
+    def add_warnings(self, lines) -> None:
         """Add messages, each only once."""
         self.warnings += [line for line in lines if line not in self.warnings]
 
-    def check(self) -> None:
+    def check_cancelled(self) -> None:
         """Raise Cancelled if the user has stopped the job."""
         if self._cancelled is not None and self._cancelled():
-            raise Cancelled("cancelled")
+            raise UserCancelledError("cancelled")
 
 
-def set_of(trial: MarkerTrial, model: MarkerModel | None, settings: ReconstructSettings):
+def find_marker_set(trial: MarkerTrial, model: MarkerModel | None, settings: ReconstructSettings):
     """Find the marker set of a trial.
 
     Args:
@@ -240,26 +240,26 @@ def set_of(trial: MarkerTrial, model: MarkerModel | None, settings: ReconstructS
     """
     if settings.marker_set is not None:
         return settings.marker_set
-    from .files.marker_set_text import shipped_sets
-    from .model.marker_set import recognise
+    from .files.marker_set_text import read_shipped_sets
+    from .model.marker_set import choose_marker_set
 
-    sets = shipped_sets()
+    sets = read_shipped_sets()
     if model is not None:
         return next((one for one in sets if one.name == model.set_name), None)
     try:
-        return recognise(trial.labels, sets)
+        return choose_marker_set(trial.labels, sets)
     except InputError as error:
         raise InputError(trial.name, str(error)) from None  # labels carry no file name
 
 
-def named_by(trial: MarkerTrial, marker_set) -> MarkerTrial:
+def apply_set_labels(trial: MarkerTrial, marker_set) -> MarkerTrial:
     """Return the trial with the set's own labels; unchanged if `marker_set` is None."""
-    from .model.marker_set import named_as
+    from .model.marker_set import convert_labels
 
-    return trial if marker_set is None else named_as(trial, marker_set)
+    return trial if marker_set is None else convert_labels(trial, marker_set)
 
 
-def clusters_of(marker_set, model: MarkerModel | None, trial: MarkerTrial) -> dict[str, tuple[str, ...]]:
+def collect_clusters(marker_set, model: MarkerModel | None, trial: MarkerTrial) -> dict[str, tuple[str, ...]]:
     """Collect the clusters of markers that each segment carries.
 
     Args:
@@ -270,25 +270,25 @@ def clusters_of(marker_set, model: MarkerModel | None, trial: MarkerTrial) -> di
         Segment name -> labels of its markers that the trial contains.
     """
     if marker_set is not None:
-        return marker_set.clusters(trial.labels)
+        return marker_set.select_clusters(trial.labels)
     names = model.skeleton.names
     found = {names[joint]: tuple(model.markers[i] for i in rows if model.markers[i] in trial.labels)
-             for joint, rows in model.clusters().items()}
+             for joint, rows in model.collect_clusters().items()}
     return {name: labels for name, labels in found.items() if labels}
 
 
-def _checked(trial, still, marker_set, model) -> tuple[str, ...]:
+def _check_trial(trial, still, marker_set, model) -> tuple[str, ...]:
     """Report missing and unused markers; raise InputError for mirrored markers or the static of another person."""
-    from .checks import check, unused
+    from .checks import check_trial, report_unused
 
-    clusters = clusters_of(marker_set, model, trial)
+    clusters = collect_clusters(marker_set, model, trial)
     others = () if marker_set is None else (*marker_set.ball, *marker_set.other)
     lacking = () if marker_set is None or model is not None else marker_set.lacking(trial.labels)
-    gone = [f"markers of the set {marker_set.name} are missing: {list_some(lacking)}"] if lacking else []
-    return (*gone, *unused(trial, clusters, others), *check(trial, still, clusters, model))
+    missing = [f"markers of the set {marker_set.name} are missing: {list_some(lacking)}"] if lacking else []
+    return (*missing, *report_unused(trial, clusters, others), *check_trial(trial, still, clusters, model))
 
 
-def modelled(trial: MarkerTrial, static: MarkerTrial | None, settings: ReconstructSettings = ReconstructSettings(),
+def build_model(trial: MarkerTrial, static: MarkerTrial | None, settings: ReconstructSettings = ReconstructSettings(),
              progress: Progress | None = None, cancelled: Callable[[], bool] | None = None) -> MarkerModel:
     """Build the model alone, as `reconstruct` does.
 
@@ -303,25 +303,25 @@ def modelled(trial: MarkerTrial, static: MarkerTrial | None, settings: Reconstru
     Raises:
         InputError, Cancelled: as `reconstruct`.
     """
-    marker_set = set_of(trial, None, settings)
-    seen, still = (None if one is None else named_evenly(one, marker_set) for one in (trial, static))
-    _checked(seen, still, marker_set, None)
-    tidy, still = (None if one is None else _tidied(one, marker_set, None, None, cancelled).for_pose()
-                   for one in (seen, still))
-    return _calibrated(marker_set, tidy, still, progress, cancelled)
+    marker_set = find_marker_set(trial, None, settings)
+    visible, still = (None if one is None else prepare_trial(one, marker_set) for one in (trial, static))
+    _check_trial(visible, still, marker_set, None)
+    clean_markers, still = (None if one is None else _clean_trial(one, marker_set, None, None, cancelled).build_pose_trial()
+                   for one in (visible, still))
+    return _calibrate_model(marker_set, clean_markers, still, progress, cancelled)
 
 
-def named_evenly(trial: MarkerTrial, marker_set) -> MarkerTrial:
+def prepare_trial(trial: MarkerTrial, marker_set) -> MarkerTrial:
     """Return the trial with the set's labels and evenly spaced frames."""
-    return evenly(named_by(trial, marker_set))
+    return resample_evenly(apply_set_labels(trial, marker_set))
 
 
-def _tidied(trial: MarkerTrial, marker_set, model, progress, cancelled) -> Cleaned:
+def _clean_trial(trial: MarkerTrial, marker_set, model, progress, cancelled) -> CleaningResult:
     """Clean a trial that has the set's labels."""
-    return clean(trial, clusters_of(marker_set, model, trial), progress=progress, cancelled=cancelled)
+    return clean_trial(trial, collect_clusters(marker_set, model, trial), progress=progress, cancelled=cancelled)
 
 
-def _calibrated(marker_set, trial, still, progress, cancelled) -> MarkerModel:
+def _calibrate_model(marker_set, trial, still, progress, cancelled) -> MarkerModel:
     """Calibrate the model; on failure add the markers that the static trial lacks to the message."""
     from .model.calibrate import calibrate
 
@@ -334,37 +334,37 @@ def _calibrated(marker_set, trial, still, progress, cancelled) -> MarkerModel:
         raise InputError(still.name, f"{error}; markers missing in it: {list_some(lacking)}") from None
 
 
-def _check_fits(model: MarkerModel, trial: MarkerTrial) -> None:
+def _check_model_fits(model: MarkerModel, trial: MarkerTrial) -> None:
     """Raise InputError if the trial contains fewer than half of the model's markers."""
     lacking = [label for label in model.markers if label not in trial.labels]
-    if len(lacking) > (1.0 - LEAST_MARKERS) * len(model.markers):
+    if len(lacking) > (1.0 - MIN_MARKER_SHARE) * len(model.markers):
         found = f"has {len(model.markers) - len(lacking)} of the model's {len(model.markers)} markers"
         raise InputError(trial.name, f"{found}, not {list_some(lacking)}", "a trial with the model's markers",
                          "choose another model, or the marker set that has these labels")
 
 
-def _posed(model: MarkerModel, trial: MarkerTrial, marker_set, settings, road: _Road, cancelled) -> Solved:
+def _solve_pose(model: MarkerModel, trial: MarkerTrial, marker_set, settings, monitor: _RunMonitor, cancelled) -> PoseSolution:
     """Solve the poses; with a held ball, first without it to find where it lies in the hand, then with it."""
-    how = PoseSettings(weights=settings.weights, limits=settings.limits, smoothness=settings.smoothness)
-    label = _ball_label(model, marker_set, trial) if settings.hold_ball else None
-    solved = solve(model, trial, how, road.inner(0.45, 0.85 if label is None else 0.65), cancelled)
+    pose_settings = PoseSettings(weights=settings.weights, limits=settings.limits, smoothness=settings.smoothness)
+    label = _find_ball_label(model, marker_set, trial) if settings.hold_ball else None
+    solved = solve_poses(model, trial, pose_settings, monitor.build_inner_progress(0.45, 0.85 if label is None else 0.65), cancelled)
     if label is None:
         if settings.hold_ball:
-            road.tell(["no marker on a ball, so no ball is held"])
+            monitor.add_warnings(["no marker on a ball, so no ball is held"])
         return solved
-    found = _release(trial, solved.motion, model, marker_set=marker_set, settings=replace(settings, release="auto"),
-                     road=road)
-    if found is None or found.how != "ball":
-        road.tell([f"{label} does not show how the ball is held, so it takes no part in the pose"])
+    release = _find_release(trial, solved.motion, model, marker_set=marker_set, settings=replace(settings, release="auto"),
+                     monitor=monitor)
+    if release is None or release.method != "ball":
+        monitor.add_warnings([f"{label} does not show how the ball is held, so it takes no part in the pose"])
         return solved
-    hand = f"{found.side.capitalize()}Hand"
-    held = np.arange(len(trial)) < found.frame
-    ball = HeldBall(joint=hand, centre=found.centre, radius=found.radius, seen=trial.positions[:, trial.index(label)],
+    hand = f"{release.side.capitalize()}Hand"
+    held = np.arange(len(trial)) < release.frame
+    ball = HeldBall(joint=hand, centre=release.centre, radius=release.radius, seen=trial.positions[:, trial.index_of(label)],
                     held=held)
-    return solve(model, trial, replace(how, ball=ball), road.inner(0.65, 0.85), cancelled)
+    return solve_poses(model, trial, replace(pose_settings, ball=ball), monitor.build_inner_progress(0.65, 0.85), cancelled)
 
 
-def _far_off(solved: Solved, model: MarkerModel) -> list[str]:
+def _describe_poor_fit(solved: PoseSolution, model: MarkerModel) -> list[str]:
     """Report markers that do not fit the model, overall or one by one."""
     seen = np.isfinite(solved.residual)
     if not seen.any():
@@ -372,40 +372,40 @@ def _far_off(solved: Solved, model: MarkerModel) -> list[str]:
     mean = float(solved.residual[seen].mean())
     count = np.maximum(seen.sum(axis=0), 1)
     each = np.where(seen, solved.residual, 0.0).sum(axis=0) / count
-    worst = [i for i in np.argsort(-each)[:4] if each[i] > _FAR_MARKER]
-    if mean <= _FAR_MEAN and not worst:
+    worst = [i for i in np.argsort(-each)[:4] if each[i] > _POOR_MARKER_RESIDUAL]
+    if mean <= _POOR_MEAN_RESIDUAL and not worst:
         return []
-    told = ", ".join(f"{model.markers[i]} {1000.0 * each[i]:.0f}" for i in worst)
-    off = f"markers are {1000.0 * mean:.0f} mm off on average" + (f" (mm: {told})" if told else "")
+    details = ", ".join(f"{model.markers[i]} {1000.0 * each[i]:.0f}" for i in worst)
+    off = f"markers are {1000.0 * mean:.0f} mm off on average" + (f" (mm: {details})" if details else "")
     return [f"{off}: check that model, static and marker set belong to this body and that no labels are exchanged"]
 
 
-def _ball_label(model: MarkerModel, marker_set, trial: MarkerTrial) -> str | None:
+def _find_ball_label(model: MarkerModel, marker_set, trial: MarkerTrial) -> str | None:
     """Return the first ball marker of the model or its set that the trial contains, or None."""
     labels = ((model.ball.label,) if model.ball else ()) + (() if marker_set is None else marker_set.ball)
     return next((label for label in labels if label in trial.labels), None)
 
 
-def _filtered(solved: Solved, model: MarkerModel, trial: MarkerTrial, settings, road: _Road):
+def _filter_motion(solved: PoseSolution, model: MarkerModel, trial: MarkerTrial, settings, monitor: _RunMonitor):
     """Apply both filters; return the motion and which foot points are held. `trial` must have its gaps unfilled."""
-    from .pose.low_pass import butterworth, kalman
-    from .pose.plant_filter import plant_filter
+    from .pose.low_pass import filter_butterworth, smooth_kalman
+    from .pose.plant_filter import filter_foot_plants
 
     motion = solved.motion
     if settings.filter == "butterworth":
-        out = butterworth(motion, settings.cutoff)
+        out = filter_butterworth(motion, settings.cutoff)
     elif settings.filter == "kalman":
-        out = kalman(motion, told_by_markers(model, trial), settings.cutoff)
+        out = smooth_kalman(motion, measure_marker_visibility(model, trial), settings.cutoff)
     if settings.filter != "none":
         motion = out.motion
-        road.tell(out.notes)
+        monitor.add_warnings(out.notes)
     if not (settings.plant and _has_legs(motion)):
         return motion, None
-    planted = plant_filter(motion)
+    planted = filter_foot_plants(motion)
     return planted.motion, planted.held
 
 
-def told_by_markers(model: MarkerModel, trial: MarkerTrial) -> np.ndarray:
+def measure_marker_visibility(model: MarkerModel, trial: MarkerTrial) -> np.ndarray:
     """Measure which share of each joint's own markers is visible.
 
     Args:
@@ -414,59 +414,59 @@ def told_by_markers(model: MarkerModel, trial: MarkerTrial) -> np.ndarray:
     Returns:
         (T, J) shares, 0 to 1; 1 for joints that carry no marker.
     """
-    seen = np.isfinite(seen_markers(model, trial)).all(axis=-1)
-    worth = np.ones((len(trial), len(model.skeleton)))
-    for joint, rows in model.clusters().items():
-        worth[:, joint] = seen[:, rows].mean(axis=1)
-    return worth
+    seen = np.isfinite(collect_markers(model, trial)).all(axis=-1)
+    shares = np.ones((len(trial), len(model.skeleton)))
+    for joint, rows in model.collect_clusters().items():
+        shares[:, joint] = seen[:, rows].mean(axis=1)
+    return shares
 
 
 def _has_legs(motion: Motion) -> bool:
     """Return whether the skeleton has the legs that the foot-plant filter needs."""
-    from ..motion.humanoid import identify
+    from ..motion.humanoid import identify_joints
 
     try:
-        identify(motion.skeleton)
+        identify_joints(motion.skeleton)
     except InputError:
         return False
     return True
 
 
-def _floor(model: MarkerModel, trial: MarkerTrial, settings: ReconstructSettings, road: _Road) -> float:
+def _measure_floor(model: MarkerModel, trial: MarkerTrial, settings: ReconstructSettings, monitor: _RunMonitor) -> float:
     """Measure the floor height in metres, and report it where it is not at 0."""
-    floor = floor_under(model, trial)
-    if abs(floor) > _TOLD_FLOOR:
+    floor = measure_floor(model, trial)
+    if abs(floor) > _REPORTED_FLOOR_HEIGHT:
         done = "markers and motion were moved so that it is at 0" if settings.floor else "use Floor at 0 to move it"
-        road.tell([f"the floor is at {floor:+.3f} m; {done}"])
+        monitor.add_warnings([f"the floor is at {floor:+.3f} m; {done}"])
     return floor
 
 
-def moved_down(motion: Motion, by: float) -> Motion:
+def move_down(motion: Motion, by: float) -> Motion:
     """Return the motion moved down by `by` metres."""
     return replace(motion, root_positions=motion.root_positions - [0.0, 0.0, by]) if by else motion
 
 
-def _lowered(trial: MarkerTrial, by: float) -> MarkerTrial:
+def _move_trial_down(trial: MarkerTrial, by: float) -> MarkerTrial:
     """Return the trial moved down by `by` metres."""
     return trial.with_positions(trial.positions - [0.0, 0.0, by]) if by else trial
 
 
-def _release(trial, motion, model: MarkerModel, marker_set, settings: ReconstructSettings, road: _Road):
+def _find_release(trial, motion, model: MarkerModel, marker_set, settings: ReconstructSettings, monitor: _RunMonitor):
     """Find when and how the ball leaves the hand, where the settings ask for it; a model with a ball says where it
     lies.
     """
-    from .release.release import ReleaseSettings, radar_speed, release
+    from .release.release import ReleaseSettings, parse_radar_speed, estimate_release
 
-    label = _ball_label(model, marker_set, trial)
-    told = label is not None or radar_speed(trial.name) is not None
-    if settings.release == "no" or (settings.release == "auto" and not told):
+    label = _find_ball_label(model, marker_set, trial)
+    is_throw = label is not None or parse_radar_speed(trial.name) is not None
+    if settings.release == "no" or (settings.release == "auto" and not is_throw):
         return None
-    asked = ReleaseSettings(label, settings.radius, ball=settings.ball)
+    release_settings = ReleaseSettings(label, settings.radius, ball=settings.ball)
     if model.ball is not None and model.ball.label == label:
         side = "left" if model.skeleton.names[model.ball.joint].startswith("Left") else "right"
-        asked = replace(asked, radius=asked.radius or model.ball.radius, hand=side, centre=model.ball.centre)
+        release_settings = replace(release_settings, radius=release_settings.radius or model.ball.radius, hand=side, centre=model.ball.centre)
     try:
-        return release(trial, motion, asked)
+        return estimate_release(trial, motion, release_settings)
     except InputError as error:
-        road.tell([f"no release found: {error}"])
+        monitor.add_warnings([f"no release found: {error}"])
         return None

@@ -14,17 +14,17 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from ..base.errors import BeyondMocapError, Cancelled, InputError
-from .checks import check
+from ..base.errors import BeyondMocapError, UserCancelledError, InputError
+from .checks import check_trial
 from .model.model import MarkerModel
-from .reconstruct import Reconstruction, ReconstructSettings, modelled, named_by, reconstruct, set_of
+from .reconstruct import Reconstruction, ReconstructSettings, build_model, apply_set_labels, reconstruct, find_marker_set
 from .trial import MarkerTrial
 
 SUFFIXES = (".c3d", ".trc")
 _STATIC = re.compile(r"static|calib|(^|[^a-z])cal([^a-z]|$)|[tna][-_ ]?pose|standing", re.IGNORECASE)
-_SAME_MARKERS = 0.8  # share of a trial's markers that its static must have
+_MIN_SHARED_MARKERS = 0.8  # share of a trial's markers that its static must have
 
-Read = Callable[[Path], MarkerTrial]
+ReadTrial = Callable[[Path], MarkerTrial]
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class Recording:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Made:
+class TrialOutcome:
     """The outcome for one trial.
 
     Attributes:
@@ -60,13 +60,13 @@ class Made:
     """
 
     recording: Recording
-    made: Reconstruction | None
+    reconstruction: Reconstruction | None
     error: str = ""
     static: Recording | None = None
     note: str = ""
 
 
-def recordings_of(folder: Path) -> list[Recording]:
+def list_recordings(folder: Path) -> list[Recording]:
     """List all marker recordings in a folder and below it, by name.
 
     Raises:
@@ -82,9 +82,9 @@ def recordings_of(folder: Path) -> list[Recording]:
     return [Recording(path, name, session.removeprefix(".")) for path, name, session in zip(paths, names, sessions)]
 
 
-def reconstruct_folder(folder: Path, read: Read, settings: ReconstructSettings = ReconstructSettings(),
+def reconstruct_folder(folder: Path, read: ReadTrial, settings: ReconstructSettings = ReconstructSettings(),
                        model: MarkerModel | None = None, progress: Callable[[float, str], None] | None = None,
-                       cancelled: Callable[[], bool] | None = None) -> Iterator[Made]:
+                       cancelled: Callable[[], bool] | None = None) -> Iterator[TrialOutcome]:
     """Reconstruct every trial of a folder, one after the other; a trial that fails is reported and does not stop the
     others.
 
@@ -101,20 +101,20 @@ def reconstruct_folder(folder: Path, read: Read, settings: ReconstructSettings =
         InputError: if the folder has no trials.
         Cancelled: if the user stops the job.
     """
-    recordings = recordings_of(folder)
-    statics, moving = _told_apart(recordings, read)
-    plans = [_planned(one, read, statics if model is None else [], settings) for one in moving]
-    models = _models(plans, read, settings, cancelled)
+    recordings = list_recordings(folder)
+    statics, trials = _split_statics(recordings, read)
+    plans = [_plan_trial(one, read, statics if model is None else [], settings) for one in trials]
+    models = _build_models(plans, read, settings, cancelled)
     for number, plan in enumerate(plans):
         if cancelled is not None and cancelled():
-            raise Cancelled("cancelled")
-        part = _part_of(progress, number, len(plans), plan.recording.name)
-        yield _made(plan, read, settings, model=model or models.get(plan.static_path), progress=part,
+            raise UserCancelledError("cancelled")
+        part = _build_trial_progress(progress, number, len(plans), plan.recording.name)
+        yield _reconstruct_trial(plan, read, settings, model=model or models.get(plan.static_path), progress=part,
                     cancelled=cancelled)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class _Plan:
+class _TrialPlan:
     """What is planned for one trial.
 
     Attributes:
@@ -137,7 +137,7 @@ class _Plan:
         return None if self.static is None else self.static[0].path
 
 
-def _told_apart(recordings: Sequence[Recording], read: Read):
+def _split_statics(recordings: Sequence[Recording], read: ReadTrial):
     """Split the recordings into statics, read, and trials.
 
     If all names are those of statics, they are trials too. A static that cannot be read is treated as a trial, so that
@@ -145,55 +145,55 @@ def _told_apart(recordings: Sequence[Recording], read: Read):
     """
     if all(one.is_static for one in recordings):
         return [], list(recordings)
-    statics, moving = [], []
+    statics, trials = [], []
     for one in recordings:
         if not one.is_static:
-            moving.append(one)
+            trials.append(one)
             continue
         try:
             statics.append((one, read(one.path)))
         except (BeyondMocapError, OSError):
-            moving.append(one)
-    return statics, moving
+            trials.append(one)
+    return statics, trials
 
 
-def _planned(one: Recording, read: Read, statics, settings: ReconstructSettings) -> _Plan:
+def _plan_trial(one: Recording, read: ReadTrial, statics, settings: ReconstructSettings) -> _TrialPlan:
     """Read a trial and choose its static."""
     try:
         trial = read(one.path)
-        static, note = _static_for(one, trial, statics, settings)
-        return _Plan(recording=one, static=static, subject=trial.subject, note=note)
+        static, note = _choose_static(one, trial, statics, settings)
+        return _TrialPlan(recording=one, static=static, subject=trial.subject, note=note)
     except (BeyondMocapError, OSError) as error:
-        return _Plan(recording=one, error=str(error))
+        return _TrialPlan(recording=one, error=str(error))
 
 
-def _static_for(one: Recording, trial: MarkerTrial, statics, settings):
+def _choose_static(one: Recording, trial: MarkerTrial, statics, settings):
     """Choose the static of a trial: same session, markers and body; of several, the one with the most similar name.
 
     Returns the static or None, and a message on a static that is of another body, or "".
     """
     if not statics:
         return None, ""
-    marker_set = set_of(trial, None, settings)
-    named = named_by(trial, marker_set)
-    wanted = set(named.labels) & set(marker_set.labels)
-    fits, note = [], ""
+    marker_set = find_marker_set(trial, None, settings)
+    labeled_trial = apply_set_labels(trial, marker_set)
+    required = set(labeled_trial.labels) & set(marker_set.labels)
+    candidates, note = [], ""
     for recording, static in statics:
-        other = named_by(static, marker_set)
-        shared = len(wanted & set(other.labels)) / max(len(wanted), 1)
+        labeled_static = apply_set_labels(static, marker_set)
+        shared = len(required & set(labeled_static.labels)) / max(len(required), 1)
         same_name = not (trial.subject and static.subject and trial.subject != static.subject)
-        if recording.session != one.session or not same_name or shared < _SAME_MARKERS:
+        if recording.session != one.session or not same_name or shared < _MIN_SHARED_MARKERS:
             continue
         try:
-            check(named, other, marker_set.clusters(named.labels))
+            check_trial(labeled_trial, labeled_static, marker_set.select_clusters(labeled_trial.labels))
         except InputError as error:
             note = f"reconstructed without a static: {error}"
             continue
-        fits.append((len(os.path.commonprefix([recording.path.stem, one.path.stem])), shared, (recording, static)))
-    return (max(fits, key=lambda row: row[:2])[2], "") if fits else (None, note)
+        candidates.append((len(os.path.commonprefix([recording.path.stem, one.path.stem])), shared, (recording, static)))
+    return (max(candidates, key=lambda row: row[:2])[2], "") if candidates else (None, note)
 
 
-def _models(plans: Sequence[_Plan], read: Read, settings, cancelled) -> dict[Path, MarkerModel]:
+def _build_models(plans: Sequence[_TrialPlan], read: ReadTrial, settings, cancelled) -> dict[Path, MarkerModel]:
     """Build one model for each static, from the first trial that it serves; sessions of one subject get one
     skeleton.
     """
@@ -201,7 +201,7 @@ def _models(plans: Sequence[_Plan], read: Read, settings, cancelled) -> dict[Pat
     models: dict[Path, MarkerModel] = {}
     for path, plan in reversed(first.items()):
         try:
-            models[path] = modelled(read(plan.recording.path), plan.static[1], settings, cancelled=cancelled)
+            models[path] = build_model(read(plan.recording.path), plan.static[1], settings, cancelled=cancelled)
         except (InputError, OSError):
             continue  # the error is reported when its trials are reconstructed
     groups: dict[tuple, list[Path]] = {}
@@ -209,28 +209,28 @@ def _models(plans: Sequence[_Plan], read: Read, settings, cancelled) -> dict[Pat
         groups.setdefault((first[path].subject, own.set_name, own.skeleton.names), []).append(path)
     for paths in groups.values():
         if len({first[path].recording.session for path in paths}) > 1:
-            from .model.assemble import subject_models
+            from .model.assemble import merge_session_models
 
-            models.update(zip(paths, subject_models([models[path] for path in paths])))
+            models.update(zip(paths, merge_session_models([models[path] for path in paths])))
     return models
 
 
-def _made(plan: _Plan, read: Read, settings, model, progress, cancelled) -> Made:
+def _reconstruct_trial(plan: _TrialPlan, read: ReadTrial, settings, model, progress, cancelled) -> TrialOutcome:
     """Reconstruct one trial; errors other than a cancellation become part of the outcome."""
     if plan.error:
-        return Made(recording=plan.recording, made=None, error=plan.error)
+        return TrialOutcome(recording=plan.recording, reconstruction=None, error=plan.error)
     static, still = plan.static or (None, None)
     try:
-        made = reconstruct(read(plan.recording.path), still, model, settings=settings, progress=progress,
+        reconstruction = reconstruct(read(plan.recording.path), still, model, settings=settings, progress=progress,
                            cancelled=cancelled)
-    except Cancelled:
+    except UserCancelledError:
         raise
     except (BeyondMocapError, OSError) as error:
-        return Made(recording=plan.recording, made=None, error=str(error), static=static)
-    return Made(recording=plan.recording, made=made, static=static, note=plan.note)
+        return TrialOutcome(recording=plan.recording, reconstruction=None, error=str(error), static=static)
+    return TrialOutcome(recording=plan.recording, reconstruction=reconstruction, static=static, note=plan.note)
 
 
-def _part_of(progress, number: int, count: int, name: str):
+def _build_trial_progress(progress, number: int, count: int, name: str):
     """Return a progress callback for one of `count` trials, or None."""
     if progress is None:
         return None

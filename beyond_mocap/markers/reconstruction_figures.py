@@ -6,13 +6,13 @@ import numpy as np
 
 from ..base.errors import InputError
 from ..motion import contacts as foot_contacts
-from ..motion.humanoid import identify
+from ..motion.humanoid import identify_joints
 from ..motion.motion import Motion, forward_kinematics
-from ..synthesis.quality.movement import contact_speeds, foot_joints, stance_travel, stances
-from .pose.residuals import residuals
+from ..synthesis.quality.movement import measure_contact_speeds, list_foot_joints, measure_stance_travel, list_stances
+from .pose.residuals import measure_residuals
 
 
-def figures(made) -> dict:
+def collect_figures(reconstruction) -> dict:
     """Collect the report of a reconstruction.
 
     Args:
@@ -20,21 +20,21 @@ def figures(made) -> dict:
     Returns:
         Values for JSON; lengths of markers in millimetres, other units as the keys say.
     """
-    solved, motion = made.solved, made.motion
-    posing = made.seconds.get("pose") or solved.seconds
-    return {"trial": made.raw.name, "subject": made.model.subject, "marker_set": made.model.set_name,
-            "markers": len(made.model.markers), "joints": len(made.model.skeleton), "fps": motion.fps,
-            "frames": len(motion), "duration_s": motion.duration, "seconds": dict(made.seconds),
-            "residual_mm": residual_figures(made), "weighted_se": weighted_squares(solved),
-            "frames_per_second": len(motion) / posing if posing else None, "bones_change_m": bones_change(motion),
-            "skate": skate(motion), "limits": limit_shares(solved, motion.skeleton.names), "floor_m": made.floor,
-            "grounded": made.grounded,
-            "held_share": None if made.held is None else float(made.held.any(axis=(1, 2)).mean()),
-            **made.cleaned.report.as_dict(), "release": None if made.release is None else made.release.report(),
-            "warnings": list(made.warnings)}
+    solved, motion = reconstruction.solved, reconstruction.motion
+    posing = reconstruction.seconds.get("pose") or solved.seconds
+    return {"trial": reconstruction.raw.name, "subject": reconstruction.model.subject, "marker_set": reconstruction.model.set_name,
+            "markers": len(reconstruction.model.markers), "joints": len(reconstruction.model.skeleton), "fps": motion.fps,
+            "frames": len(motion), "duration_s": motion.duration, "seconds": dict(reconstruction.seconds),
+            "residual_mm": collect_residual_figures(reconstruction), "weighted_se": measure_weighted_squares(solved),
+            "frames_per_second": len(motion) / posing if posing else None, "bones_change_m": measure_bone_change(motion),
+            "skate": measure_foot_slide(motion), "limits": measure_limit_shares(solved, motion.skeleton.names), "floor_m": reconstruction.floor,
+            "grounded": reconstruction.grounded,
+            "held_share": None if reconstruction.held is None else float(reconstruction.held.any(axis=(1, 2)).mean()),
+            **reconstruction.cleaned.report.as_dict(), "release": None if reconstruction.release is None else reconstruction.release.report(),
+            "warnings": list(reconstruction.warnings)}
 
 
-def residual_figures(made) -> dict:
+def collect_residual_figures(reconstruction) -> dict:
     """Measure the distances in millimetres between the model's markers and the recorded ones.
 
     Args:
@@ -43,16 +43,16 @@ def residual_figures(made) -> dict:
         Figures of the solved pose, of every segment fitted alone (`single_mean`), and of the motion that is written,
         after its filters (`output_mean`).
     """
-    seen = 1000.0 * made.solved.residual[np.isfinite(made.solved.residual)]
-    single = 1000.0 * made.solved.single[np.isfinite(made.solved.single)]
-    written = 1000.0 * residuals(made.model, made.motion, made.trial)
-    each = {label: _mean(1000.0 * made.solved.residual[:, i]) for i, label in enumerate(made.model.markers)}
-    return {"mean": _mean(seen), "rms": _rms(seen), "p95": _percentile(seen, 95), "max": _percentile(seen, 100),
-            "single_mean": _mean(single), "single_rms": _rms(single), "output_mean": _mean(written),
-            "output_rms": _rms(written), "per_marker": each}
+    seen = 1000.0 * reconstruction.solved.residual[np.isfinite(reconstruction.solved.residual)]
+    single = 1000.0 * reconstruction.solved.single[np.isfinite(reconstruction.solved.single)]
+    written = 1000.0 * measure_residuals(reconstruction.model, reconstruction.motion, reconstruction.trial)
+    each = {label: _compute_mean(1000.0 * reconstruction.solved.residual[:, i]) for i, label in enumerate(reconstruction.model.markers)}
+    return {"mean": _compute_mean(seen), "rms": _compute_rms(seen), "p95": _compute_percentile(seen, 95), "max": _compute_percentile(seen, 100),
+            "single_mean": _compute_mean(single), "single_rms": _compute_rms(single), "output_mean": _compute_mean(written),
+            "output_rms": _compute_rms(written), "per_marker": each}
 
 
-def weighted_squares(solved) -> dict:
+def measure_weighted_squares(solved) -> dict:
     """Measure the sum over markers of weight x residual^2 per frame, square metres: mean and standard deviation.
 
     Source: Fredriksson section 5.3.2, equation (5.1).
@@ -61,7 +61,7 @@ def weighted_squares(solved) -> dict:
     return {"mean": float(each.mean()), "sd": float(each.std())} if len(each) else {"mean": None, "sd": None}
 
 
-def bones_change(motion: Motion) -> float:
+def measure_bone_change(motion: Motion) -> float:
     """Measure the largest difference in metres between a bone's length in any frame and in the skeleton."""
     places, _ = forward_kinematics(motion)
     parents = np.array(motion.skeleton.parents[1:], dtype=int)
@@ -69,7 +69,7 @@ def bones_change(motion: Motion) -> float:
     return float(np.abs(lengths - np.linalg.norm(motion.skeleton.offsets[1:], axis=-1)).max(initial=0.0))
 
 
-def skate(motion: Motion) -> dict | None:
+def measure_foot_slide(motion: Motion) -> dict | None:
     """Measure how fast feet slide while in contact, and how far toes travel in a contact.
 
     Args:
@@ -78,34 +78,34 @@ def skate(motion: Motion) -> dict | None:
         Values for JSON; None for a skeleton without legs or fewer than three frames.
     """
     try:
-        identify(motion.skeleton)
+        identify_joints(motion.skeleton)
     except InputError:
         return None
     if len(motion) < 3:
         return None
-    standing = foot_contacts.detect(motion)
+    contacts = foot_contacts.detect_contacts(motion)
     places, _ = forward_kinematics(motion)
-    feet = places[:, foot_joints(motion.skeleton)]
-    travel = 1000.0 * stance_travel(feet[:, :, 1], stances(standing))
-    return {"contact_cm_s": _mean(100.0 * contact_speeds(feet, standing, motion.fps)),
+    feet = places[:, list_foot_joints(motion.skeleton)]
+    travel = 1000.0 * measure_stance_travel(feet[:, :, 1], list_stances(contacts))
+    return {"contact_cm_s": _compute_mean(100.0 * measure_contact_speeds(feet, contacts, motion.fps)),
             "stance_mm_median": float(np.median(travel)) if len(travel) else None, "stances": len(travel)}
 
 
-def limit_shares(solved, names) -> dict[str, float]:
+def measure_limit_shares(solved, names) -> dict[str, float]:
     """Measure in which share of the frames each joint is at a limit; joints that never are, are left out."""
     share = np.asarray(solved.at_limit, dtype=bool).mean(axis=0)
     return {name: float(part) for name, part in zip(names, share) if part > 0}
 
 
-def _mean(values: np.ndarray) -> float | None:
+def _compute_mean(values: np.ndarray) -> float | None:
     values = values[np.isfinite(values)]
     return float(values.mean()) if len(values) else None
 
 
-def _rms(values: np.ndarray) -> float | None:
+def _compute_rms(values: np.ndarray) -> float | None:
     values = values[np.isfinite(values)]
     return float(np.sqrt(np.mean(values**2))) if len(values) else None
 
 
-def _percentile(values: np.ndarray, share: float) -> float | None:
+def _compute_percentile(values: np.ndarray, share: float) -> float | None:
     return float(np.percentile(values, share)) if len(values) else None

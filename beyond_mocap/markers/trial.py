@@ -16,12 +16,12 @@ import numpy as np
 
 from ..base.errors import InputError
 
-FEWEST_FPS, MOST_FPS = 1.0, 20000.0  # frames per second that a trial may have
+MIN_FPS, MAX_FPS = 1.0, 20000.0  # frames per second that a trial may have
 
 TICK = 1e-3  # seconds, the clock period to which exposures are rounded
-_SMOOTH = 19  # frames over which a marker's step is smoothed, several times the length of the jitter pattern
-_LEAST_ALIKE = 0.8  # minimum correlation of the markers' common jitter with the jitter of the clock
-_PHASES = 36  # phases of the clock that are tried
+_SMOOTHING_FRAMES = 19  # frames over which a marker's step is smoothed, several times the length of the jitter pattern
+_MIN_CORRELATION = 0.8  # minimum correlation of the markers' common jitter with the jitter of the clock
+_PHASE_COUNT = 36  # phases of the clock that are tried
 
 
 @dataclass(frozen=True)
@@ -69,12 +69,12 @@ class MarkerTrial:
     notes: tuple[str, ...] = ()
 
     def __post_init__(self):
-        kept = {"labels": tuple(self.labels), "positions": _frozen(self.positions, self.name, "positions"),
+        values = {"labels": tuple(self.labels), "positions": _freeze_array(self.positions, self.name, "positions"),
                 "fps": float(self.fps),
-                "residuals": None if self.residuals is None else _frozen(self.residuals, self.name, "residuals"),
+                "residuals": None if self.residuals is None else _freeze_array(self.residuals, self.name, "residuals"),
                 "events": tuple(sorted(self.events, key=lambda event: event.seconds)), "start": float(self.start),
                 "notes": tuple(self.notes)}
-        for name, value in kept.items():
+        for name, value in values.items():
             object.__setattr__(self, name, value)
         self._check()
 
@@ -85,12 +85,12 @@ class MarkerTrial:
             raise InputError(self.name, f"positions of shape {shape}", f"(frames, {len(self.labels)} labels, 3)")
         if self.residuals is not None and self.residuals.shape != shape[:2]:
             raise InputError(self.name, f"residuals of shape {self.residuals.shape}", f"{shape[:2]}")
-        if twice := repeated(self.labels):
+        if twice := find_duplicates(self.labels):
             raise InputError(self.name, f"duplicate label {twice[0]!r}", "unique labels", "rename one of them")
         if not all(isinstance(label, str) and label.strip() for label in self.labels):
             raise InputError(self.name, "a marker without a label", "unique labels", "give it a label")
-        if not FEWEST_FPS <= self.fps <= MOST_FPS:
-            raise InputError(self.name, f"{self.fps:g} frames per second", f"{FEWEST_FPS:g} to {MOST_FPS:g}")
+        if not MIN_FPS <= self.fps <= MAX_FPS:
+            raise InputError(self.name, f"{self.fps:g} frames per second", f"{MIN_FPS:g} to {MAX_FPS:g}")
         if not np.isfinite(self.start):
             raise InputError(self.name, f"starts at {self.start:g} s", "a number of seconds")
         if np.isinf(self.positions).any():
@@ -116,7 +116,7 @@ class MarkerTrial:
         """Seconds from the first frame to the last."""
         return max(len(self) - 1, 0) / self.fps
 
-    def index(self, label: str) -> int:
+    def index_of(self, label: str) -> int:
         """Return the index of the marker with this label.
 
         Raises:
@@ -125,10 +125,10 @@ class MarkerTrial:
         try:
             return self.labels.index(label)
         except ValueError:
-            there = ", ".join(self.labels[:12]) + (", ..." if len(self.labels) > 12 else "")
-            raise InputError(self.name, f"no marker {label!r}", f"one of {there}", "check the spelling") from None
+            known = ", ".join(self.labels[:12]) + (", ..." if len(self.labels) > 12 else "")
+            raise InputError(self.name, f"no marker {label!r}", f"one of {known}", "check the spelling") from None
 
-    def only(self, labels: Iterable[str]) -> MarkerTrial:
+    def select_markers(self, labels: Iterable[str]) -> MarkerTrial:
         """Select markers.
 
         Args:
@@ -138,12 +138,12 @@ class MarkerTrial:
         Raises:
             InputError: if a label is missing.
         """
-        chosen = [self.index(label) for label in labels]
+        chosen = [self.index_of(label) for label in labels]
         residuals = None if self.residuals is None else self.residuals[:, chosen]
         return replace(self, labels=tuple(self.labels[i] for i in chosen), positions=self.positions[:, chosen],
                        residuals=residuals)
 
-    def frames(self, first: int, end: int) -> MarkerTrial:
+    def select_frames(self, first: int, end: int) -> MarkerTrial:
         """Select frames.
 
         Args:
@@ -159,7 +159,7 @@ class MarkerTrial:
         residuals = None if self.residuals is None else self.residuals[first:end]
         return replace(self, positions=self.positions[first:end], residuals=residuals, start=start, events=inside)
 
-    def renamed(self, names: Mapping[str, str]) -> MarkerTrial:
+    def rename_labels(self, names: Mapping[str, str]) -> MarkerTrial:
         """Return the trial with other labels.
 
         Args:
@@ -174,8 +174,8 @@ class MarkerTrial:
 
         Residuals stay if the number of frames and markers is unchanged; otherwise they are dropped.
         """
-        keeps = self.residuals is not None and np.shape(positions)[:2] == self.residuals.shape
-        return replace(self, positions=positions, residuals=self.residuals if keeps else None)
+        keeps_residuals = self.residuals is not None and np.shape(positions)[:2] == self.residuals.shape
+        return replace(self, positions=positions, residuals=self.residuals if keeps_residuals else None)
 
 
 def list_some(names: Sequence[str], most: int = 6) -> str:
@@ -185,21 +185,21 @@ def list_some(names: Sequence[str], most: int = 6) -> str:
         names: the names.
         most: how many are written out.
     """
-    shown = ", ".join(name or "(no name)" for name in names[:most])
-    return shown + (f" and {len(names) - most} more" if len(names) > most else "")
+    listed = ", ".join(name or "(no name)" for name in names[:most])
+    return listed + (f" and {len(names) - most} more" if len(names) > most else "")
 
 
-def repeated(labels: Iterable[str]) -> list[str]:
+def find_duplicates(labels: Iterable[str]) -> list[str]:
     """Return the labels that occur more than once, each once, in the order of their second occurrence."""
-    met, twice = set(), []
+    known, twice = set(), []
     for label in labels:
-        if label in met and label not in twice:
+        if label in known and label not in twice:
             twice.append(label)
-        met.add(label)
+        known.add(label)
     return twice
 
 
-def _frozen(values, where: str, what: str) -> np.ndarray:
+def _freeze_array(values, where: str, what: str) -> np.ndarray:
     """Return a read-only float array; raise InputError where the values are not numbers."""
     try:
         out = np.array(values, dtype=float)
@@ -209,7 +209,7 @@ def _frozen(values, where: str, what: str) -> np.ndarray:
     return out
 
 
-def frame_times(trial: MarkerTrial) -> np.ndarray | None:
+def estimate_frame_times(trial: MarkerTrial) -> np.ndarray | None:
     """Estimate when the frames were exposed, for systems whose clock ticks in whole milliseconds.
 
     The steps of all markers, each against its own smoothed steps, give one common jitter per frame. It is correlated
@@ -222,27 +222,27 @@ def frame_times(trial: MarkerTrial) -> np.ndarray | None:
         0.8.
     """
     step = 1.0 / (trial.fps * TICK)
-    if abs(step - round(step)) < 1e-3 or step < 1.5 or len(trial) < 3 * _SMOOTH:
+    if abs(step - round(step)) < 1e-3 or step < 1.5 or len(trial) < 3 * _SMOOTHING_FRAMES:
         return None
-    common, weight = _common_unsteadiness(trial.positions)
+    common, weight = _measure_common_jitter(trial.positions)
     if not np.sum(weight * common**2) > 0.0:
         return None
-    best, found = _LEAST_ALIKE, None
+    best, found = _MIN_CORRELATION, None
     # the clock's ticks (T,) at each phase, and the relative jitter (T-1,) of the steps between them
-    for phase in np.arange(_PHASES) / _PHASES:
+    for phase in np.arange(_PHASE_COUNT) / _PHASE_COUNT:
         ticks = np.floor(np.arange(len(trial)) * step + phase + 1e-9)
         jitter = np.diff(ticks) / step - 1.0
         size = np.sqrt(np.sum(weight * common**2) * np.sum(weight * jitter**2))
-        alike = np.sum(weight * common * jitter) / max(size, 1e-300)
-        if alike > best:
-            best, found = alike, ticks
+        correlation = np.sum(weight * common * jitter) / max(size, 1e-300)
+        if correlation > best:
+            best, found = correlation, ticks
     if found is None:
         return None
     times = found * TICK
     return trial.start + times - np.mean(times - np.arange(len(trial)) / trial.fps)
 
 
-def evenly(trial: MarkerTrial) -> MarkerTrial:
+def resample_evenly(trial: MarkerTrial) -> MarkerTrial:
     """Resample a trial to evenly spaced frames.
 
     Args:
@@ -250,22 +250,22 @@ def evenly(trial: MarkerTrial) -> MarkerTrial:
     Returns:
         The resampled trial, or the trial itself where its frames are even. Markers that are not visible stay so.
     """
-    times = frame_times(trial)
+    times = estimate_frame_times(trial)
     if times is None:
         return trial
     note = f"frames were recorded at whole milliseconds, not every {1000.0 / trial.fps:.2f} ms: resampled evenly"
-    return replace(trial, positions=_at_even_times(trial, times), notes=(*trial.notes, note))
+    return replace(trial, positions=_interpolate_at_even_times(trial, times), notes=(*trial.notes, note))
 
 
-def _common_unsteadiness(positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _measure_common_jitter(positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Measure by what share (T-1,) all markers' steps exceed their smoothed steps, and the weight (T-1,) of each."""
     from scipy.signal import savgol_filter
 
     steps = np.diff(positions, axis=0)
     known = np.isfinite(steps).all(axis=-1)
     filled = np.where(known[..., None], steps, 0.0)
-    smooth = savgol_filter(filled, _SMOOTH, 3, axis=0)
-    gap = np.apply_along_axis(np.convolve, 0, ~known, np.ones(_SMOOTH), "same") > 0.5
+    smooth = savgol_filter(filled, _SMOOTHING_FRAMES, 3, axis=0)
+    gap = np.apply_along_axis(np.convolve, 0, ~known, np.ones(_SMOOTHING_FRAMES), "same") > 0.5
     # steps within half a window of a gap are smoothed with zeros; they get no weight
     smooth[gap] = 0.0
     weight = np.einsum("tmc,tmc->t", smooth, smooth)
@@ -273,7 +273,7 @@ def _common_unsteadiness(positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]
     return np.where(weight > 0.0, shared / np.maximum(weight, 1e-300), 0.0), weight
 
 
-def _at_even_times(trial: MarkerTrial, times: np.ndarray) -> np.ndarray:
+def _interpolate_at_even_times(trial: MarkerTrial, times: np.ndarray) -> np.ndarray:
     """Interpolate (T, M, 3) metres by cubic splines, one for all markers that are visible in the same frames."""
     from scipy.interpolate import CubicSpline
 
@@ -283,7 +283,7 @@ def _at_even_times(trial: MarkerTrial, times: np.ndarray) -> np.ndarray:
         if np.count_nonzero(seen) < 4:
             continue
         markers = np.flatnonzero(which.ravel() == number)
-        course = CubicSpline(times[seen], trial.positions[seen][:, markers])
+        trajectory = CubicSpline(times[seen], trial.positions[seen][:, markers])
         at = np.clip(trial.seconds[seen], times[seen][0], times[seen][-1])
-        out[np.ix_(seen, markers)] = course(at)
+        out[np.ix_(seen, markers)] = trajectory(at)
     return out

@@ -16,9 +16,9 @@ from ..base.errors import InputError
 from ..base.vectors import unit_vector, unit_vectors
 from ..evaluation.report import check_depth
 
-CULLED = 3.0  # standard deviations from the mean, beyond which a throw is left out (Fredriksson §8.2)
+OUTLIER_DEVIATIONS = 3.0  # standard deviations from the mean, beyond which a throw is left out (Fredriksson §8.2)
 
-LEAST = 6  # pairs; with fewer, Wilcoxon's test cannot reject anything at 0.05 (two-sided: 2 / 2^n)
+MIN_PAIRS = 6  # pairs; with fewer, Wilcoxon's test cannot reject anything at 0.05 (two-sided: 2 / 2^n)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -41,7 +41,7 @@ class Throw:
     hips: np.ndarray
     impact: np.ndarray | None
     velocity: np.ndarray
-    how: str
+    method: str
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -83,34 +83,34 @@ def read_results(folder: Path) -> tuple[TrialResult, ...]:
     """
     table = folder / "trials.json"
     if table.is_file():
-        rows = _read(table).get("trials", ())
-        return tuple(_of_row(folder, row) for row in rows)
+        rows = _read_json(table).get("trials", ())
+        return tuple(_parse_row(folder, row) for row in rows)
     reports = sorted(folder.rglob("*.report.json"))
     if not reports:
         raise InputError(folder, "no reports of trials", "the output of a reconstructed folder", "check the folder")
-    return tuple(_of_report(path.name.removesuffix(".report.json"), _read(path)) for path in reports)
+    return tuple(_parse_report(path.name.removesuffix(".report.json"), _read_json(path)) for path in reports)
 
 
-def _of_row(folder: Path, row: Mapping) -> TrialResult:
+def _parse_row(folder: Path, row: Mapping) -> TrialResult:
     """Build a result from a row of trials.json and the report that it names."""
     name = str(row.get("trial", ""))
     if row.get("error") or not row.get("report"):
         return TrialResult(name=name, subject=str(row.get("subject") or ""), error=str(row.get("error") or "no motion"))
-    found = _of_report(name, _read(folder / row["report"]))
+    found = _parse_report(name, _read_json(folder / row["report"]))
     return found if found.subject else replace(found, subject=str(row.get("session") or ""))
 
 
-def _of_report(name: str, report: Mapping) -> TrialResult:
+def _parse_report(name: str, report: Mapping) -> TrialResult:
     """Build a result from the report of one trial."""
     residual, squares = report.get("residual_mm") or {}, report.get("weighted_se") or {}
     return TrialResult(name=name, subject=str(report.get("subject") or ""), frames=int(report.get("frames") or 0),
-                       squares=(_number(squares.get("mean")), _number(squares.get("sd"))),
-                       residual=_number(residual.get("rms", residual.get("mean"))),
-                       single=_number(residual.get("single_rms", residual.get("single_mean"))),
-                       rate=_number(report.get("frames_per_second")), throw=_throw(report.get("release")))  # fmt: skip
+                       squares=(_to_float(squares.get("mean")), _to_float(squares.get("sd"))),
+                       residual=_to_float(residual.get("rms", residual.get("mean"))),
+                       single=_to_float(residual.get("single_rms", residual.get("single_mean"))),
+                       rate=_to_float(report.get("frames_per_second")), throw=_parse_throw(report.get("release")))  # fmt: skip
 
 
-def _throw(release: Mapping | None) -> Throw | None:
+def _parse_throw(release: Mapping | None) -> Throw | None:
     """Build a throw from the release of a report; None where there is none."""
     if not release or release.get("speed_m_s") is None:
         return None
@@ -120,26 +120,26 @@ def _throw(release: Mapping | None) -> Throw | None:
                  hips=np.array(release.get("hips_m", (0.0, 0.0, 0.0))[:2], float),
                  impact=None if impact is None else np.array(impact[:2], float),
                  velocity=speed * np.array(release.get("direction", (1.0, 0.0, 0.0)), float),
-                 how=str(release.get("how", "")))
+                 method=str(release.get("how", "")))
 
 
-def _number(value) -> float:
+def _to_float(value) -> float:
     return float("nan") if value is None else float(value)
 
 
-def _read(path: Path) -> Mapping:
+def _read_json(path: Path) -> Mapping:
     """Read a JSON object; raise InputError where it cannot be read."""
     try:
-        found = json.loads(path.read_text("utf-8"))
+        content = json.loads(path.read_text("utf-8"))
     except (OSError, ValueError, RecursionError) as error:
         raise InputError(path, f"cannot be read: {error}", "a report in JSON", "reconstruct the folder again") from None
-    if not isinstance(found, Mapping):
+    if not isinstance(content, Mapping):
         raise InputError(path, "contains no object", "a report in JSON", "reconstruct the folder again")
-    check_depth(found, path)
-    return found
+    check_depth(content, path)
+    return content
 
 
-def dominant_sides(results: Sequence[TrialResult]) -> dict[str, str]:
+def find_dominant_sides(results: Sequence[TrialResult]) -> dict[str, str]:
     """Find the hand with which each subject throws more often.
 
     Returns:
@@ -153,7 +153,7 @@ def dominant_sides(results: Sequence[TrialResult]) -> dict[str, str]:
             for subject, thrown in sides.items()}
 
 
-def aligned_impacts(results: Sequence[TrialResult]) -> np.ndarray:
+def align_impacts(results: Sequence[TrialResult]) -> np.ndarray:
     """Place the impacts of all throws in a common frame, as in figure 8.2.
 
     The origin is at the hips in the trial's first frame. The y axis is the direction of a subject's throws (the mean of
@@ -171,17 +171,17 @@ def aligned_impacts(results: Sequence[TrialResult]) -> np.ndarray:
                 if result.subject == subject and result.throw is not None and result.throw.impact is not None]
         if not rows:
             continue
-        ways = np.array([results[i].throw.velocity[:2] for i in rows])
-        mean = np.sum(unit_vectors(ways), axis=0)
+        directions = np.array([results[i].throw.velocity[:2] for i in rows])
+        mean = np.sum(unit_vectors(directions), axis=0)
         along = unit_vector(mean)
         across = np.array([along[1], -along[0]])
         for i in rows:
-            way = results[i].throw.impact - results[i].throw.hips
-            out[i] = way @ across, way @ along
+            offset = results[i].throw.impact - results[i].throw.hips
+            out[i] = offset @ across, offset @ along
     return out
 
 
-def near_mean(points: np.ndarray) -> np.ndarray:
+def select_near_mean(points: np.ndarray) -> np.ndarray:
     """Select the points within three standard deviations of their mean on both axes.
 
     Args:
@@ -193,11 +193,11 @@ def near_mean(points: np.ndarray) -> np.ndarray:
     if np.count_nonzero(known) < 3:
         return known
     mean, spread = points[known].mean(axis=0), points[known].std(axis=0)
-    return known & (np.abs(points - mean) <= CULLED * np.maximum(spread, 1e-9) + 1e-9).all(axis=-1)
+    return known & (np.abs(points - mean) <= OUTLIER_DEVIATIONS * np.maximum(spread, 1e-9) + 1e-9).all(axis=-1)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Paired:
+class SpeedComparison:
     """A comparison of estimated with measured speeds. Tests are NaN where there are too few pairs.
 
     Attributes:
@@ -219,7 +219,7 @@ class Paired:
     normal: float
 
 
-def compare_speeds(estimated: np.ndarray, measured: np.ndarray) -> Paired:
+def compare_speeds(estimated: np.ndarray, measured: np.ndarray) -> SpeedComparison:
     """Compare paired speeds; pairs with NaN are left out.
 
     Args:
@@ -232,13 +232,13 @@ def compare_speeds(estimated: np.ndarray, measured: np.ndarray) -> Paired:
 
     estimated, measured = np.asarray(estimated, float), np.asarray(measured, float)
     known = np.isfinite(estimated) & np.isfinite(measured)
-    off, base = (estimated - measured)[known], measured[known]
-    if not len(off):
-        none = float("nan")
-        return Paired(count=0, mean=none, sd=none, share=none, within=none, wilcoxon=none, normal=none)
-    varies = len(off) > 1 and np.ptp(off) > 1e-12
-    share = np.abs(off) / base
-    return Paired(count=len(off), mean=float(off.mean()), sd=float(off.std(ddof=1)) if len(off) > 1 else np.nan,
+    difference, base = (estimated - measured)[known], measured[known]
+    if not len(difference):
+        nan = float("nan")
+        return SpeedComparison(count=0, mean=nan, sd=nan, share=nan, within=nan, wilcoxon=nan, normal=nan)
+    varies = len(difference) > 1 and np.ptp(difference) > 1e-12
+    share = np.abs(difference) / base
+    return SpeedComparison(count=len(difference), mean=float(difference.mean()), sd=float(difference.std(ddof=1)) if len(difference) > 1 else np.nan,
                   share=float(share.mean()), within=float(np.mean(share <= 0.1)),
-                  wilcoxon=float(wilcoxon(off).pvalue) if len(off) >= LEAST and np.any(off != 0.0) else np.nan,
-                  normal=float(shapiro(off).pvalue) if len(off) >= 3 and varies else np.nan)  # fmt: skip
+                  wilcoxon=float(wilcoxon(difference).pvalue) if len(difference) >= MIN_PAIRS and np.any(difference != 0.0) else np.nan,
+                  normal=float(shapiro(difference).pvalue) if len(difference) >= 3 and varies else np.nan)  # fmt: skip

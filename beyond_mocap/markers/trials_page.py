@@ -18,15 +18,15 @@ from pathlib import Path
 import numpy as np
 
 from ..evaluation import html_page as html
-from ..evaluation.plots import plain
-from .trial_results import LEAST, TrialResult, aligned_impacts, compare_speeds, dominant_sides, near_mean, read_results
+from ..evaluation.plots import style_axes
+from .trial_results import MIN_PAIRS, TrialResult, align_impacts, compare_speeds, find_dominant_sides, select_near_mean, read_results
 
 DOMINANT, OTHER, QUIET = "#2563a8", "#e08a00", "#999999"
 _WIDTH, _DPI = 11.0, 100
 _BINS = 24
 
 
-def trials_report(folder: Path) -> str:
+def build_trials_report(folder: Path) -> str:
     """Build the page.
 
     Args:
@@ -37,79 +37,79 @@ def trials_report(folder: Path) -> str:
         InputError: if the folder has no reports, or matplotlib is not installed.
     """
     results = read_results(Path(folder))
-    made = [result for result in results if not result.error]
+    solved = [result for result in results if not result.error]
     title = Path(folder).resolve().name
-    parts = [html.element("h1", f"{title}: {len(results)} trials")]
-    if made:
-        parts.append(_section("Markers and time", _fit_text(made), draw_residuals_and_time(results),
+    parts = [html.build_element("h1", f"{title}: {len(results)} trials")]
+    if solved:
+        parts.append(_build_section("Markers and time", _describe_fit(solved), draw_residuals_and_time(results),
                               draw_residuals_by_trial(results)))
-    return html.build_page(title, *parts, *_throws(made), html.build_section("All trials", _table(results)))
+    return html.build_page(title, *parts, *_build_throw_sections(solved), html.build_section("All trials", _build_table(results)))
 
 
-def _fit_text(made: Sequence[TrialResult]) -> html.Html:
+def _describe_fit(solved: Sequence[TrialResult]) -> html.Html:
     """Describe how well the markers fit and how fast the solver is."""
-    residual, single = (_mean([getattr(r, name) for r in made]) for name in ("residual", "single"))
-    rate = _mean([r.rate for r in made])
-    said = f"Residuals {residual:.1f} mm (segments alone {single:.1f} mm), {rate:.0f} frames per second overall."
-    return html.element("p", f"{said} Error bars show one standard deviation.")
+    residual, single = (_compute_mean([getattr(r, name) for r in solved]) for name in ("residual", "single"))
+    rate = _compute_mean([r.rate for r in solved])
+    text = f"Residuals {residual:.1f} mm (segments alone {single:.1f} mm), {rate:.0f} frames per second overall."
+    return html.build_element("p", f"{text} Error bars show one standard deviation.")
 
 
-def _throws(made: Sequence[TrialResult]) -> list[html.Html]:
+def _build_throw_sections(solved: Sequence[TrialResult]) -> list[html.Html]:
     """Build the sections on throws; none where no throw was found."""
-    thrown = [result for result in made if result.throw is not None]
-    if not thrown:
+    throws = [result for result in solved if result.throw is not None]
+    if not throws:
         return []
     parts = []
-    points = aligned_impacts(thrown)
-    near = near_mean(points)
+    points = align_impacts(throws)
+    near = select_near_mean(points)
     if near.any():
-        said = f"{int(near.sum())} of {len(thrown)} throws; those beyond three standard deviations are left out."
-        parts.append(_section("Where throws land", html.element("p", said), draw_impact_map(points[near]),
-                              draw_impact_scatter(thrown, points)))
-    pairs = [(r.throw.radar, r.throw.speed) for r in thrown if r.throw.radar]
+        text = f"{int(near.sum())} of {len(throws)} throws; those beyond three standard deviations are left out."
+        parts.append(_build_section("Where throws land", html.build_element("p", text), draw_impact_map(points[near]),
+                              draw_impact_scatter(throws, points)))
+    pairs = [(r.throw.radar, r.throw.speed) for r in throws if r.throw.radar]
     if pairs:
         measured, estimated = np.array(pairs, float).T
-        parts.append(_section("How fast they are", _speed_text(estimated, measured), draw_speeds(measured, estimated)))
+        parts.append(_build_section("How fast they are", _describe_speeds(estimated, measured), draw_speeds(measured, estimated)))
     return parts
 
 
-def _speed_text(estimated: np.ndarray, measured: np.ndarray) -> html.Html:
+def _describe_speeds(estimated: np.ndarray, measured: np.ndarray) -> html.Html:
     """Describe the differences between estimated and measured speeds, with both tests."""
-    found = compare_speeds(estimated, measured)
-    many = "throws" if found.count != 1 else "throw"
-    lines = [f"{found.count} {many} with a measured speed: estimated - measured {found.mean:+.2f} m/s"
-             + (f" (standard deviation {found.sd:.2f})" if np.isfinite(found.sd) else "")
-             + f", {100 * found.share:.1f} % off on average, {100 * found.within:.0f} % of them within 10 %."]
-    if np.isfinite(found.normal):
-        lines.append(f"Normality of the differences (Shapiro-Wilk): p = {found.normal:.3f}.")
-    if np.isfinite(found.wilcoxon):
-        lines.append(f"No difference (Wilcoxon, paired, two-sided): p = {found.wilcoxon:.4f}.")
+    comparison = compare_speeds(estimated, measured)
+    many = "throws" if comparison.count != 1 else "throw"
+    lines = [f"{comparison.count} {many} with a measured speed: estimated - measured {comparison.mean:+.2f} m/s"
+             + (f" (standard deviation {comparison.sd:.2f})" if np.isfinite(comparison.sd) else "")
+             + f", {100 * comparison.share:.1f} % off on average, {100 * comparison.within:.0f} % of them within 10 %."]
+    if np.isfinite(comparison.normal):
+        lines.append(f"Normality of the differences (Shapiro-Wilk): p = {comparison.normal:.3f}.")
+    if np.isfinite(comparison.wilcoxon):
+        lines.append(f"No difference (Wilcoxon, paired, two-sided): p = {comparison.wilcoxon:.4f}.")
     else:
-        lines.append(f"No paired test: it needs at least {LEAST} throws that differ.")
-    return html.fragment(*(html.element("p", line) for line in lines))
+        lines.append(f"No paired test: it needs at least {MIN_PAIRS} throws that differ.")
+    return html.join_html(*(html.build_element("p", line) for line in lines))
 
 
-def _table(results: Sequence[TrialResult]) -> html.Html:
+def _build_table(results: Sequence[TrialResult]) -> html.Html:
     """Build the table of all trials."""
     number = html.build_title
     titles = ("trial", "subject", number("frames"), number("residual, mm"), number("frames/s"), "hand",
               number("speed, m/s"), number("radar"), "")
-    return html.build_table(titles, map(_row, results))
+    return html.build_table(titles, map(_build_row, results))
 
 
-def _row(result: TrialResult) -> html.Html:
+def _build_row(result: TrialResult) -> html.Html:
     side, speed, radar = (result.throw.side, result.throw.speed, result.throw.radar) if result.throw else ("", None, 0)
     cell = html.build_number_cell
     return html.build_row(result.name, result.subject, cell(result.frames or None), cell(result.residual, 1),
                           cell(result.rate), side, cell(speed, 1), cell(radar or None, 1),
-                          html.element("td", result.error, class_="missed"))
+                          html.build_element("td", result.error, class_="missed"))
 
 
-def _section(title: str, body: html.Html, *images: bytes) -> html.Html:
+def _build_section(title: str, body: html.Html, *images: bytes) -> html.Html:
     return html.build_section(title, body, *(html.build_image(png, title) for png in images))
 
 
-def _mean(values: Sequence[float]) -> float:
+def _compute_mean(values: Sequence[float]) -> float:
     known = [value for value in values if np.isfinite(value)]
     return float(np.mean(known)) if known else float("nan")
 
@@ -122,19 +122,19 @@ def draw_residuals_and_time(results: Sequence[TrialResult]) -> bytes:
     Returns:
         A PNG image.
     """
-    made = [result for result in results if not result.error]
-    subjects = sorted({result.subject for result in made})
-    figure, (left, right) = _canvas(1, 2, 3.6)
-    squares = [_over_frames([r for r in made if r.subject == subject]) for subject in subjects]
-    times = [[1000.0 / r.rate for r in made if r.subject == subject and r.rate > 0] for subject in subjects]
+    solved = [result for result in results if not result.error]
+    subjects = sorted({result.subject for result in solved})
+    figure, (left, right) = _build_canvas(1, 2, 3.6)
+    squares = [_merge_frame_statistics([r for r in solved if r.subject == subject]) for subject in subjects]
+    times = [[1000.0 / r.rate for r in solved if r.subject == subject and r.rate > 0] for subject in subjects]
     names = [subject or "no name" for subject in subjects]
-    _bar(left, names, [1e4 * mean for mean, _ in squares], [1e4 * sd for _, sd in squares])
+    _draw_bars(left, names, [1e4 * mean for mean, _ in squares], [1e4 * sd for _, sd in squares])
     left.set_ylabel("cm², sum over markers")
     left.set_title("squared residuals per frame, weighted", loc="left", fontsize=9.5)
-    _bar(right, names, [np.mean(t) if t else np.nan for t in times], [np.std(t) if t else 0.0 for t in times])
+    _draw_bars(right, names, [np.mean(t) if t else np.nan for t in times], [np.std(t) if t else 0.0 for t in times])
     right.set_ylabel("ms")
     right.set_title("solving time per frame", loc="left", fontsize=9.5)
-    return _png(figure)
+    return _render_png(figure)
 
 
 def draw_residuals_by_trial(results: Sequence[TrialResult]) -> bytes:
@@ -145,17 +145,17 @@ def draw_residuals_by_trial(results: Sequence[TrialResult]) -> bytes:
     Returns:
         A PNG image.
     """
-    made = [result for result in results if not result.error]
-    figure, (ax,) = _canvas(1, 1, 0.9 + 0.28 * len(made))
-    rows = np.arange(len(made))
-    ax.barh(rows - 0.19, [r.residual for r in made], 0.36, color=DOMINANT, label="whole body")
-    ax.barh(rows + 0.19, [r.single for r in made], 0.36, color=QUIET, label="segments alone")
-    ax.set_yticks(rows, [_short(r.name) for r in made])
+    solved = [result for result in results if not result.error]
+    figure, (ax,) = _build_canvas(1, 1, 0.9 + 0.28 * len(solved))
+    rows = np.arange(len(solved))
+    ax.barh(rows - 0.19, [r.residual for r in solved], 0.36, color=DOMINANT, label="whole body")
+    ax.barh(rows + 0.19, [r.single for r in solved], 0.36, color=QUIET, label="segments alone")
+    ax.set_yticks(rows, [_shorten_name(r.name) for r in solved])
     ax.invert_yaxis()
     ax.set_xlabel("mm, root mean square", fontsize=8)
     ax.set_title("markers against the model", loc="left", fontsize=9.5)
-    ax.legend(fontsize=8, frameon=False)
-    return _png(figure)
+    ax.choose_clip_colours(fontsize=8, frameon=False)
+    return _render_png(figure)
 
 
 def draw_impact_map(points: np.ndarray) -> bytes:
@@ -173,17 +173,17 @@ def draw_impact_map(points: np.ndarray) -> bytes:
     grid = figure.add_gridspec(2, 2, width_ratios=(4, 1), height_ratios=(1, 4))
     main = figure.add_subplot(grid[1, 0])
     above, beside = figure.add_subplot(grid[0, 0], sharex=main), figure.add_subplot(grid[1, 1], sharey=main)
-    edges = [_edges(points[:, axis]) for axis in (0, 1)]
+    edges = [_compute_bin_edges(points[:, axis]) for axis in (0, 1)]
     counts, *_ = np.histogram2d(points[:, 0], points[:, 1], bins=edges)
-    shown = main.pcolormesh(*edges, np.where(counts > 0, counts, np.nan).T, cmap="viridis", vmin=0)
-    bar = figure.colorbar(shown, ax=beside, label="throws", ticks=MaxNLocator(integer=True))
+    mesh = main.pcolormesh(*edges, np.where(counts > 0, counts, np.nan).T, cmap="viridis", vmin=0)
+    bar = figure.colorbar(mesh, ax=beside, label="throws", ticks=MaxNLocator(integer=True))
     bar.ax.tick_params(labelsize=8)
     above.hist(points[:, 0], bins=list(edges[0]), color=DOMINANT)
     beside.hist(points[:, 1], bins=list(edges[1]), color=DOMINANT, orientation="horizontal")
     above.tick_params(labelbottom=False, labelsize=8)
     beside.tick_params(labelleft=False, labelsize=8)
-    _ground(main)
-    return _png(figure)
+    _draw_ground_axes(main)
+    return _render_png(figure)
 
 
 def draw_impact_scatter(results: Sequence[TrialResult], points: np.ndarray) -> bytes:
@@ -195,21 +195,21 @@ def draw_impact_scatter(results: Sequence[TrialResult], points: np.ndarray) -> b
     Returns:
         A PNG image.
     """
-    sides = dominant_sides(results)
-    figure, axes = _canvas((len(sides) + 2) // 3, min(len(sides), 3), 3.6)
+    sides = find_dominant_sides(results)
+    figure, axes = _build_canvas((len(sides) + 2) // 3, min(len(sides), 3), 3.6)
     for ax, (subject, strong) in zip(axes, sorted(sides.items())):
-        for name, colour, wanted in (("dominant arm", DOMINANT, True), ("other arm", OTHER, False)):
+        for name, colour, is_dominant in (("dominant arm", DOMINANT, True), ("other arm", OTHER, False)):
             rows = [i for i, r in enumerate(results) if r.subject == subject and r.throw is not None
-                    and (r.throw.side == strong) is wanted and np.isfinite(points[i]).all()]
+                    and (r.throw.side == strong) is is_dominant and np.isfinite(points[i]).all()]
             if rows:
                 ax.plot(*points[rows].T, "o", color=colour, ms=4, label=f"{name}: {len(rows)}")
         ax.set_title(subject or "no name", loc="left", fontsize=9.5)
-        _ground(ax)
+        _draw_ground_axes(ax)
         if ax.get_legend_handles_labels()[1]:
-            ax.legend(fontsize=8, frameon=False)
+            ax.choose_clip_colours(fontsize=8, frameon=False)
     for ax in axes[len(sides):]:
         ax.axis("off")
-    return _png(figure)
+    return _render_png(figure)
 
 
 def draw_speeds(measured: np.ndarray, estimated: np.ndarray) -> bytes:
@@ -221,15 +221,15 @@ def draw_speeds(measured: np.ndarray, estimated: np.ndarray) -> bytes:
     Returns:
         A PNG image.
     """
-    figure, (left, right) = _canvas(1, 2, 3.8)
-    edges = _edges(np.concatenate([measured, estimated]), 16)
+    figure, (left, right) = _build_canvas(1, 2, 3.8)
+    edges = _compute_bin_edges(np.concatenate([measured, estimated]), 16)
     for values, colour, name in ((measured, QUIET, "measured"), (estimated, DOMINANT, "estimated")):
         share = np.full(len(values), 1.0 / len(values))
         left.hist(values, bins=edges, weights=share, color=colour, alpha=0.6, label=name)
     left.set_xlabel("m/s", fontsize=8)
     left.set_ylabel("share of throws")
     left.set_title("ball speeds", loc="left", fontsize=9.5)
-    left.legend(fontsize=8, frameon=False)
+    left.choose_clip_colours(fontsize=8, frameon=False)
     span = np.array([edges[0], edges[-1]])
     right.plot(span, span, color=QUIET, lw=1)
     right.fill_between(span, 0.9 * span, 1.1 * span, color=QUIET, alpha=0.15, lw=0, label="within 10 %")
@@ -237,14 +237,14 @@ def draw_speeds(measured: np.ndarray, estimated: np.ndarray) -> bytes:
     right.set_xlabel("measured, m/s", fontsize=8)
     right.set_ylabel("estimated, m/s")
     right.set_title("pair by pair", loc="left", fontsize=9.5)
-    right.legend(fontsize=8, frameon=False)
-    return _png(figure)
+    right.choose_clip_colours(fontsize=8, frameon=False)
+    return _render_png(figure)
 
 
-def _over_frames(made: Sequence[TrialResult]) -> tuple[float, float]:
+def _merge_frame_statistics(results: Sequence[TrialResult]) -> tuple[float, float]:
     """Return mean and standard deviation of the squared residuals over all frames of several trials."""
-    count = np.array([r.frames for r in made], float)
-    mean, spread = np.array([r.squares for r in made], float).reshape(-1, 2).T
+    count = np.array([r.frames for r in results], float)
+    mean, spread = np.array([r.squares for r in results], float).reshape(-1, 2).T
     known = np.isfinite(mean) & np.isfinite(spread) & (count > 0)
     if not known.any():
         return np.nan, 0.0
@@ -254,13 +254,13 @@ def _over_frames(made: Sequence[TrialResult]) -> tuple[float, float]:
     return whole, float(np.sqrt(max(share @ (spread[known] ** 2 + mean[known] ** 2) - whole**2, 0.0)))
 
 
-def _bar(ax, names, values, spread) -> None:
+def _draw_bars(ax, names, values, spread) -> None:
     ax.bar(range(len(names)), values, 0.6, yerr=spread, color=DOMINANT, ecolor="#333333", capsize=4)
-    ax.set_xticks(range(len(names)), [_short(name) for name in names])
+    ax.set_xticks(range(len(names)), [_shorten_name(name) for name in names])
     ax.set_ylim(bottom=0.0)
 
 
-def _ground(ax) -> None:
+def _draw_ground_axes(ax) -> None:
     """Label the axes of an impact plot and mark the thrower."""
     ax.set_xlabel("m to the right of the throw", fontsize=8)
     ax.set_ylabel("m from the hips", fontsize=8)
@@ -270,28 +270,28 @@ def _ground(ax) -> None:
     ax.set_axisbelow(True)
 
 
-def _edges(values: np.ndarray, bins: int = _BINS) -> np.ndarray:
+def _compute_bin_edges(values: np.ndarray, bins: int = _BINS) -> np.ndarray:
     """Return the edges of `bins` bins over the values, with a margin of 5 %."""
     low, high = float(np.min(values)), float(np.max(values))
     room = max(0.05 * (high - low), 0.25)
     return np.linspace(low - room, high + room, bins + 1)
 
 
-def _short(name: str) -> str:
+def _shorten_name(name: str) -> str:
     return name if len(name) <= 34 else name[:15] + " … " + name[-15:]
 
 
-def _canvas(rows: int, columns: int, height: float):
+def _build_canvas(rows: int, columns: int, height: float):
     """Build a figure without a window; return it with its axes, row by row."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(_WIDTH, height * rows), dpi=_DPI, layout="constrained")
     axes = figure.subplots(rows, columns, squeeze=False).ravel()
-    plain(axes)
+    style_axes(axes)
     return figure, axes
 
 
-def _png(figure) -> bytes:
+def _render_png(figure) -> bytes:
     out = io.BytesIO()
     figure.savefig(out, format="png", metadata={"Software": None})
     return out.getvalue()

@@ -21,36 +21,36 @@ from ..annotation.event_words import EVENT_KINDS
 from ..ball.tracked.kinds import TOUCH_KINDS
 from ..ball.tracked.solve import SolvedTouch
 from ..base.errors import InputError
-from ..files.event_data import CERTAIN, MatchEvent, MatchEvents
+from ..files.event_data import CERTAIN_TOUCHES, MatchEvent, MatchEvents
 from ..motion.track.match_data import Half
 
-MOST_LAG = 300.0
+MAX_LAG = 300.0
 """s by which clocks may differ, for a feed whose clock starts elsewhere, if enough of its events agree."""
 
-WINDOW = 2.0
+PAIR_WINDOW = 2.0
 """s around an event's time on the corrected clock within which its touch may be."""
 
-_BIN = 0.1  # s, width of a bin of lags
-_SPREAD = 0.5  # s, scatter of the lags of one period
-_MOST_DRIFT = 0.002  # s per second
-_FEWEST = 8  # events of players who touch the ball: with fewer the lag is unknown
-_INSIDE = 4  # passes and shots in the solved time: with fewer a lag may be chance
-_SURE = 30  # pairs: with fewer, drift cannot be separated from scatter
-_TELLING = 15  # certain events: with fewer, a bad fit does not prove another match
-_LEAST_MATCHED, _ABOVE_CHANCE = 0.3, 1.6  # least share of certain events that fit, and least ratio to chance
+_LAG_BIN = 0.1  # s, width of a bin of lags
+_LAG_SPREAD = 0.5  # s, scatter of the lags of one period
+_MAX_DRIFT = 0.002  # s per second
+_MIN_EVENTS = 8  # events of players who touch the ball: with fewer the lag is unknown
+_MIN_INSIDE = 4  # passes and shots in the solved time: with fewer a lag may be chance
+_MIN_DRIFT_PAIRS = 30  # pairs: with fewer, drift cannot be separated from scatter
+_MIN_CERTAIN = 15  # certain events: with fewer, a bad fit does not prove another match
+_MIN_MATCHED, _MIN_CHANCE_RATIO = 0.3, 1.6  # least share of certain events that fit, and least ratio to chance
 _USUAL_LAG = 5.0  # s, scale of the Cauchy distribution of lags
-_LEAST_CHANCE = 0.04  # least probability to fit with a wrong lag: few events estimate it badly
-_LEAST_SURE = 4.0  # nats that make a clock certain
-_PAIR = 2.7  # nats that one pair is worth
-_DOUBTFUL = 0.3  # weight of an event that may be no touch, relative to a certain one
+_MIN_CHANCE = 0.04  # least probability to fit with a wrong lag: few events estimate it badly
+_MIN_CONFIDENCE = 4.0  # nats that make a clock certain
+_PAIR_NATS = 2.7  # nats that one pair is worth
+_DOUBTFUL_WEIGHT = 0.3  # weight of an event that may be no touch, relative to a certain one
 _SENDING = {kind.name for kind in EVENT_KINDS if kind.ball == "sends"}
 _TAKING = {kind.name for kind in EVENT_KINDS if kind.ball == "takes"}
-_SENT = {kind.name for kind in TOUCH_KINDS if kind.ball == "sends"}
-_TAKEN = {kind.name for kind in TOUCH_KINDS if kind.ball == "takes"}
-_CHANCES = (-97.0, -71.0, -53.0, -37.0, 37.0, 53.0, 71.0, 97.0)  # s added to a lag to measure fits by chance
-_NEAR = 1.0  # s between event and touch within which they fit
-_UNLIKE = 0.6  # s, cost of another kind or body part
-_NO_TOUCH = 1.4  # s, cost of an event without a touch
+_SENDING_TOUCHES = {kind.name for kind in TOUCH_KINDS if kind.ball == "sends"}
+_TAKING_TOUCHES = {kind.name for kind in TOUCH_KINDS if kind.ball == "takes"}
+_WRONG_LAGS = (-97.0, -71.0, -53.0, -37.0, 37.0, 53.0, 71.0, 97.0)  # s added to a lag to measure fits by chance
+_FIT_SECONDS = 1.0  # s between event and touch within which they fit
+_MISMATCH_COST = 0.6  # s, cost of another kind or body part
+_NO_TOUCH_COST = 1.4  # s, cost of an event without a touch
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,7 +78,7 @@ class PeriodClock:
     @property
     def fits(self) -> bool:
         """True if its events fit touches better than by chance."""
-        return self.sure >= _LEAST_SURE and self.matched >= max(_LEAST_MATCHED, _ABOVE_CHANCE * self.by_chance)
+        return self.sure >= _MIN_CONFIDENCE and self.matched >= max(_MIN_MATCHED, _MIN_CHANCE_RATIO * self.by_chance)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -100,7 +100,7 @@ class AlignedEvents:
     notes: tuple[str, ...] = ()
 
 
-def aligned(
+def align_events(
     events: MatchEvents, touches: Sequence[SolvedTouch], halves: Sequence[Half],
     span: tuple[float, float] | None = None,
 ) -> AlignedEvents:
@@ -123,38 +123,38 @@ def aligned(
     times, clocks, notes = np.full(len(events.events), np.nan), {}, []
     for half in halves:
         members = [i for i, event in enumerate(events.events) if event.period == half.number]
-        own = [touch for touch in touches if half.start <= touch.time <= half.end]
-        found = _half_clock([events.events[i] for i in members], own, half, span)
+        half_touches = [touch for touch in touches if half.start <= touch.time <= half.end]
+        found = _fit_half_clock([events.events[i] for i in members], half_touches, half, span)
         if found is None:
-            if members and own:
-                told = "too few events of players who touch the ball to align its clock; its events are ignored"
-                notes.append(f"period {half.number}: {told}")
+            if members and half_touches:
+                text = "too few events of players who touch the ball to align its clock; its events are ignored"
+                notes.append(f"period {half.number}: {text}")
             continue
         clocks[half.number], times[members] = found
-    _check(events, clocks)
+    _check_clocks(events, clocks)
     for number in [number for number, clock in clocks.items() if not clock.fits]:
-        notes.append(f"{_told(number, clocks.pop(number))}, which may be chance; its events are ignored")
+        notes.append(f"{_describe_clock(number, clocks.pop(number))}, which may be chance; its events are ignored")
         times[[i for i, event in enumerate(events.events) if event.period == number]] = np.nan
-    pairs = _pairs(events.events, times, touches)
-    notes += [_told(number, clock) for number, clock in clocks.items()]
+    pairs = _pair_touches(events.events, times, touches)
+    notes += [_describe_clock(number, clock) for number, clock in clocks.items()]
     return AlignedEvents(events=events.events, times=times, touches=pairs, clocks=clocks, notes=tuple(notes))
 
 
-def _half_clock(events, touches, half: Half, span) -> tuple[PeriodClock, np.ndarray] | None:
+def _fit_half_clock(events, touches, half: Half, span) -> tuple[PeriodClock, np.ndarray] | None:
     """Fit a half's clock; return it and its events' times (E,) s on the match's clock, None if it is unknown.
 
     A clock that does not count from the start of the half is tried from its first frame too.
     """
     since = np.array([event.time for event in events])
-    tried = []
-    for zero in dict.fromkeys((half.zero, half.start)):
-        clock = _clock(events, since, touches, zero, span)
+    candidates = []
+    for zero in dict.fromkeys((half.clock_zero, half.start)):
+        clock = _fit_clock(events, since, touches, zero, span)
         if clock is not None:
-            tried.append((clock, zero + (since - clock.lag) / (1.0 + clock.drift)))
-    return max(tried, key=lambda one: one[0].sure, default=None)
+            candidates.append((clock, zero + (since - clock.lag) / (1.0 + clock.drift)))
+    return max(candidates, key=lambda one: one[0].sure, default=None)
 
 
-def _told(number: int, clock: PeriodClock) -> str:
+def _describe_clock(number: int, clock: PeriodClock) -> str:
     drift = f", drifting {1000.0 * clock.drift:+.2f} s in 1000 s" if clock.drift else ""
     return (
         f"period {number}: events come {clock.lag:.2f} s after their touches{drift}, "
@@ -163,68 +163,68 @@ def _told(number: int, clock: PeriodClock) -> str:
     )
 
 
-def _clock(events, since, touches, start: float, span) -> PeriodClock | None:
+def _fit_clock(events, since, touches, start: float, span) -> PeriodClock | None:
     """Fit the clock of one period, which is 0 at `start` s; since: (E,) s, its events' times on it."""
-    when = np.array([touch.time - start for touch in touches])
-    who = np.array([touch.player for touch in touches])
-    sent = np.array([touch.kind in _SENT for touch in touches], bool)
+    touch_times = np.array([touch.time - start for touch in touches])
+    players = np.array([touch.player for touch in touches])
+    is_sending = np.array([touch.kind in _SENDING_TOUCHES for touch in touches], bool)
     early, late, origin = [], [], []
     for event, time in zip(events, since):
-        if event.played and event.player and np.isfinite(time):
-            own = when[(who == event.player) & (sent if event.kind in _SENDING else True)]
-            near = own[np.abs(time - own) <= MOST_LAG]
+        if event.may_be_touch and event.player and np.isfinite(time):
+            own = touch_times[(players == event.player) & (is_sending if event.kind in _SENDING else True)]
+            near = own[np.abs(time - own) <= MAX_LAG]
             early += [time] * len(near)
             late += near.tolist()
-            origin += [event.kind in CERTAIN] * len(near)
-    if len(set(early)) < _FEWEST:
+            origin += [event.kind in CERTAIN_TOUCHES] * len(near)
+    if len(set(early)) < _MIN_EVENTS:
         return None
     early, late, certain = np.array(early), np.array(late), np.array(origin)
-    lag = _commonest(early - late, np.where(certain, 1.0, _DOUBTFUL))
-    lag, drift = _line(early, late, lag)
-    fit = _Fit(events, since, when, who=who, span=(span[0] - start, span[1] - start), drift=drift)
-    right, wrong = fit.at([lag]), fit.at([lag + by for by in _CHANCES])
-    if right[0, 1] < _INSIDE:
+    lag = _find_commonest_lag(early - late, np.where(certain, 1.0, _DOUBTFUL_WEIGHT))
+    lag, drift = _fit_line(early, late, lag)
+    fit = _EventFit(events, since, touch_times, who=players, span=(span[0] - start, span[1] - start), drift=drift)
+    right, wrong = fit.at([lag]), fit.at([lag + by for by in _WRONG_LAGS])
+    if right[0, 1] < _MIN_INSIDE:
         return None
     # 1.48 turns the median absolute deviation of a normal distribution into its standard deviation.
     rest = early - late * (1.0 + drift) - lag
-    near = rest[np.abs(rest) < 3.0 * _SPREAD]
+    near = rest[np.abs(rest) < 3.0 * _LAG_SPREAD]
     spread = 1.48 * float(np.median(np.abs(near - np.median(near)))) if len(near) else np.nan
     matched, chance = right[0, 0] / right[0, 1], wrong[0, 0] / max(wrong[0, 1], 1)
-    doubtful = _sure(right[1, 0], right[1, 1], wrong[1, 0] / max(wrong[1, 1], 1))
-    sure = _sure(right[0, 0], right[0, 1], chance) + _DOUBTFUL * doubtful - _far(lag)
+    doubtful = _compute_confidence(right[1, 0], right[1, 1], wrong[1, 0] / max(wrong[1, 1], 1))
+    confidence = _compute_confidence(right[0, 0], right[0, 1], chance) + _DOUBTFUL_WEIGHT * doubtful - _compute_lag_cost(lag)
     return PeriodClock(lag=float(lag), drift=float(drift), spread=spread, matched=float(matched),
-                       by_chance=float(chance), told=int(right[0, 1]), sure=float(sure))
+                       by_chance=float(chance), told=int(right[0, 1]), sure=float(confidence))
 
 
-def _commonest(lags: np.ndarray, weights: np.ndarray) -> float:
+def _find_commonest_lag(lags: np.ndarray, weights: np.ndarray) -> float:
     """Find the lag (s) with most weight within _LAG_SPREAD, minus the cost of a large lag; of equal ones the
     smallest.
     """
-    edges = np.arange(-MOST_LAG - 1.0, MOST_LAG + 1.0 + _BIN, _BIN)
+    edges = np.arange(-MAX_LAG - 1.0, MAX_LAG + 1.0 + _LAG_BIN, _LAG_BIN)
     counts, _ = np.histogram(lags, edges, weights=weights)
-    reach = np.arange(-15, 16) * _BIN
+    reach = np.arange(-15, 16) * _LAG_BIN
     middles = 0.5 * (edges[1:] + edges[:-1])
-    smooth = np.convolve(counts, np.exp(-0.5 * (reach / _SPREAD) ** 2), "same") - _far(middles) / _PAIR
+    smooth = np.convolve(counts, np.exp(-0.5 * (reach / _LAG_SPREAD) ** 2), "same") - _compute_lag_cost(middles) / _PAIR_NATS
     smooth -= smooth.min()
     best = np.flatnonzero(smooth >= smooth.max() * (1.0 - 1e-9))
     return float(middles[best[np.abs(middles[best]).argmin()]])
 
 
-def _far(lag):
+def _compute_lag_cost(lag):
     """Compute the nats by which a lag (s) is less likely than none: a Cauchy distribution around the usual lags."""
     return np.log1p((lag / _USUAL_LAG) ** 2)
 
 
-def _line(early: np.ndarray, late: np.ndarray, lag: float) -> tuple[float, float]:
+def _fit_line(early: np.ndarray, late: np.ndarray, lag: float) -> tuple[float, float]:
     """Fit lag and drift through the pairs near `lag`; distant pairs count less and less.
 
     A drift is accepted only if many pairs over a long time show it.
     """
     found, drift = lag, 0.0
-    for reach in (6.0 * _SPREAD, 4.0 * _SPREAD, 3.0 * _SPREAD, 2.0 * _SPREAD, 2.0 * _SPREAD):
+    for reach in (6.0 * _LAG_SPREAD, 4.0 * _LAG_SPREAD, 3.0 * _LAG_SPREAD, 2.0 * _LAG_SPREAD, 2.0 * _LAG_SPREAD):
         off = early - late * (1.0 + drift) - found
         near = np.abs(off) < reach
-        if np.count_nonzero(near) < _FEWEST:
+        if np.count_nonzero(near) < _MIN_EVENTS:
             break
         x, y = late[near], (early - late)[near]
         # Tukey's biweight; the reach shrinks from round to round.
@@ -234,13 +234,13 @@ def _line(early: np.ndarray, late: np.ndarray, lag: float) -> tuple[float, float
         mean = np.average(y, weights=weights)
         slope = np.average((x - middle) * (y - mean), weights=weights) / max(around, 1e-9)
         error = np.sqrt(np.average((y - mean) ** 2, weights=weights) / max(around, 1e-9) / np.count_nonzero(near))
-        told = np.count_nonzero(near) >= _SURE and abs(slope) > 4.0 * error and abs(slope) < _MOST_DRIFT
-        drift = float(slope) if told else 0.0
+        has_drift = np.count_nonzero(near) >= _MIN_DRIFT_PAIRS and abs(slope) > 4.0 * error and abs(slope) < _MAX_DRIFT
+        drift = float(slope) if has_drift else 0.0
         found = float(mean - drift * middle)
     return found, drift
 
 
-class _Fit:
+class _EventFit:
     """Count events that have a touch of their player within _FIT_SECONDS, at any lag.
 
     Args:
@@ -256,8 +256,8 @@ class _Fit:
         self._span, self._drift, self._rows = span, drift, []
         known = np.isfinite(since)
         named = np.array([event.player for event in events])
-        certain = np.array([event.kind in CERTAIN for event in events], bool)
-        played = known & np.array([event.played for event in events], bool) & (named != "")
+        certain = np.array([event.kind in CERTAIN_TOUCHES for event in events], bool)
+        played = known & np.array([event.may_be_touch for event in events], bool) & (named != "")
         for player in np.unique(named[played]):
             own = played & (named == player)
             edges = np.concatenate([[-np.inf], np.sort(when[who == player]), [np.inf]])
@@ -269,18 +269,18 @@ class _Fit:
         for since, certain, edges in self._rows:
             there = (since - np.reshape(lags, (-1, 1))) / (1.0 + self._drift)
             after = np.searchsorted(edges, there)
-            near = np.minimum(edges[after] - there, there - edges[after - 1]) <= _NEAR
+            near = np.minimum(edges[after] - there, there - edges[after - 1]) <= _FIT_SECONDS
             inside = (there >= self._span[0]) & (there <= self._span[1])
             for row, which in enumerate((certain, ~certain)):
                 out[row] += np.count_nonzero(inside & near & which), np.count_nonzero(inside & which)
         return out
 
 
-def _sure(fitting: int, count: int, chance: float) -> float:
+def _compute_confidence(fitting: int, count: int, chance: float) -> float:
     """Compute the nats: how unlikely it is that as many of `count` fit by `chance` (Chernoff's bound of a binomial
     tail).
     """
-    chance = min(max(chance, _LEAST_CHANCE), 0.99)
+    chance = min(max(chance, _MIN_CHANCE), 0.99)
     share = fitting / max(count, 1)
     if share <= chance:
         return 0.0
@@ -288,55 +288,55 @@ def _sure(fitting: int, count: int, chance: float) -> float:
     return float(count * (share * np.log(share / chance) + rest))
 
 
-def _check(events: MatchEvents, clocks: Mapping[int, PeriodClock]) -> None:
+def _check_clocks(events: MatchEvents, clocks: Mapping[int, PeriodClock]) -> None:
     """Check that a period fits better than by chance, if there are enough events; InputError otherwise."""
-    many = sum(clock.told for clock in clocks.values()) >= _TELLING
+    many = sum(clock.told for clock in clocks.values()) >= _MIN_CERTAIN
     if many and not any(clock.fits for clock in clocks.values()):
         best = max(clocks.values(), key=lambda clock: clock.matched)
         found = f"{best.matched:.0%} of passes and shots fit a touch of their player (by chance {best.by_chance:.0%})"
         raise InputError(events.where, found, "events of the same match", "check both files")
 
 
-def _pairs(events: Sequence[MatchEvent], times: np.ndarray, touches: Sequence[SolvedTouch]) -> np.ndarray:
+def _pair_touches(events: Sequence[MatchEvent], times: np.ndarray, touches: Sequence[SolvedTouch]) -> np.ndarray:
     """Pair each player's events with touches at the lowest cost, in order; (E,) touch indices, -1 for none."""
     out = np.full(len(events), -1)
     for player in sorted({event.player for event in events if event.player}):
-        own = [i for i, event in enumerate(events) if event.player == player and event.played and np.isfinite(times[i])]
-        own.sort(key=lambda i: times[i])
-        his = [i for i, touch in enumerate(touches) if touch.player == player]
-        for event, touch in _together(own, his, events, times, touches):
+        player_events = [i for i, event in enumerate(events) if event.player == player and event.may_be_touch and np.isfinite(times[i])]
+        player_events.sort(key=lambda i: times[i])
+        player_touches = [i for i, touch in enumerate(touches) if touch.player == player]
+        for event, touch in _pair_in_order(player_events, player_touches, events, times, touches):
             out[event] = touch
     return out
 
 
-def _together(own, his, events, times, touches) -> list[tuple[int, int]]:
+def _pair_in_order(player_events, player_touches, events, times, touches) -> list[tuple[int, int]]:
     """Pair events and touches (event, touch) in the order of both, by dynamic programming."""
-    best = np.full((len(own) + 1, len(his) + 1), np.inf)
-    best[0], way = 0.0, np.zeros(best.shape, int)
+    best = np.full((len(player_events) + 1, len(player_touches) + 1), np.inf)
+    best[0], steps = 0.0, np.zeros(best.shape, int)
     # best[r, c]: lowest cost of the first r events and c touches. Steps: 0 the event has no touch,
     # 1 the touch has no event, 2 they are a pair.
-    for row, event in enumerate(own, 1):
-        best[row, 0] = best[row - 1, 0] + _NO_TOUCH
-        for column, touch in enumerate(his, 1):
-            cost = _unlike(events[event], touches[touch], times[event])
-            ways = (best[row - 1, column] + _NO_TOUCH, best[row, column - 1], best[row - 1, column - 1] + cost)
-            way[row, column] = int(np.argmin(ways))
-            best[row, column] = ways[way[row, column]]
-    row, column, found = len(own), len(his), []
+    for row, event in enumerate(player_events, 1):
+        best[row, 0] = best[row - 1, 0] + _NO_TOUCH_COST
+        for column, touch in enumerate(player_touches, 1):
+            cost = _compute_difference(events[event], touches[touch], times[event])
+            costs = (best[row - 1, column] + _NO_TOUCH_COST, best[row, column - 1], best[row - 1, column - 1] + cost)
+            steps[row, column] = int(np.argmin(costs))
+            best[row, column] = costs[steps[row, column]]
+    row, column, found = len(player_events), len(player_touches), []
     while row and column:
-        step = way[row, column]
+        step = steps[row, column]
         if step == 2:
-            found.append((own[row - 1], his[column - 1]))
+            found.append((player_events[row - 1], player_touches[column - 1]))
         row, column = row - (step != 1), column - (step > 0)
     return found[::-1]
 
 
-def _unlike(event: MatchEvent, touch: SolvedTouch, time: float) -> float:
+def _compute_difference(event: MatchEvent, touch: SolvedTouch, time: float) -> float:
     """Compute how much a touch differs from an event, in s; inf beyond PAIR_WINDOW."""
-    off = abs(touch.time - time)
-    if off > WINDOW:
+    distance = abs(touch.time - time)
+    if distance > PAIR_WINDOW:
         return np.inf
-    wanted = _SENT if event.kind in _SENDING else _TAKEN if event.kind in _TAKING else {touch.kind}
-    unlike = touch.kind not in wanted
+    expected = _SENDING_TOUCHES if event.kind in _SENDING else _TAKING_TOUCHES if event.kind in _TAKING else {touch.kind}
+    unlike = touch.kind not in expected
     other_part = event.part in ("head", "hand") and touch.part != event.part
-    return off + _UNLIKE * unlike + 0.5 * _UNLIKE * other_part
+    return distance + _MISMATCH_COST * unlike + 0.5 * _MISMATCH_COST * other_part

@@ -14,35 +14,35 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..annotation import Span, Timeline
-from ..base.errors import InputError, spans_of
-from ..library.automatic import with_chosen_gaits
+from ..base.errors import InputError, line_spans
+from ..library.automatic import apply_chosen_gaits
 from ..library.features import FPS
 from ..library.library import Library
-from ..library.made import MADE_FOLDER
-from ..motion.motion import concatenate
+from ..library.made import SYNTHETIC_FOLDER
+from ..motion.motion import concatenate_motions
 from ..motion.track.ball_path import BallPath
-from ..synthesis.construct.hand_over import handed_over
-from ..synthesis.construct.meeting import eased
+from ..synthesis.construct.hand_over import blend_with_old
+from ..synthesis.construct.meeting import ease_in_out
 from ..synthesis.plan import Plan
 from ..synthesis.resolve_plan import resolve_plan
-from ..synthesis.search.edit_list import EditList, at_times
-from ..synthesis.search.footage import shown
-from ..synthesis.synthesize import constructed
+from ..synthesis.search.edit_list import EditList, sample_edit
+from ..synthesis.search.footage import look_up_frames
+from ..synthesis.synthesize import construct_take
 from ..synthesis.take import DribbleTouch, Take
-from .pieces.named_edit import bound, part
-from .pieces.units import cut_plan, frame_count, window_edges
+from .pieces.named_edit import to_library_edit, cut_named_edit
+from .pieces.units import cut_plan, count_frames, build_window_edges
 from .player_edit import PlayerEdit, Stretch
 
-AROUND = 4.0
+MARGIN_SECONDS = 4.0
 """s on either side of a window that are constructed too."""
 
-HAND_OVER = 0.5
+BLEND_SECONDS = 0.5
 """s after an edge in which the motion of the window before blends into the next one's."""
 
-SETTLED = 2.0
+SETTLE_SECONDS = 2.0
 """s after an edge within which a foot in contact reaches its position in the next window."""
 
-_PINNED = 1e-9
+_MIN_SHARE = 1e-9
 """A share that counts as zero but fixes a frame at its own position."""
 
 Progress = Callable[[float, str], None]
@@ -50,7 +50,7 @@ Progress = Callable[[float, str], None]
 _SAME_TIME = 1e-6
 
 
-def expanded(
+def construct_player(
     library: Library, edit: PlayerEdit, start: float, end: float, progress: Progress | None = None
 ) -> tuple[Take, ...]:
     """Construct what a player does in a span of the match: one take for each stretch on the pitch that reaches into it.
@@ -72,10 +72,10 @@ def expanded(
     report = progress or (lambda fraction, text: None)
     takes = []
     for number, stretch in enumerate(edit.stretches):
-        def tell(fraction: float, number=number):
+        def report_stretch(fraction: float, number=number):
             report((number + fraction) / len(edit.stretches), "Constructing")
 
-        take = _Layout(library, edit.window, stretch).take(start, end, tell)
+        take = _StretchConstructor(library, edit.window, stretch).construct_take(start, end, report_stretch)
         takes += [] if take is None else [take]
     report(1.0, "Done")
     return tuple(takes)
@@ -97,99 +97,99 @@ class _Window:
     high: int
     first: int
     take: Take
-    standing: np.ndarray
+    foot_contacts: np.ndarray
 
 
-class _Layout:
+class _StretchConstructor:
     """A stretch and the grid of windows in which it is constructed."""
 
     def __init__(self, library: Library, window: float, stretch: Stretch):
         self.plan, self.edit = stretch.plan, stretch.edit
-        made = any(path.startswith(MADE_FOLDER) for path, _ in self.edit.clips)
-        self.library = with_chosen_gaits(library.extended if made else library, dict(self.plan.gaits))
+        uses_synthetic = any(path.startswith(SYNTHETIC_FOLDER) for path, _ in self.edit.clips)
+        self.library = apply_chosen_gaits(library.with_synthetic_clips if uses_synthetic else library, dict(self.plan.gaits))
         self.fps, self.begin = self.plan.fps, float(self.plan.track.times[0])
-        self.count = frame_count(self.plan, self.fps)
-        self.edges = window_edges(self.begin, self.count, window, self.fps, step=1)
+        self.count = count_frames(self.plan, self.fps)
+        self.edges = build_window_edges(self.begin, self.count, window, self.fps, step=1)
 
-    def take(self, start: float, end: float, tell: Callable[[float], None]) -> Take | None:
+    def construct_take(self, start: float, end: float, tell: Callable[[float], None]) -> Take | None:
         """Construct the frames from `start` to `end` s; None if there are fewer than two."""
         low = max(0, int(np.ceil((start - self.begin) * self.fps - 1e-6)))
         high = min(self.count, int(np.floor((end - self.begin) * self.fps + 1e-6)) + 1)
         if high - low < 2:
             return None
-        parts = list(self._parts(low, high, tell))
-        return one_take(parts, cut_plan(self.plan, self._time(low), self._time(high - 1)))
+        parts = list(self._iter_parts(low, high, tell))
+        return join_takes(parts, cut_plan(self.plan, self._compute_time(low), self._compute_time(high - 1)))
 
-    def _parts(self, low: int, high: int, tell: Callable[[float], None]) -> Iterator[Take]:
+    def _iter_parts(self, low: int, high: int, tell: Callable[[float], None]) -> Iterator[Take]:
         """Iterate over the frames low .. high, window by window."""
-        settled = int(round(SETTLED * self.fps))
+        settle_frames = int(round(SETTLE_SECONDS * self.fps))
         numbers = [n for n, (a, b) in enumerate(zip(self.edges, self.edges[1:])) if a < high and b > low]
         before = None
         for done, number in enumerate(numbers):
             tell(done / len(numbers))
-            window, handed = self._window(number), None
+            window, blended = self._construct_window(number), None
             first, end = max(low, window.low), min(high, window.high)
-            if number and first < window.low + settled:
-                handed = _handed_over(before or self._window(number - 1), window, settled)
-            yield own_part(handed or window.take, first - window.first, end - window.first)
+            if number and first < window.low + settle_frames:
+                blended = _blend_window_start(before or self._construct_window(number - 1), window, settle_frames)
+            yield cut_take(blended or window.take, first - window.first, end - window.first)
             before = window
 
-    def _window(self, number: int) -> _Window:
+    def _construct_window(self, number: int) -> _Window:
         """Construct a window with its margins; only key moments within its plan count."""
         low, high = self.edges[number : number + 2]
-        around = int(round(AROUND * self.fps))
+        around = int(round(MARGIN_SECONDS * self.fps))
         first, end = max(0, low - around), min(self.count, high + around)
-        plan = cut_plan(self.plan, self._time(first), self._time(end - 1))
-        shown_here = self._shown(plan, first * FPS / self.fps)
-        resolved = resolve_plan(plan, self.library, touches_solved=True)
-        take = constructed(self.library, resolved, shown_here)
-        return _Window(low=low, high=high, first=first, take=take, standing=self._standing(shown_here, take))
+        plan = cut_plan(self.plan, self._compute_time(first), self._compute_time(end - 1))
+        shown_here = self._select_edit(plan, first * FPS / self.fps)
+        resolved = resolve_plan(plan, self.library, are_touches_resolved=True)
+        take = construct_take(self.library, resolved, shown_here)
+        return _Window(low=low, high=high, first=first, take=take, foot_contacts=self._find_foot_contacts(shown_here, take))
 
-    def _shown(self, plan: Plan, at: float) -> EditList:
+    def _select_edit(self, plan: Plan, at: float) -> EditList:
         """Select the edit list of a plan that starts at frame `at` (fractional) of the stretch, at the library's
         rate.
         """
-        count, whole = frame_count(plan), int(at)
-        edit = part(self.edit, whole, min(whole + count + 1, len(self.edit)))
-        edit = bound(self.library, edit, plan.timeline.keys)
-        clip, frame, piece = at_times(edit, np.minimum(np.arange(count) + (at - whole), len(edit) - 1))
+        count, whole = count_frames(plan), int(at)
+        edit = cut_named_edit(self.edit, whole, min(whole + count + 1, len(self.edit)))
+        edit = to_library_edit(self.library, edit, plan.timeline.keys)
+        clip, frame, piece = sample_edit(edit, np.minimum(np.arange(count) + (at - whole), len(edit) - 1))
         return EditList(clip, frame, np.flatnonzero(np.diff(piece)) + 1, edit.keys)
 
-    def _standing(self, edit: EditList, take: Take) -> np.ndarray:
+    def _find_foot_contacts(self, edit: EditList, take: Take) -> np.ndarray:
         """Find the feet (T, 2) bool whose heel or toe is in contact."""
         index = np.minimum(np.arange(len(take.motion)) * (FPS / self.fps), len(edit) - 1)
-        what = shown(self.library, edit, index)
+        what = look_up_frames(self.library, edit, index)
         frame, clips = np.round(what.clip_frame).astype(int), self.library.clips
         stands = np.array([clips[clip].standing[at].any(axis=1) for clip, at in zip(what.clip, frame)])
         return stands & ~take.stepped
 
-    def _time(self, frame: int) -> float:
+    def _compute_time(self, frame: int) -> float:
         return self.begin + frame / self.fps
 
 
-def _handed_over(before: _Window, window: _Window, settled: int) -> Take:
+def _blend_window_start(before: _Window, window: _Window, settle_frames: int) -> Take:
     """Blend the first `settle_frames` own frames of a window's take from where the window before ends."""
     take, old, fps = window.take, before.take, window.take.motion.fps
-    hand = int(round(HAND_OVER * fps))
-    settled = min(settled, len(take.motion) - (window.low - window.first) - 1)
-    at = slice(window.low - window.first, window.low - window.first + settled + 1)
+    hand = int(round(BLEND_SECONDS * fps))
+    settle_frames = min(settle_frames, len(take.motion) - (window.low - window.first) - 1)
+    at = slice(window.low - window.first, window.low - window.first + settle_frames + 1)
     then = slice(window.low - before.first, window.low - before.first + hand)
-    ahead = np.arange(settled + 1)
-    share = eased(1.0 - (ahead + 1.0) / (hand + 1.0), np.ones(len(ahead)))
+    ahead = np.arange(settle_frames + 1)
+    share = ease_in_out(1.0 - (ahead + 1.0) / (hand + 1.0), np.ones(len(ahead)))
     # Over BLEND_SECONDS the old pose fades out; feet in contact may take until the settle time.
-    share[-1] = _PINNED
-    places, turns = take.motion.root_positions[at].copy(), take.motion.rotations[at].copy()
-    new = places.copy(), turns.copy()
-    places[:hand], turns[:hand] = old.motion.root_positions[then], old.motion.rotations[then]
-    standing = np.repeat(window.standing[at][:, :, None], 2, axis=2)
+    share[-1] = _MIN_SHARE
+    places, rotations_before = take.motion.root_positions[at].copy(), take.motion.rotations[at].copy()
+    new = places.copy(), rotations_before.copy()
+    places[:hand], rotations_before[:hand] = old.motion.root_positions[then], old.motion.rotations[then]
+    foot_contacts = np.repeat(window.foot_contacts[at][:, :, None], 2, axis=2)
     root, rotations = take.motion.root_positions.copy(), take.motion.rotations.copy()
-    root[at], rotations[at] = handed_over(take.motion.skeleton, new, (places, turns), share=share, standing=standing,
+    root[at], rotations[at] = blend_with_old(take.motion.skeleton, new, (places, rotations_before), share=share, heel_toe_contacts=foot_contacts,
                                           fps=fps)
     motion = replace(take.motion, root_positions=root, rotations=rotations)
-    return replace(take, motion=motion, ball=_ball_handed(old.ball, take.ball, then, at.start, share[:hand]))
+    return replace(take, motion=motion, ball=_blend_ball(old.ball, take.ball, then, at.start, share[:hand]))
 
 
-def _ball_handed(
+def _blend_ball(
     old: BallPath | None, new: BallPath | None, then: slice, first: int, share: np.ndarray
 ) -> BallPath | None:
     """Blend the start of the new ball path from the old one: its share (H,) at frames first ... of the new."""
@@ -202,7 +202,7 @@ def _ball_handed(
     return replace(new, positions=places)
 
 
-def own_part(take: Take, first: int, end: int) -> Take:
+def cut_take(take: Take, first: int, end: int) -> Take:
     """Cut frames first .. end out of a take, with the key moments, pins, touches and warnings of that time.
 
     Args:
@@ -213,8 +213,8 @@ def own_part(take: Take, first: int, end: int) -> Take:
         The take, without edit list and without what editing needs.
     """
     inside = slice(first, end)
-    begin, fps = take.start_time + first / take.motion.fps, take.motion.fps
-    until = begin + (end - first) / fps
+    start, fps = take.start_time + first / take.motion.fps, take.motion.fps
+    stop = start + (end - first) / fps
     seams = take.seams[(take.seams >= first) & (take.seams < end)] - first
     ball = take.ball
     if ball is not None:
@@ -222,42 +222,42 @@ def own_part(take: Take, first: int, end: int) -> Take:
         ball = BallPath(ball.times[inside], ball.positions[inside], ball.measured[inside], turns)
     values = {name: getattr(take, name) for name in ("correction", "ik_miss", "stepped")}
     return replace(
-        take, motion=take.motion.frames(first, end), start_time=begin, clip=take.clip[inside],
+        take, motion=take.motion.frames(first, end), start_time=start, clip=take.clip[inside],
         clip_frame=take.clip_frame[inside], mirrored=take.mirrored[inside], words=take.words[inside],
         contacts=take.contacts[inside], seams=seams, ball=ball,
         **{name: None if each is None else each[inside] for name, each in values.items()},
-        timeline=_between(take.timeline, begin, until),
+        timeline=_cut_timeline(take.timeline, start, stop),
         keys=tuple(
-            replace(key, frame=key.frame - first) for key in take.keys if _within(key.asked.in_force, begin, until)
+            replace(key, frame=key.frame - first) for key in take.keys if _is_within(key.requested.resolved_time, start, stop)
         ),
-        pins=tuple(pin for pin in take.pins if _within(pin.pin.time, begin, until)),
-        dribbled=tuple(
+        pins=tuple(pin for pin in take.pins if _is_within(pin.pin.time, start, stop)),
+        dribble_touches=tuple(
             DribbleTouch(max(one.first - first, 0), min(one.last, end - 1) - first, one.side)
-            for one in take.dribbled if one.first < end and one.last >= first
+            for one in take.dribble_touches if one.first < end and one.last >= first
         ),
-        warnings=tuple(line for line in take.warnings if _told_in(line, begin, until)),
-        unpinned=None, met_ball=None, plan=None, edit=None,
+        warnings=tuple(line for line in take.warnings if _is_warning_within(line, start, stop)),
+        unpinned=None, contact_ball=None, plan=None, edit=None,
     )  # fmt: skip
 
 
-def _within(time: float, begin: float, until: float) -> bool:
+def _is_within(time: float, begin: float, until: float) -> bool:
     return begin - _SAME_TIME <= time < until - _SAME_TIME
 
 
-def _told_in(line: str, begin: float, until: float) -> bool:
+def _is_warning_within(line: str, begin: float, until: float) -> bool:
     """Say whether a warning is about no time, or about a time that starts here."""
-    spans = spans_of(line)
-    return not spans or _within(spans[0][0], begin, until)
+    spans = line_spans(line)
+    return not spans or _is_within(spans[0][0], begin, until)
 
 
-def _between(timeline: Timeline, begin: float, until: float) -> Timeline:
+def _cut_timeline(timeline: Timeline, begin: float, until: float) -> Timeline:
     """Cut spans to a time, and select the key moments in it."""
     spans = [span for span in timeline.spans if span.start < until - _SAME_TIME and span.end > begin + _SAME_TIME]
     cut = [replace(span, start=max(span.start, begin), end=min(span.end, until)) for span in spans]
-    return Timeline(tuple(cut), tuple(key for key in timeline.keys if _within(key.in_force, begin, until)))
+    return Timeline(tuple(cut), tuple(key for key in timeline.keys if _is_within(key.resolved_time, begin, until)))
 
 
-def one_take(takes: Sequence[Take], plan: Plan) -> Take:
+def join_takes(takes: Sequence[Take], plan: Plan) -> Take:
     """Join takes that follow each other without a gap.
 
     Args:
@@ -273,27 +273,27 @@ def one_take(takes: Sequence[Take], plan: Plan) -> Take:
     arrays = ("clip_frame", "mirrored", "contacts", "correction", "ik_miss", "stepped")
     begin, fps = takes[0].start_time, takes[0].motion.fps
     return replace(
-        takes[0], motion=concatenate([take.motion for take in takes]), clips=clips,
+        takes[0], motion=concatenate_motions([take.motion for take in takes]), clips=clips,
         clip=np.concatenate([np.array([number[path] for path in take.clips], int)[take.clip] for take in takes]),
         **{name: np.concatenate([getattr(take, name) for take in takes]) for name in arrays},
         words=tuple(words for take in takes for words in take.words), seams=seams[seams > 0],
-        timeline=_one_timeline([take.timeline for take in takes]),
+        timeline=_join_timelines([take.timeline for take in takes]),
         keys=tuple(
             replace(key, frame=key.frame + first) for take, first in zip(takes, firsts) for key in take.keys
         ),
         pins=tuple(pin for take in takes for pin in take.pins),
-        dribbled=tuple(
+        dribble_touches=tuple(
             DribbleTouch(one.first + int(first), one.last + int(first), one.side)
-            for take, first in zip(takes, firsts) for one in take.dribbled
+            for take, first in zip(takes, firsts) for one in take.dribble_touches
         ),
-        ball=_one_ball(takes, begin + np.arange(firsts[-1]) / fps),
+        ball=_join_balls(takes, begin + np.arange(firsts[-1]) / fps),
         warnings=tuple(dict.fromkeys(line for take in takes for line in take.warnings)),
         seconds={name: sum(take.seconds.get(name, 0.0) for take in takes) for name in takes[0].seconds},
         plan=plan, solved=plan.solved,
     )  # fmt: skip
 
 
-def _one_timeline(timelines: Sequence[Timeline]) -> Timeline:
+def _join_timelines(timelines: Sequence[Timeline]) -> Timeline:
     """Join timelines; a span that continues in the next one becomes one span."""
     spans: list[Span] = []
     for span in sorted((s for each in timelines for s in each.spans), key=lambda span: (span.words, span.start)):
@@ -306,7 +306,7 @@ def _one_timeline(timelines: Sequence[Timeline]) -> Timeline:
     return Timeline(tuple(spans), tuple(key for each in timelines for key in each.keys))
 
 
-def _one_ball(takes: Sequence[Take], times: np.ndarray) -> BallPath | None:
+def _join_balls(takes: Sequence[Take], times: np.ndarray) -> BallPath | None:
     """Join the balls of all takes at times (T,) s; unknown where a take has none, None if no take has one."""
     if all(take.ball is None for take in takes):
         return None

@@ -20,18 +20,18 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from ..base.errors import InputError
-from ..files.content import content
-from ..files.tables import plain
+from ..files.content import read_bytes
+from ..files.tables import to_plain
 from ..files.whole import atomic_write
-from .order import digest_of
+from .order import compute_digest
 
 STATE = "match.json"
-WORDS = "annotations"
+LABELS_FOLDER = "annotations"
 VERSION = 1
 _WORK, _LOCK, _ORDER = ".work", "lock", "order"  # the last file has the request's digest, in case match.json is lost
-_LONGEST = 100  # characters of a file name
+_MAX_NAME = 100  # characters of a file name
 _PART = re.compile(r"\..+\.\d+\.\d+\.part")  # temporary files of `files.whole`
-_HEAD, _DIGEST = 1000, re.compile(rb'"digest": *"([0-9a-f]+)"')  # first bytes of match.json, which contain its digest
+_HEAD_BYTES, _DIGEST = 1000, re.compile(rb'"digest": *"([0-9a-f]+)"')  # first bytes of match.json, which contain its digest
 _RESERVED = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\.|$)", re.IGNORECASE)  # names reserved by Windows
 
 
@@ -48,23 +48,23 @@ class MatchFolder:
 
     path: Path
     digest: str
-    before: dict = field(default_factory=dict)
+    previous_state: dict = field(default_factory=dict)
     notes: tuple[str, ...] = ()
 
-    def of(self, player_file: str, ending: str) -> Path:
+    def player_path(self, player_file: str, ending: str) -> Path:
         """The path of a player's file with this ending, such as "take.npz"."""
         return self.path / f"{player_file}.{ending}"
 
-    def words_of(self, player_file: str) -> Path:
+    def labels_path(self, player_file: str) -> Path:
         """The path of the text with a player's labels."""
-        return self.path / WORDS / f"{player_file}.txt"
+        return self.path / LABELS_FOLDER / f"{player_file}.txt"
 
-    def tell(self, state: Mapping) -> None:
+    def write_state(self, state: Mapping) -> None:
         """Write match.json."""
         whole = {"version": VERSION, "digest": self.digest, **state}
-        atomic_write(self.path / STATE, json.dumps(plain(whole), indent=1, ensure_ascii=False, allow_nan=False) + "\n")
+        atomic_write(self.path / STATE, json.dumps(to_plain(whole), indent=1, ensure_ascii=False, allow_nan=False) + "\n")
 
-    def place(self, kind: str, name: str) -> Path:
+    def piece_path(self, kind: str, name: str) -> Path:
         """The path of a piece of work, whether it exists or not.
 
         Args:
@@ -77,16 +77,16 @@ class MatchFolder:
         folder.mkdir(parents=True, exist_ok=True)
         return folder / f"{name}.npz"
 
-    def forget(self, kind: str, but: Iterable[str]) -> None:
+    def remove_pieces(self, kind: str, keep: Iterable[str]) -> None:
         """Remove all pieces of a kind except the names in `keep`."""
-        wanted = {f"{name}.npz" for name in but}
+        kept_names = {f"{name}.npz" for name in keep}
         for path in (self.path / _WORK / kind).glob("*"):
-            if path.name not in wanted:
+            if path.name not in kept_names:
                 path.unlink(missing_ok=True)
 
 
 @contextlib.contextmanager
-def opened(path: Path, identity: Mapping[str, object]) -> Iterator[MatchFolder]:
+def open_folder(path: Path, identity: Mapping[str, object]) -> Iterator[MatchFolder]:
     """Open the folder for a request whose results are determined by `identity`; create it if needed.
 
     A damaged match.json is set aside, with a note, if there are pieces of work beside it.
@@ -101,29 +101,29 @@ def opened(path: Path, identity: Mapping[str, object]) -> Iterator[MatchFolder]:
             works in it.
     """
     check_folder(path)
-    new, kept = not path.exists(), (path / _WORK).exists()
+    is_new, had_work = not path.exists(), (path / _WORK).exists()
     if (path / STATE).exists() and not any((path / _WORK).glob("*/*.npz")):  # nothing to resume from
-        _own_state(path)
+        _read_own_state(path)
     try:
         (path / _WORK).mkdir(parents=True, exist_ok=True)
     except OSError as error:
         found = f"cannot be written to ({error.strerror or error})"
         raise InputError(path, found, "a writable folder", "choose another folder") from None
-    with _locked(path / _WORK / _LOCK, path):
-        before, notes = _state_before(path, identity)
-        _check_order(path, before, identity)
-        _sweep(path)
-        atomic_write(path / _WORK / _ORDER, digest_of(identity))
+    with _hold_lock(path / _WORK / _LOCK, path):
+        before, notes = _read_previous_state(path, identity)
+        _check_identity(path, before, identity)
+        _remove_parts(path)
+        atomic_write(path / _WORK / _ORDER, compute_digest(identity))
         try:
-            yield MatchFolder(path, digest_of(identity), before, notes)
+            yield MatchFolder(path, compute_digest(identity), before, notes)
         finally:
-            if not (path / STATE).exists() and not kept:  # no work has started
+            if not (path / STATE).exists() and not had_work:  # no work has started
                 shutil.rmtree(path / _WORK, ignore_errors=True)
                 with contextlib.suppress(OSError):  # the user's own folder, or one with texts in it, stays
-                    path.rmdir() if new else None
+                    path.rmdir() if is_new else None
 
 
-def _state_before(path: Path, identity: Mapping[str, object]) -> tuple[dict, tuple[str, ...]]:
+def _read_previous_state(path: Path, identity: Mapping[str, object]) -> tuple[dict, tuple[str, ...]]:
     """Read match.json and notes for people; set a damaged one aside.
 
     InputError if it belongs to another version, or is damaged and still names another request.
@@ -131,30 +131,30 @@ def _state_before(path: Path, identity: Mapping[str, object]) -> tuple[dict, tup
     if not (path / STATE).exists():
         return {}, ()
     try:
-        return _own_state(path), ()
-    except _Damaged as error:
-        _check_order(path, _digest_kept(path), identity)
+        return _read_own_state(path), ()
+    except _DamagedState as error:
+        _check_identity(path, _read_digest(path), identity)
         os.replace(path / STATE, path / f"{STATE}.damaged")
         return {}, (f"{error.what}: renamed to {STATE}.damaged; finished work is found by its pieces",)
 
 
-def _digest_kept(path: Path) -> dict[str, str]:
+def _read_digest(path: Path) -> dict[str, str]:
     """Read the digest of the request from a damaged match.json, or from the folder of pieces."""
-    if told := _DIGEST.search((path / STATE).read_bytes()[:_HEAD]):
-        return {"digest": told[1].decode()}
+    if match := _DIGEST.search((path / STATE).read_bytes()[:_HEAD_BYTES]):
+        return {"digest": match[1].decode()}
     kept = path / _WORK / _ORDER
     return {"digest": kept.read_text("ascii", "replace")} if kept.is_file() else {}
 
 
-def _own_state(path: Path) -> dict:
+def _read_own_state(path: Path) -> dict:
     """Read match.json with the digest of its request; InputError as for `read_state`."""
     state = read_state(path)
     if not isinstance(state.get("digest"), str):
-        raise _Damaged(path / STATE, "no digest")
+        raise _DamagedState(path / STATE, "no digest")
     return state
 
 
-class _Damaged(InputError):
+class _DamagedState(InputError):
     """A match.json that is not in the expected form. what: where and what, without the next step."""
 
     def __init__(self, path: Path, found: str):
@@ -162,7 +162,7 @@ class _Damaged(InputError):
         self.what = f"{path}: {found}"
 
 
-def _sweep(path: Path) -> None:
+def _remove_parts(path: Path) -> None:
     """Remove temporary files of a killed run; only this run writes here."""
     for part in path.rglob(".*.part"):
         if _PART.fullmatch(part.name):
@@ -182,21 +182,21 @@ def read_state(folder: str | os.PathLike) -> dict:
     """
     path = Path(folder) / STATE
     try:
-        state = json.loads(content(path, "the state of a match"))
+        state = json.loads(read_bytes(path, "the state of a match"))
     except (ValueError, RecursionError) as error:
-        raise _Damaged(path, f"not valid JSON ({' '.join(str(error).split())[:80]})") from None
+        raise _DamagedState(path, f"not valid JSON ({' '.join(str(error).split())[:80]})") from None
     players = state.get("players") if isinstance(state, dict) else None
     ids = [one.get("id") if isinstance(one, dict) else None for one in players] if isinstance(players, list) else [None]
     if not all(isinstance(one, str) and one for one in ids):
-        raise _Damaged(path, "no list of players")
+        raise _DamagedState(path, "no list of players")
     if "version" not in state:
-        raise _Damaged(path, "no version")
+        raise _DamagedState(path, "no version")
     if state["version"] != VERSION:
         raise InputError(path, f"version {state['version']}", f"{VERSION}", "run the match again with this version")
     return state
 
 
-def file_names(ids: Iterable[str]) -> dict[str, str]:
+def build_file_names(ids: Iterable[str]) -> dict[str, str]:
     """Build the file name of each player from their id.
 
     Characters other than letters, digits, dot, minus and underscore are replaced; no two names are equal, ignoring
@@ -208,14 +208,14 @@ def file_names(ids: Iterable[str]) -> dict[str, str]:
         Name by id.
     """
     out: dict[str, str] = {}
-    taken: set[str] = set()
+    used: set[str] = set()
     for player in ids:
-        bare = re.sub(r"[^\w.-]", "_", player, flags=re.ASCII).strip(".")[:_LONGEST] or "player"
-        bare = f"_{bare}" if _RESERVED.match(bare) else bare
-        name, number = bare, 2
-        while name.lower() in taken:
-            name, number = f"{bare}-{number}", number + 1
-        taken.add(name.lower())
+        base = re.sub(r"[^\w.-]", "_", player, flags=re.ASCII).strip(".")[:_MAX_NAME] or "player"
+        base = f"_{base}" if _RESERVED.match(base) else base
+        name, number = base, 2
+        while name.lower() in used:
+            name, number = f"{base}-{number}", number + 1
+        used.add(name.lower())
         out[player] = name
     return out
 
@@ -230,24 +230,24 @@ def check_folder(path: Path) -> None:
     if not os.access(place, os.W_OK | os.X_OK):
         raise InputError(path, "cannot be written to", "a writable folder", "choose another folder")
     if path.is_dir() and not (path / STATE).exists() and not (path / _WORK).exists():
-        other = next((one.name for one in sorted(path.iterdir()) if one.name != WORDS), None)
+        other = next((one.name for one in sorted(path.iterdir()) if one.name != LABELS_FOLDER), None)
         if other is not None:
             raise InputError(path, f"holds other files ({other})", "an empty or a new folder", "choose another folder")
 
 
-def _check_order(path: Path, before: dict, identity: Mapping[str, object]) -> None:
+def _check_identity(path: Path, before: dict, identity: Mapping[str, object]) -> None:
     """Check that the folder's results belong to this request; InputError names the first difference."""
-    if not before or before.get("digest") == digest_of(identity):
+    if not before or before.get("digest") == compute_digest(identity):
         return
     earlier = before.get("identity")
-    known = plain(dict(identity)).items() if isinstance(earlier, dict) else ()
+    known = to_plain(dict(identity)).items() if isinstance(earlier, dict) else ()
     other = next((name for name, value in known if earlier.get(name) != value), None)
-    what = f" (its {_NAMES.get(other, other)} differs)" if other else ""
+    what = f" (its {_FIELD_NAMES.get(other, other)} differs)" if other else ""
     raise InputError(path, f"holds the results of another request{what}", "a folder for this request only",
                      "choose another folder, or delete this one")
 
 
-_NAMES = {
+_FIELD_NAMES = {
     "start": "start time", "end": "end time", "tracking": "tracking file", "meta": "metadata", "events": "events file",
     "events_meta": "events metadata", "events_provider": "events provider",
     "solve_touches": "touch solving", "players": "list of players", "fps": "frame rate", "seed": "seed",
@@ -256,15 +256,15 @@ _NAMES = {
 
 
 @contextlib.contextmanager
-def _locked(lock: Path, folder: Path) -> Iterator[None]:
+def _hold_lock(lock: Path, folder: Path) -> Iterator[None]:
     """Hold the lock; InputError if another process has it."""
     with open(lock, "a+b") as file:
         try:
-            _take(file)
+            _acquire_lock(file)
         except OSError:
             file.seek(0)
-            who = file.read(20).decode("ascii", "replace").strip()
-            found = f"another run (process {who}) uses it" if who else "another run uses it"
+            process = file.read(20).decode("ascii", "replace").strip()
+            found = f"another run (process {process}) uses it" if process else "another run uses it"
             raise InputError(folder, found, "one run at a time", "wait for it, or choose another folder") from None
         file.truncate(0)
         file.write(str(os.getpid()).encode())
@@ -272,7 +272,7 @@ def _locked(lock: Path, folder: Path) -> Iterator[None]:
         yield
 
 
-def _take(file) -> None:
+def _acquire_lock(file) -> None:
     """Acquire the operating system's lock on an open file, or raise OSError."""
     try:
         import fcntl

@@ -12,33 +12,33 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..annotation.ball_contact import surfaces
-from ..annotation.striking import ball_gap
+from ..annotation.ball_contact import build_surfaces
+from ..annotation.striking import measure_ball_gap
 from ..ball.tracked.solve import SolvedBall
-from ..base.time_series import interpolate
-from ..motion.motion import Motion, pose_kinematics
-from ..motion.track import BALL_RADIUS, Track, clean
+from ..base.time_series import interpolate_columns
+from ..motion.motion import Motion, compute_pose
+from ..motion.track import BALL_RADIUS, Track, clean_track
 from ..motion.track.ball_path import BallPath
 from ..motion.track.match_data import Match
-from ..synthesis.construct.strike_at import Meeting, met_at
-from ..synthesis.known_touches import course_of
+from ..synthesis.construct.strike_at import FixedStrike, strike_fixed_ball
+from ..synthesis.known_touches import build_trajectory
 from ..synthesis.plan import Plan
 from ..synthesis.take import KeyResult, Take
 
-_STEP = 1e-4  # m, positions are rounded to this, as in files
+_ROUNDING = 1e-4  # m, positions are rounded to this, as in files
 
-CLOSED = 0.15
+MAX_CLOSED_GAP = 0.15
 """m: the largest gap that is closed, the same as in `synthesis.construct.strike`; a player who misses the ball by more
 is not corrected."""
 
-OPEN = 1e-3
+MIN_GAP = 1e-3
 """m: smaller gaps are left."""
 
-EASE = 0.3
+EASE_SECONDS = 0.3
 """s before and after a touch in which the part moves to the ball and back, less if another touch is within them."""
 
 
-def ball_plan(match: Match, solved: SolvedBall | None, start: float, end: float, fps: float) -> Plan | None:
+def build_ball_plan(match: Match, solved: SolvedBall | None, start: float, end: float, fps: float) -> Plan | None:
     """Build a plan that has the ball and no player, for `sample_ball`.
 
     Args:
@@ -54,12 +54,12 @@ def ball_plan(match: Match, solved: SolvedBall | None, start: float, end: float,
     times, ball = match.times[inside], match.ball[inside]
     if not np.isfinite(ball[:, :2]).all(axis=1).any():
         return None
-    track, _ = clean(Track(times, np.zeros((len(times), 2)), ball, name="ball"))
+    track, _ = clean_track(Track(times, np.zeros((len(times), 2)), ball, name="ball"))
     plan = Plan(track=track, fps=fps, solve_touches=solved is not None)
-    return plan if solved is None else Plan(**{**vars(plan), "solved": course_of(solved, "", plan)})
+    return plan if solved is None else Plan(**{**vars(plan), "solved": build_trajectory(solved, "", plan)})
 
 
-def course(plan: Plan, times: np.ndarray) -> BallPath:
+def sample_ball(plan: Plan, times: np.ndarray) -> BallPath:
     """Sample the ball of a plan before any player moves it: solved where that is known, otherwise as in the feed.
 
     Args:
@@ -68,27 +68,27 @@ def course(plan: Plan, times: np.ndarray) -> BallPath:
     Returns:
         The ball path.
     """
-    sampled = plan.sampled(plan.fps)
-    place = interpolate(times, sampled.times, sampled.ball, outside=np.nan)
+    sampled = plan.sample_track(plan.fps)
+    place = interpolate_columns(times, sampled.times, sampled.ball, fill_value=np.nan)
     near = np.clip(np.searchsorted(sampled.times, times - 0.5 / plan.fps), 0, len(sampled) - 1)
     measured = sampled.ball_measured[near]
     if plan.solved is None:
         return BallPath(times, place, measured)
-    solved, _ = plan.solved.at(times)
+    solved, _ = plan.solved.interpolate(times)
     return BallPath(times, np.where(np.isfinite(solved), solved, place), measured)
 
 
-def led_by(take: Take) -> tuple[np.ndarray, np.ndarray]:
+def find_led_ball(take: Take) -> tuple[np.ndarray, np.ndarray]:
     """Find the frames (K,) of the match's clock at which a player moves the ball, and the offsets (K, 3) m."""
     if take.ball is None:
         return np.zeros(0, int), np.zeros((0, 3))
-    off = take.ball.positions - course(take.plan, take.ball.times).positions
-    off = np.where(np.isfinite(off), off, 0.0)
-    some = np.flatnonzero(np.abs(off).max(axis=1) > 0.5 * _STEP)
-    return some + round(take.start_time * take.motion.fps), off[some]
+    offset = take.ball.positions - sample_ball(take.plan, take.ball.times).positions
+    offset = np.where(np.isfinite(offset), offset, 0.0)
+    affected = np.flatnonzero(np.abs(offset).max(axis=1) > 0.5 * _ROUNDING)
+    return affected + round(take.start_time * take.motion.fps), offset[affected]
 
 
-def met(ball: BallPath, first: int, led: Iterable[tuple[np.ndarray, np.ndarray]]) -> BallPath:
+def apply_led_ball(ball: BallPath, first: int, led: Iterable[tuple[np.ndarray, np.ndarray]]) -> BallPath:
     """Apply to the ball what all players' `find_led_ball` found.
 
     A player moves the ball only between the touches before and after their own, so several players' offsets add up
@@ -102,13 +102,13 @@ def met(ball: BallPath, first: int, led: Iterable[tuple[np.ndarray, np.ndarray]]
         The ball path.
     """
     places = np.array(ball.positions)
-    for frames, off in led:
+    for frames, offset in led:
         inside = (frames >= first) & (frames < first + len(places))
-        np.add.at(places, frames[inside] - first, off[inside])
-    return BallPath(ball.times, np.round(places / _STEP) * _STEP, ball.measured)
+        np.add.at(places, frames[inside] - first, offset[inside])
+    return BallPath(ball.times, np.round(places / _ROUNDING) * _ROUNDING, ball.measured)
 
 
-def at_ball(take: Take, ball: np.ndarray) -> Take:
+def restore_ball_contact(take: Take, ball: np.ndarray) -> Take:
     """Solve ball contact again after collision avoidance and head tracking moved the striking part.
 
     Args:
@@ -118,31 +118,31 @@ def at_ball(take: Take, ball: np.ndarray) -> Take:
         The take with its striking parts on the ball at each key moment that touches it. Frames farther than
         EASE_SECONDS from such a moment keep their bits.
     """
-    touches = [key for key in take.keys if surfaces(take.motion.skeleton, key.touching)]
-    found = (_meeting(take.motion, key, ball, _alone(key, touches)) for key in touches)
+    touches = [key for key in take.keys if build_surfaces(take.motion.skeleton, key.contact_labels)]
+    found = (_build_meeting(take.motion, key, ball, _find_free_frames(key, touches)) for key in touches)
     meetings = [meeting for meeting in found if meeting is not None]
     if not meetings:
         return take
-    return replace(take, motion=met_at(take.motion, take.contacts, meetings, grounded=True).motion)
+    return replace(take, motion=strike_fixed_ball(take.motion, take.contacts, meetings, has_ground=True).motion)
 
 
-def _alone(key: KeyResult, touches: Sequence[KeyResult]) -> tuple[float, float]:
+def _find_free_frames(key: KeyResult, touches: Sequence[KeyResult]) -> tuple[float, float]:
     """Find the frames before and after a touch that are free of other touches."""
-    apart = [round(other.frame) - round(key.frame) for other in touches]
-    before, after = [-step for step in apart if step < 0], [step for step in apart if step > 0]
+    gaps = [round(other.frame) - round(key.frame) for other in touches]
+    before, after = [-step for step in gaps if step < 0], [step for step in gaps if step > 0]
     return min(before, default=np.inf), min(after, default=np.inf)
 
 
-def _meeting(motion: Motion, key: KeyResult, ball: np.ndarray, alone: tuple[float, float]) -> Meeting | None:
+def _build_meeting(motion: Motion, key: KeyResult, ball: np.ndarray, free_frames: tuple[float, float]) -> FixedStrike | None:
     """Build what moves a part to the ball at one key moment; None if it is there already, or too far away."""
     frame = int(np.clip(np.rint(key.frame), 0, len(motion) - 1))
-    parts = surfaces(motion.skeleton, key.touching)
+    parts = build_surfaces(motion.skeleton, key.contact_labels)
     if not np.isfinite(ball[frame]).all():
         return None
-    places, world = pose_kinematics(motion.skeleton, motion.root_positions[frame], motion.rotations[frame])
-    gaps = [abs(float(ball_gap(part.line(places, world), part.radius, ball[frame]))) for part in parts]
+    places, world = compute_pose(motion.skeleton, motion.root_positions[frame], motion.rotations[frame])
+    gaps = [abs(float(measure_ball_gap(part.compute_line(places, world), part.radius, ball[frame]))) for part in parts]
     nearest = int(np.argmin(gaps))
-    if not OPEN < gaps[nearest] < CLOSED:
+    if not MIN_GAP < gaps[nearest] < MAX_CLOSED_GAP:
         return None
-    entry, leave = (min(EASE * motion.fps, frames) for frames in alone)
-    return Meeting(float(frame), parts[nearest], ball[frame], radius=BALL_RADIUS, entry=entry, leave=leave)
+    entry, leave = (min(EASE_SECONDS * motion.fps, frames) for frames in free_frames)
+    return FixedStrike(float(frame), parts[nearest], ball[frame], radius=BALL_RADIUS, entry=entry, leave=leave)

@@ -15,23 +15,23 @@ from pathlib import Path
 import numpy as np
 
 from .. import __version__
-from ..base.errors import InputError, told_time
-from ..base.settings import defaults
+from ..base.errors import InputError, format_seconds
+from ..base.settings import collect_defaults
 from ..files.event_providers import EVENT_PROVIDERS
 from .pieces.units import OVERLAP, WINDOW
 
-_DEFAULTS = defaults("match")
+_DEFAULTS = collect_defaults("match")
 FORM = 3
 """Raised whenever the same request would give other results, so that stored ones are not used for it."""
 
-WINDOWS = (5.0, 600.0)
+WINDOW_LIMITS = (5.0, 600.0)
 """s: shortest and longest window."""
 
 _LENGTH = 20  # bytes of a digest
 
 
 @dataclass(frozen=True)
-class MatchOrder:
+class MatchRequest:
     """One match to synthesize. The settings table describes the fields that are not listed here.
 
     Attributes:
@@ -92,9 +92,9 @@ class MatchOrder:
             if value is not None and math.isnan(value):
                 raise InputError(option, "not a number", "seconds of the match's clock")
         if self.start is not None and self.end is not None and self.end <= self.start:
-            raise InputError("end time", f"{told_time(self.end)} s", f"later than the start, {told_time(self.start)} s")
-        if not WINDOWS[0] <= self.window <= WINDOWS[1]:
-            raise InputError("window", f"{self.window:g} s", f"{WINDOWS[0]:g} to {WINDOWS[1]:g} s")
+            raise InputError("end time", f"{format_seconds(self.end)} s", f"later than the start, {format_seconds(self.start)} s")
+        if not WINDOW_LIMITS[0] <= self.window <= WINDOW_LIMITS[1]:
+            raise InputError("window", f"{self.window:g} s", f"{WINDOW_LIMITS[0]:g} to {WINDOW_LIMITS[1]:g} s")
         if not 1.0 <= self.overlap <= self.window / 2.0:
             raise InputError("overlap", f"{self.overlap:g} s", f"1 s to half of the window, {self.window / 2.0:g} s")
         for option, value in (("events metadata", self.events_meta), ("events provider", self.events_provider)):
@@ -103,7 +103,7 @@ class MatchOrder:
         if self.events_provider and self.events_provider.lower() not in EVENT_PROVIDERS:
             raise InputError("events provider", f"{self.events_provider!r}", f"one of {', '.join(EVENT_PROVIDERS)}")
 
-    def told(self) -> dict:
+    def to_plain(self) -> dict:
         """Convert the request to plain values, for match.json."""
         return {name: value.as_posix() if isinstance(value, Path) else value for name, value in asdict(self).items()}
 
@@ -113,7 +113,7 @@ _RESULTS = ("provider", "start", "end", "players", "fps", "seed", "nearest", "so
 _FILES = ("tracking", "meta", "events", "events_meta")
 
 
-def identity(order: MatchOrder, library_key: str) -> dict[str, object]:
+def build_identity(request: MatchRequest, library_key: str) -> dict[str, object]:
     """Build what determines the results of a request, by name: settings, and digests of the content of its files.
 
     The label texts are not part of it: they may be edited between runs.
@@ -128,18 +128,18 @@ def identity(order: MatchOrder, library_key: str) -> dict[str, object]:
         InputError: if a file cannot be read.
     """
     out: dict[str, object] = {"form": FORM, "software": __version__}
-    out |= {name: getattr(order, name) for name in _RESULTS}
+    out |= {name: getattr(request, name) for name in _RESULTS}
     for name in _FILES:
-        path = getattr(order, name)
+        path = getattr(request, name)
         try:
-            out[name] = None if path is None else digest_of_file(path)
+            out[name] = None if path is None else compute_file_digest(path)
         except OSError as error:
             raise InputError(path, error.strerror or str(error), "a file that can be read", "check the path") from None
     out["library"] = library_key
     return out
 
 
-def digest_of(*values: object) -> str:
+def compute_digest(*values: object) -> str:
     """Compute hex digits for the content of `values`.
 
     Args:
@@ -150,17 +150,17 @@ def digest_of(*values: object) -> str:
         TypeError: for anything else.
     """
     hashed = hashlib.blake2b(digest_size=_LENGTH)
-    _feed(hashed, values)
+    _add_to_hash(hashed, values)
     return hashed.hexdigest()
 
 
-def digest_of_file(path: str | os.PathLike) -> str:
+def compute_file_digest(path: str | os.PathLike) -> str:
     """Compute the digest of a file's bytes; OSError if it cannot be read."""
     with open(path, "rb") as stream:
         return hashlib.file_digest(stream, lambda: hashlib.blake2b(digest_size=_LENGTH)).hexdigest()
 
 
-def _feed(hashed, value: object) -> None:
+def _add_to_hash(hashed, value: object) -> None:
     """Add a value to a hash. It starts with its kind and ends with a zero, so that different contents give different
     bytes.
     """
@@ -173,10 +173,10 @@ def _feed(hashed, value: object) -> None:
     elif isinstance(value, Path):
         hashed.update(f"path {value.as_posix()}\0".encode())
     else:
-        _feed_parts(hashed, value)
+        _add_parts_to_hash(hashed, value)
 
 
-def _feed_parts(hashed, value: object) -> None:
+def _add_parts_to_hash(hashed, value: object) -> None:
     if is_dataclass(value) and not isinstance(value, type):
         parts = [(field.name, getattr(value, field.name)) for field in fields(value)]
         kind = type(value).__name__
@@ -190,4 +190,4 @@ def _feed_parts(hashed, value: object) -> None:
         raise TypeError(f"{type(value).__name__} has no content to hash")
     hashed.update(f"{kind} {len(parts)}\0".encode())
     for part in parts:
-        _feed(hashed, part)
+        _add_to_hash(hashed, part)

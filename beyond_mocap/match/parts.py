@@ -10,18 +10,18 @@ from pathlib import Path
 
 from ..annotation import Timeline, format_timeline
 from ..ball.tracked.solve import SolvedBall
-from ..base.errors import InputError, told_time
-from ..synthesis.known_touches import course_of
+from ..base.errors import InputError, format_seconds
+from ..synthesis.known_touches import build_trajectory
 from ..synthesis.plan import Plan
 from .folder import MatchFolder
-from .order import MatchOrder
-from .player_edit import kept
+from .order import MatchRequest
+from .player_edit import to_stored_plan
 from .roles import Role
-from .words import USER, MatchWords, Moment, edited, read_words, timeline_of, write_words
+from .words import USER, MatchLabels, Moment, is_edited, read_labels, build_timeline, write_labels
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
+class PlayerPlans:
     """A role with its plans.
 
     Attributes:
@@ -37,10 +37,10 @@ class Part:
     unused: tuple[Moment, ...] = ()
 
 
-def parts_of(
-    roles: tuple[Role, ...], files: Mapping[str, str], words: MatchWords, solved: SolvedBall | None,
-    order: MatchOrder, folder: MatchFolder, known_words: frozenset[str],
-) -> list[Part]:
+def build_player_plans(
+    roles: tuple[Role, ...], files: Mapping[str, str], labels: MatchLabels, solved: SolvedBall | None,
+    request: MatchRequest, folder: MatchFolder, known_labels: frozenset[str],
+) -> list[PlayerPlans]:
     """Build the plans of all players.
 
     Labels are read from the texts of `request.annotations`, else from edited texts in the folder; else they are the
@@ -61,24 +61,24 @@ def parts_of(
     for role in roles:
         file = files[role.player.id]
         try:
-            moments = () if role.reason else _moments(file, role, words, order=order, folder=folder,
-                                                      known_words=known_words)
-            plans = tuple(_plan(role, number, moments, solved, order) for number in range(len(role.asked)))
+            moments = () if role.reason else _read_moments(file, role, labels, request=request, folder=folder,
+                                                      known_labels=known_labels)
+            plans = tuple(_build_plan(role, number, moments, solved, request) for number in range(len(role.target_tracks)))
             unused = tuple(one for one in moments if one.source == USER and not _is_used(one, role))
-            out.append(Part(role, file, () if role.reason else plans, unused))
+            out.append(PlayerPlans(role, file, () if role.reason else plans, unused))
         except InputError as error:
-            out.append(Part(replace(role, reason=str(error)), file))
+            out.append(PlayerPlans(replace(role, reason=str(error)), file))
     return out
 
 
-def check_texts(annotations: Path | None) -> None:
+def check_label_folder(annotations: Path | None) -> None:
     """Check that the folder with the user's labels exists, if one is named; InputError otherwise."""
     if annotations is not None and not annotations.is_dir():
         found = "is a file" if annotations.exists() else "no such folder"
         raise InputError(annotations, found, "a folder with a text ID.txt for players", "check the path")
 
 
-def strange_texts(annotations: Path | None, files: Iterable[str]) -> list[str]:
+def list_unknown_texts(annotations: Path | None, files: Iterable[str]) -> list[str]:
     """List a message for each of the user's texts that belongs to no player. files: base names of all players'
     files.
     """
@@ -87,7 +87,7 @@ def strange_texts(annotations: Path | None, files: Iterable[str]) -> list[str]:
     return [f"{text}: ignored, because no player of the match has this id" for text in texts if text.name not in known]
 
 
-def unused_lines(parts: Iterable[Part], order: MatchOrder, files: Mapping[str, str]) -> list[str]:
+def list_unused_labels(parts: Iterable[PlayerPlans], request: MatchRequest, files: Mapping[str, str]) -> list[str]:
     """List messages about labels that are not used.
 
     Args:
@@ -98,17 +98,17 @@ def unused_lines(parts: Iterable[Part], order: MatchOrder, files: Mapping[str, s
         One line per player with labels for times at which they are absent, and one for texts of players who are absent
         altogether.
     """
-    out, there = [], {part.role.player.id for part in parts}
-    away = [] if order.players else [file for player, file in files.items() if player not in there]
-    idle = [f"{file}.txt" for file in away if _own_text(order.annotations, file) is not None]
+    out, present = [], {part.role.player.id for part in parts}
+    absent_files = [] if request.players else [file for player, file in files.items() if player not in present]
+    idle = [f"{file}.txt" for file in absent_files if _find_text(request.annotations, file) is not None]
     if idle:
-        who = "the player is" if len(idle) == 1 else "the players are"
-        out.append(f"{', '.join(idle)}: ignored, because {who} absent in that time")
+        subject = "the player is" if len(idle) == 1 else "the players are"
+        out.append(f"{', '.join(idle)}: ignored, because {subject} absent in that time")
     for part in parts:
         if part.unused:
-            first = format_timeline(timeline_of(part.unused[:1])).strip()
-            edges = [(track.times[0], track.times[-1]) for track in part.role.asked]
-            times = ", ".join(f"{told_time(start)} to {told_time(end)} s" for start, end in edges)
+            first = format_timeline(build_timeline(part.unused[:1])).strip()
+            edges = [(track.times[0], track.times[-1]) for track in part.role.target_tracks]
+            times = ", ".join(f"{format_seconds(start)} to {format_seconds(end)} s" for start, end in edges)
             count = len(part.unused)
             found = f"{count} of your lines {'is' if count == 1 else 'are'} ignored ({first}{' ...' * (count > 1)})"
             out.append(f"{part.file}.txt: {found}, because {part.role.player.id} is present from {times}")
@@ -117,39 +117,39 @@ def unused_lines(parts: Iterable[Part], order: MatchOrder, files: Mapping[str, s
 
 def _is_used(moment: Moment, role: Role) -> bool:
     """Say whether any of the player's stretches contains the moment, or a part of it."""
-    cut = (timeline_of([moment], float(track.times[0]), float(track.times[-1])) for track in role.asked)
+    cut = (build_timeline([moment], float(track.times[0]), float(track.times[-1])) for track in role.target_tracks)
     return any(one.spans or one.keys for one in cut)
 
 
-def _moments(
-    file: str, role: Role, words: MatchWords, order: MatchOrder, folder: MatchFolder, known_words: frozenset[str]
+def _read_moments(
+    file: str, role: Role, labels: MatchLabels, request: MatchRequest, folder: MatchFolder, known_labels: frozenset[str]
 ) -> tuple[Moment, ...]:
     """Read a player's moments from their text, or write the automatic ones and return them."""
-    automatic = words.players.get(role.player.id, ())
-    text = _own_text(order.annotations, file)
+    automatic = labels.players.get(role.player.id, ())
+    text = _find_text(request.annotations, file)
     if text is None:
-        text = folder.words_of(file)
-        if not edited(text):
+        text = folder.labels_path(file)
+        if not is_edited(text):
             text.parent.mkdir(exist_ok=True)
-            write_words(text, role.player.id, automatic)
+            write_labels(text, role.player.id, automatic)
             return automatic
-    return read_words(text, automatic, known_words)
+    return read_labels(text, automatic, known_labels)
 
 
-def _own_text(annotations: Path | None, file: str) -> Path | None:
+def _find_text(annotations: Path | None, file: str) -> Path | None:
     """Find the user's text for a player; None if there is none."""
     text = None if annotations is None else annotations / f"{file}.txt"
     return text if text is not None and text.is_file() else None
 
 
-def _plan(role: Role, number: int, moments, solved: SolvedBall | None, order: MatchOrder) -> Plan:
+def _build_plan(role: Role, number: int, moments, solved: SolvedBall | None, request: MatchRequest) -> Plan:
     """Build the plan of one stretch, as stored in files."""
-    track = role.asked[number]
+    track = role.target_tracks[number]
     start, end = float(track.times[0]), float(track.times[-1])
-    timeline: Timeline = timeline_of(moments, start, end)
+    timeline: Timeline = build_timeline(moments, start, end)
     plan = Plan(
-        track=track, timeline=timeline, library=str(order.library), nearest=order.nearest,
-        seed=order.seed + role.number, fps=order.fps, solve_touches=solved is not None, variety=order.variety,
+        track=track, timeline=timeline, library=str(request.library), nearest=request.nearest,
+        seed=request.seed + role.number, fps=request.fps, solve_touches=solved is not None, variety=request.variety,
         lag=role.lag,
     )
-    return kept(plan if solved is None else replace(plan, solved=course_of(solved, role.player.id, plan)))
+    return to_stored_plan(plan if solved is None else replace(plan, solved=build_trajectory(solved, role.player.id, plan)))

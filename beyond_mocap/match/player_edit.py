@@ -17,37 +17,37 @@ import numpy as np
 
 from ..annotation import KeyMoment, Span, Timeline
 from ..base.errors import InputError
-from ..files.content import content
-from ..files.json_values import check_names, entries, number, numbers, object_of, shown, text, truth, whole_number
-from ..files.plain_npz import HEADER, header_text, plain_arrays
+from ..files.content import read_bytes
+from ..files.json_values import check_names, check_list, check_number, check_numbers, parse_json, describe_value, check_text, check_bool, check_whole_number
+from ..files.plain_npz import HEADER, take_header_text, read_plain_arrays
 from ..files.whole import atomic_write
 from ..motion.track import Track
-from ..synthesis.known_touches import solve_touches
-from ..synthesis.plan import METHODS, Pin, Plan, SolvedCourse, Touched
+from ..synthesis.known_touches import resolve_touches
+from ..synthesis.plan import METHODS, Pin, Plan, SolvedTrajectory, PlayerTouch
 from .crowd.correction import Correction
 from .pieces.named_edit import NamedEdit, NamedKey
 
-COURSE_STEP = 0.02
+BALL_STEP = 0.02
 """s between the stored points of the ball's trajectory; gravity bends it by half a millimetre in between, and a bounce
 is cut off by some centimetres."""
 
-LAYOUT = 30.0
+WINDOW_SECONDS = 30.0
 """s of the windows in which a player is constructed."""
 
-_MOST_STEPS = 10_000_000
+_MAX_STEPS = 10_000_000
 VERSION = 1
 FORMAT = "Beyond Mocap player of a match"
-LARGEST = 200_000_000
+MAX_FILE_BYTES = 200_000_000
 """Bytes: a larger file is rejected."""
-UNPACKED = 1_000_000_000
+MAX_ARRAY_BYTES = 1_000_000_000
 """Bytes of all arrays together: a file with more is rejected."""
 _KIND = "a player of a match (ID.take.npz)"
 _PAGE = "docs/match/match.md"
 _TYPES = tuple(np.dtype(name) for name in ("<f8", "<i8", "<i4", "<i2", "|i1", "|u1"))
-_LONGEST = 24 * 3600.0
+_MAX_STRETCH = 24 * 3600.0
 """s: a longer stretch is rejected."""
-_MOST_FRAMES, _MOST_RATE = 1e7, 100.0
-_LEAST_WINDOW = 1.0  # s
+_MAX_FRAMES, _MAX_RATE = 1e7, 100.0
+_MIN_WINDOW = 1.0  # s
 _DEFAULTS = {
     field.name: field.default for field in fields(Plan) if field.name not in ("track", "timeline", "pins", "solved")
 }  # fmt: skip
@@ -89,7 +89,7 @@ class PlayerEdit:
     correction: Correction | None = None
 
 
-def kept(plan: Plan) -> Plan:
+def to_stored_plan(plan: Plan) -> Plan:
     """Convert a plan to what files store, so that results do not depend on whether it has been in a file.
 
     Touches are solved; the track's times are whole microseconds and its positions whole millimetres; so is the ball's
@@ -100,18 +100,18 @@ def kept(plan: Plan) -> Plan:
     Returns:
         The rounded plan.
     """
-    plan = solve_touches(plan)
+    plan = resolve_touches(plan)
     track = plan.track
     track = Track(
-        np.round(track.times * 1e6) / 1e6, _to_millimetres(track.positions), _to_millimetres(track.ball),
+        np.round(track.times * 1e6) / 1e6, _round_to_millimetres(track.positions), _round_to_millimetres(track.ball),
         ball_height_known=track.ball_height_known, filled=track.filled, outlier=track.outlier, name=track.name,
     )  # fmt: skip
-    return replace(plan, track=track, solved=None if plan.solved is None else _kept_course(plan.solved, track))
+    return replace(plan, track=track, solved=None if plan.solved is None else _to_stored_trajectory(plan.solved, track))
 
 
-def course_times(first: float, last: float, touches) -> np.ndarray:
+def build_ball_times(first: float, last: float, touches) -> np.ndarray:
     """Build the times (M,) s of the stored points of the ball's trajectory, from `first` to `last` s."""
-    steps = min(max(int(np.ceil((last - first) / COURSE_STEP)), 1), _MOST_STEPS)
+    steps = min(max(int(np.ceil((last - first) / BALL_STEP)), 1), _MAX_STEPS)
     inside = [touch.time for touch in touches if first <= touch.time <= last]
     return np.union1d(first + (last - first) / steps * np.arange(steps + 1), inside)
 
@@ -127,15 +127,15 @@ def write_player(path: str | os.PathLike, edit: PlayerEdit) -> None:
     """
     arrays, stretches = {}, []
     for index, stretch in enumerate(edit.stretches):
-        stretches.append(_stretch_out(stretch))
-        arrays |= {f"{index}/{name}": values for name, values in _stretch_arrays(stretch).items()}
-    apart = edit.correction
+        stretches.append(_build_stretch_header(stretch))
+        arrays |= {f"{index}/{name}": values for name, values in _build_stretch_arrays(stretch).items()}
+    correction = edit.correction
     header = {
         "format": FORMAT, "version": VERSION, "player": edit.player, "window": edit.window, "stretches": stretches,
-        "correction": None if apart is None else [apart.fps, apart.step],
+        "correction": None if correction is None else [correction.fps, correction.step],
     }  # fmt: skip
-    if apart is not None:
-        arrays |= {"knots": apart.knots, "values": apart.values}
+    if correction is not None:
+        arrays |= {"knots": correction.knots, "values": correction.values}
     arrays[HEADER] = np.frombuffer(json.dumps(header, allow_nan=False).encode(), np.uint8)
     whole = io.BytesIO()
     np.savez_compressed(whole, **dict(sorted(arrays.items())))
@@ -152,19 +152,19 @@ def read_player(path: str | os.PathLike) -> PlayerEdit:
     Raises:
         InputError: one line that starts with the file's name, for anything that is wrong with it.
     """
-    data = content(path, _KIND, LARGEST)
+    data = read_bytes(path, _KIND, MAX_FILE_BYTES)
     try:
-        return _player(plain_arrays(data, _KIND, _TYPES, UNPACKED))
+        return _parse_player(read_plain_arrays(data, _KIND, _TYPES, MAX_ARRAY_BYTES))
     except InputError as error:
         raise InputError(path, str(error)) from None
 
 
-def packed_places(metres: np.ndarray) -> np.ndarray:
+def pack_positions(metres: np.ndarray) -> np.ndarray:
     """Pack positions (N, k) m, NaN where unknown, to the millimetre, for `unpack_positions`."""
-    return packed(np.where(np.isnan(metres), _UNKNOWN, np.round(np.nan_to_num(metres) * 1000.0)))
+    return pack_differences(np.where(np.isnan(metres), _UNKNOWN, np.round(np.nan_to_num(metres) * 1000.0)))
 
 
-def packed(values: np.ndarray) -> np.ndarray:
+def pack_differences(values: np.ndarray) -> np.ndarray:
     """Pack whole numbers (N, k) as second differences, in the smallest integer type that holds them."""
     once = np.diff(values.astype(np.int64), axis=0, prepend=0)
     twice = once.copy()
@@ -173,13 +173,13 @@ def packed(values: np.ndarray) -> np.ndarray:
     return twice.astype(next(kind for kind in ("<i2", "<i4", "<i8") if most <= np.iinfo(kind).max))
 
 
-def places(values: np.ndarray, where: str) -> np.ndarray:
+def unpack_positions(values: np.ndarray, where: str) -> np.ndarray:
     """Unpack (N, k) m that `pack_positions` packed; InputError at `where` unless they are whole numbers."""
-    whole = unpacked(values, where)
+    whole = unpack_differences(values, where)
     return np.where(whole == _UNKNOWN, np.nan, whole / 1000.0)
 
 
-def unpacked(values: np.ndarray, where: str) -> np.ndarray:
+def unpack_differences(values: np.ndarray, where: str) -> np.ndarray:
     """Unpack what `pack_differences` packed, as floats; InputError at `where` unless they are whole numbers."""
     if values.dtype.kind != "i":
         raise InputError(where, f"values of type {values.dtype}", "whole numbers")
@@ -188,20 +188,20 @@ def unpacked(values: np.ndarray, where: str) -> np.ndarray:
     return np.cumsum(once, axis=0).astype(float)
 
 
-def _kept_course(course: SolvedCourse, track: Track) -> SolvedCourse:
-    times = course_times(float(track.times[0]), float(track.times[-1]), course.touches)
-    ball, filled = course.at(times)
-    return SolvedCourse(times, _to_millimetres(ball), filled, course.touches)
+def _to_stored_trajectory(course: SolvedTrajectory, track: Track) -> SolvedTrajectory:
+    times = build_ball_times(float(track.times[0]), float(track.times[-1]), course.touches)
+    ball, filled = course.interpolate(times)
+    return SolvedTrajectory(times, _round_to_millimetres(ball), filled, course.touches)
 
 
-def _to_millimetres(places: np.ndarray) -> np.ndarray:
+def _round_to_millimetres(places: np.ndarray) -> np.ndarray:
     return np.round(places * 1000.0) / 1000.0
 
 
 # -- writing
 
 
-def _stretch_out(stretch: Stretch) -> dict:
+def _build_stretch_header(stretch: Stretch) -> dict:
     """Build the part of the JSON header for a stretch."""
     plan, course = stretch.plan, stretch.plan.solved
     return {
@@ -216,57 +216,57 @@ def _stretch_out(stretch: Stretch) -> dict:
     }  # fmt: skip
 
 
-def _stretch_arrays(stretch: Stretch) -> dict[str, np.ndarray]:
+def _build_stretch_arrays(stretch: Stretch) -> dict[str, np.ndarray]:
     """Build the arrays of a stretch; `flags` has the bits 1 ball height known, 2 filled in, 4 outlier."""
     track, course = stretch.plan.track, stretch.plan.solved
     flags = track.ball_height_known + 2 * track.filled + 4 * track.outlier
     arrays = {name: getattr(stretch.edit, name).astype(kind) for name, kind in _RUN_TYPES.items()}
-    arrays |= {"flags": flags.astype(np.uint8), "times": packed(np.round(track.times * 1e6)[:, None]),
-               "positions": packed_places(track.positions), "ball": packed_places(track.ball)}  # fmt: skip
+    arrays |= {"flags": flags.astype(np.uint8), "times": pack_differences(np.round(track.times * 1e6)[:, None]),
+               "positions": pack_positions(track.positions), "ball": pack_positions(track.ball)}  # fmt: skip
     if course is not None:
-        arrays |= {"course": packed_places(course.ball), "course_filled": course.filled.astype(np.uint8)}
+        arrays |= {"course": pack_positions(course.ball), "course_filled": course.filled.astype(np.uint8)}
     return arrays
 
 
 # -- reading
 
 
-def _player(arrays: dict[str, np.ndarray]) -> PlayerEdit:
+def _parse_player(arrays: dict[str, np.ndarray]) -> PlayerEdit:
     """Parse a player from arrays; every array is used once and none is left over."""
-    header = object_of(header_text(arrays, _PAGE), HEADER, _PAGE)
+    header = parse_json(take_header_text(arrays, _PAGE), HEADER, _PAGE)
     if not isinstance(header, dict) or header.get("format") != FORMAT:
         raise InputError(HEADER, "not a player of a match", _KIND, "choose another file")
     if header.get("version") != VERSION:
-        raise InputError("version", shown(header.get("version")), str(VERSION), "run the match again with this version")
+        raise InputError("version", describe_value(header.get("version")), str(VERSION), "run the match again with this version")
     rows = ("format", "version", "player", "window", "stretches", "correction")
     check_names(header, HEADER, rows, rows)
-    stretches = [_stretch(row, index, arrays) for index, row in enumerate(entries(header["stretches"], "stretches"))]
-    apart = _correction(header["correction"], arrays)
-    window = number(header["window"], "window")
-    if window < _LEAST_WINDOW:
-        raise InputError("window", f"{window:g} s", f"{_LEAST_WINDOW:g} s or more")
+    stretches = [_parse_stretch(row, index, arrays) for index, row in enumerate(check_list(header["stretches"], "stretches"))]
+    correction = _parse_correction(header["correction"], arrays)
+    window = check_number(header["window"], "window")
+    if window < _MIN_WINDOW:
+        raise InputError("window", f"{window:g} s", f"{_MIN_WINDOW:g} s or more")
     if arrays:
         raise InputError("the arrays", f"{next(iter(arrays))[:40]!r}, which is not used", f"those of {_PAGE}")
-    return PlayerEdit(text(header["player"], "player"), window, tuple(stretches), apart)
+    return PlayerEdit(check_text(header["player"], "player"), window, tuple(stretches), correction)
 
 
-def _correction(value, arrays: dict[str, np.ndarray]) -> Correction | None:
+def _parse_correction(value, arrays: dict[str, np.ndarray]) -> Correction | None:
     if value is None:
         return None
-    fps, step = _row(value, "correction", 2)
+    fps, step = _parse_row(value, "correction", 2)
     knots, values = arrays.pop("knots", None), arrays.pop("values", None)
     if knots is None or values is None or knots.dtype.kind != "i" or values.dtype != np.int16:
         raise InputError("correction", "knots or values are missing or not whole numbers", "both")
-    return Correction(knots, values, number(fps, "correction"), whole_number(step, "correction"))
+    return Correction(knots, values, check_number(fps, "correction"), check_whole_number(step, "correction"))
 
 
-def _stretch(row, index: int, arrays: dict[str, np.ndarray]) -> Stretch:
+def _parse_stretch(row, index: int, arrays: dict[str, np.ndarray]) -> Stretch:
     """Parse a stretch from its header row and arrays."""
     where = f"stretch {index}"
     names = ("name", "settings", "spans", "keys", "pins", "touches", "clips", "placed", "warnings", "short")
     check_names(row, where, names, names)
 
-    def array(name: str, columns: int | None = None, count: int | None = None) -> np.ndarray:
+    def take_array(name: str, columns: int | None = None, count: int | None = None) -> np.ndarray:
         values = arrays.pop(f"{index}/{name}", None)
         ends = () if columns is None else (columns,)
         if values is None or values.shape[1:] != ends or values.ndim != 1 + len(ends):
@@ -277,124 +277,124 @@ def _stretch(row, index: int, arrays: dict[str, np.ndarray]) -> Stretch:
         return values
 
     return Stretch(
-        _plan(row, where, array), _edit(row, where, array),
-        tuple(text(line, f"{where}: warnings") for line in entries(row["warnings"], f"{where}: warnings")),
-        tuple(_pair(span, f"{where}: short") for span in entries(row["short"], f"{where}: short")),
+        _parse_plan(row, where, take_array), _parse_edit(row, where, take_array),
+        tuple(check_text(line, f"{where}: warnings") for line in check_list(row["warnings"], f"{where}: warnings")),
+        tuple(_parse_pair(span, f"{where}: short") for span in check_list(row["short"], f"{where}: short")),
     )  # fmt: skip
 
 
-def _pair(value, where: str) -> tuple[float, float]:
-    start, end = _row(value, where, 2)
-    return number(start, where), number(end, where)
+def _parse_pair(value, where: str) -> tuple[float, float]:
+    start, end = _parse_row(value, where, 2)
+    return check_number(start, where), check_number(end, where)
 
 
-def _row(value, where: str, count: int) -> list:
-    row = entries(value, where)
+def _parse_row(value, where: str, count: int) -> list:
+    row = check_list(value, where)
     if len(row) != count:
-        raise InputError(where, shown(value), f"{count} values")
+        raise InputError(where, describe_value(value), f"{count} values")
     return row
 
 
-def _words(value, where: str) -> tuple[str, ...]:
-    return tuple(text(word, where) for word in entries(value, where))
+def _parse_labels(value, where: str) -> tuple[str, ...]:
+    return tuple(check_text(word, where) for word in check_list(value, where))
 
 
-def _plan(row, where: str, array) -> Plan:
+def _parse_plan(row, where: str, take_array) -> Plan:
     """Parse the plan of a stretch."""
-    track = _track(row, where, array)
+    track = _parse_track(row, where, take_array)
     first, last = track.times[0], track.times[-1]
     spans, keys = [], []
-    for value in entries(row["spans"], f"{where}: spans"):
-        start, end, words, avoid = _row(value, f"{where}: spans", 4)
-        spans.append(Span(number(start, where), number(end, where), _words(words, where), avoid=_words(avoid, where)))
-    for value in entries(row["keys"], f"{where}: keys"):
-        time, words, avoid, solved = _row(value, f"{where}: keys", 4)
-        solved = None if solved is None else number(solved, where)
-        keys.append(KeyMoment(number(time, where), _words(words, where), None, _words(avoid, where), solved))
-    pins = [_pin(value, f"{where}: pins") for value in entries(row["pins"], f"{where}: pins")]
+    for value in check_list(row["spans"], f"{where}: spans"):
+        start, end, words, avoid = _parse_row(value, f"{where}: spans", 4)
+        spans.append(Span(check_number(start, where), check_number(end, where), _parse_labels(words, where), avoid=_parse_labels(avoid, where)))
+    for value in check_list(row["keys"], f"{where}: keys"):
+        time, words, avoid, solved = _parse_row(value, f"{where}: keys", 4)
+        solved = None if solved is None else check_number(solved, where)
+        keys.append(KeyMoment(check_number(time, where), _parse_labels(words, where), None, _parse_labels(avoid, where), solved))
+    pins = [_parse_pin(value, f"{where}: pins") for value in check_list(row["pins"], f"{where}: pins")]
     return Plan(
         track=track, timeline=Timeline(tuple(spans), tuple(keys)), pins=tuple(pins),
-        solved=_course(row, where, array, float(first), float(last)),
-        **_settings(row["settings"], f"{where}: settings"),
+        solved=_parse_trajectory(row, where, take_array, float(first), float(last)),
+        **_parse_settings(row["settings"], f"{where}: settings"),
     )  # fmt: skip
 
 
-def _pin(value, where: str) -> Pin:
+def _parse_pin(value, where: str) -> Pin:
     names = ("time", "part", "position", "hold")
     check_names(value, where, names, names)
-    place = numbers(value["position"], where, 3, "[x, y, z] m")
-    return Pin(number(value["time"], where), text(value["part"], where), place, number(value["hold"], where))
+    place = check_numbers(value["position"], where, 3, "[x, y, z] m")
+    return Pin(check_number(value["time"], where), check_text(value["part"], where), place, check_number(value["hold"], where))
 
 
-def _settings(value, where: str) -> dict:
+def _parse_settings(value, where: str) -> dict:
     """Parse a plan's plain settings, each of the type of its default; newer ones may be missing."""
     check_names(value, where, _DEFAULTS, ())
-    kinds = {bool: truth, int: whole_number, float: number, str: text}
+    kinds = {bool: check_bool, int: check_whole_number, float: check_number, str: check_text}
     out = {}
     for name, found in value.items():
         kind = kinds.get(type(_DEFAULTS[name]))
-        out[name] = kind(found, f"{where}: {name}") if kind else _texts(found, f"{where}: {name}")
+        out[name] = kind(found, f"{where}: {name}") if kind else _parse_texts(found, f"{where}: {name}")
     if out.get("method", METHODS[0]) != METHODS[0]:
-        raise InputError(f"{where}: method", shown(out["method"]), METHODS[0])
+        raise InputError(f"{where}: method", describe_value(out["method"]), METHODS[0])
     return out
 
 
-def _texts(value, where: str) -> tuple:
+def _parse_texts(value, where: str) -> tuple:
     """Parse texts, or pairs of texts."""
-    rows = entries(value, where)
-    return tuple(text(row, where) if isinstance(row, str) else _words(_row(row, where, 2), where) for row in rows)
+    rows = check_list(value, where)
+    return tuple(check_text(row, where) if isinstance(row, str) else _parse_labels(_parse_row(row, where, 2), where) for row in rows)
 
 
-def _track(row, where: str, array) -> Track:
+def _parse_track(row, where: str, take_array) -> Track:
     """Parse the track of a stretch."""
-    times = unpacked(array("times", 1), f"{where}: times")[:, 0] / 1e6
-    if len(times) < 2 or np.any(np.diff(times) <= 0.0) or times[-1] - times[0] > _LONGEST:
+    times = unpack_differences(take_array("times", 1), f"{where}: times")[:, 0] / 1e6
+    if len(times) < 2 or np.any(np.diff(times) <= 0.0) or times[-1] - times[0] > _MAX_STRETCH:
         raise InputError(f"{where}: times", f"{len(times)} times", "two or more, ascending, within a day")
-    positions = places(array("positions", 2, len(times)), f"{where}: positions")
+    positions = unpack_positions(take_array("positions", 2, len(times)), f"{where}: positions")
     if np.isnan(positions).any():
         raise InputError(f"{where}: positions", "an unknown position", "a cleaned track")
-    flags = array("flags", None, len(times)).astype(int)
+    flags = take_array("flags", None, len(times)).astype(int)
     known, filled, outlier = ((flags & bit) > 0 for bit in (1, 2, 4))
-    ball = places(array("ball", 3, len(times)), f"{where}: ball")
+    ball = unpack_positions(take_array("ball", 3, len(times)), f"{where}: ball")
     return Track(times, positions, ball, ball_height_known=known, filled=filled, outlier=outlier,
-                 name=text(row["name"], f"{where}: name"))
+                 name=check_text(row["name"], f"{where}: name"))
 
 
-def _course(row, where: str, array, first: float, last: float) -> SolvedCourse | None:
+def _parse_trajectory(row, where: str, take_array, first: float, last: float) -> SolvedTrajectory | None:
     """Parse the ball's trajectory of a stretch; None if it is not solved."""
     if row["touches"] is None:
         return None
     touches = []
-    for value in entries(row["touches"], f"{where}: touches"):
-        time, mine, part, kind = _row(value, f"{where}: touches", 4)
-        mine = None if mine is None else truth(mine, where)
-        touches.append(Touched(number(time, where), mine, text(part, where), text(kind, where)))
-    times = course_times(first, last, touches)
-    ball = places(array("course", 3, len(times)), f"{where}: course")
-    return SolvedCourse(times, ball, array("course_filled", None, len(times)) > 0, tuple(touches))
+    for value in check_list(row["touches"], f"{where}: touches"):
+        time, mine, part, kind = _parse_row(value, f"{where}: touches", 4)
+        mine = None if mine is None else check_bool(mine, where)
+        touches.append(PlayerTouch(check_number(time, where), mine, check_text(part, where), check_text(kind, where)))
+    times = build_ball_times(first, last, touches)
+    ball = unpack_positions(take_array("course", 3, len(times)), f"{where}: course")
+    return SolvedTrajectory(times, ball, take_array("course_filled", None, len(times)) > 0, tuple(touches))
 
 
-def _edit(row, where: str, array) -> NamedEdit:
+def _parse_edit(row, where: str, take_array) -> NamedEdit:
     """Parse the edit list of a stretch."""
-    clips = [_row(value, f"{where}: clips", 2) for value in entries(row["clips"], f"{where}: clips")]
-    clips = tuple((text(path, where), truth(mirrored, where)) for path, mirrored in clips)
-    first = array("first")
-    runs = {name: first if name == "first" else array(name, None, len(first)) for name in _RUN_TYPES}
+    clips = [_parse_row(value, f"{where}: clips", 2) for value in check_list(row["clips"], f"{where}: clips")]
+    clips = tuple((check_text(path, where), check_bool(mirrored, where)) for path, mirrored in clips)
+    first = take_array("first")
+    runs = {name: first if name == "first" else take_array(name, None, len(first)) for name in _RUN_TYPES}
     length, clip = runs["length"], runs["clip"]
-    if not len(first) or np.any(length < 1) or length.sum(dtype=np.int64) > _MOST_FRAMES:
+    if not len(first) or np.any(length < 1) or length.sum(dtype=np.int64) > _MAX_FRAMES:
         raise InputError(f"{where}: length", f"{len(first)} runs", "one or more, each of a frame or more, within a day")
     if np.any(clip < 0) or np.any(clip >= len(clips)):
         raise InputError(f"{where}: clip", f"{clip.min()} to {clip.max()}", f"0 to {len(clips) - 1}")
-    if np.abs(first).max() > _MOST_FRAMES or np.abs(runs["rate"]).max() > _MOST_RATE:
-        raise InputError(f"{where}: first, rate", "values too large for a clip", f"frames up to {_MOST_FRAMES:g}")
-    keys = tuple(_named_key(value, len(clips), where) for value in entries(row["placed"], f"{where}: placed"))
+    if np.abs(first).max() > _MAX_FRAMES or np.abs(runs["rate"]).max() > _MAX_RATE:
+        raise InputError(f"{where}: first, rate", "values too large for a clip", f"frames up to {_MAX_FRAMES:g}")
+    keys = tuple(_parse_named_key(value, len(clips), where) for value in check_list(row["placed"], f"{where}: placed"))
     return NamedEdit(clips=clips, **runs, keys=keys)
 
 
-def _named_key(value, clips: int, where: str) -> NamedKey:
-    time, clip, frame, start, end, words = _row(value, f"{where}: placed", 6)
-    if not 0 <= whole_number(clip, where) < clips:
-        raise InputError(f"{where}: placed", f"clip {shown(clip)}", f"0 to {clips - 1}")
-    frame, start, end = (number(each, f"{where}: placed") for each in (frame, start, end))
-    return NamedKey(time=number(time, where), clip=whole_number(clip, where), frame=frame, start=start, end=end,
-                    words=_words(words, where))
+def _parse_named_key(value, clips: int, where: str) -> NamedKey:
+    time, clip, frame, start, end, words = _parse_row(value, f"{where}: placed", 6)
+    if not 0 <= check_whole_number(clip, where) < clips:
+        raise InputError(f"{where}: placed", f"clip {describe_value(clip)}", f"0 to {clips - 1}")
+    frame, start, end = (check_number(each, f"{where}: placed") for each in (frame, start, end))
+    return NamedKey(time=check_number(time, where), clip=check_whole_number(clip, where), frame=frame, start=start, end=end,
+                    words=_parse_labels(words, where))

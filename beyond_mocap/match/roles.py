@@ -10,19 +10,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..base.errors import InputError, told_time
-from ..base.time_series import interpolate
-from ..motion.track import Track, clean
+from ..base.errors import InputError, format_seconds
+from ..base.time_series import interpolate_columns
+from ..motion.track import Track, clean_track
 from ..motion.track.match_data import Match, MatchPlayer
-from .crowd.spacing import keeping, spaced
-from .crowd.variety import lags
-from .order import MatchOrder
+from .crowd.spacing import compute_firmness, compute_spacing
+from .crowd.variety import choose_lags
+from .order import MatchRequest
 from .pieces.units import cut_track
 
-SHORTEST = 1.0
+MIN_SECONDS = 1.0
 """s: a player who is present for less is not synthesized."""
 
-NEAR_SAMPLES = 2.0
+NEIGHBOUR_RATE = 2.0
 """Samples per second at which neighbours are found."""
 
 
@@ -43,26 +43,26 @@ class Role:
 
     player: MatchPlayer
     measured: tuple[Track, ...] = ()
-    asked: tuple[Track, ...] = ()
+    target_tracks: tuple[Track, ...] = ()
     notes: tuple[str, ...] = ()
     reason: str = ""
     number: int = 0
     lag: float = 0.0
 
 
-def span_of(match: Match, order: MatchOrder) -> tuple[float, float]:
+def resolve_span(match: Match, request: MatchRequest) -> tuple[float, float]:
     """Resolve the requested (start, end) s within the match; InputError if the match has no such time."""
     first, last = float(match.times[0]), float(match.times[-1])
-    start = first if order.start is None else max(order.start, first)
-    end = last if order.end is None else min(order.end, last)
-    if end - start < SHORTEST:
-        low, high = (told_time(value) if value is not None else "" for value in (order.start, order.end))
-        expected = f"a second or more within {told_time(first)} to {told_time(last)} s"
+    start = first if request.start is None else max(request.start, first)
+    end = last if request.end is None else min(request.end, last)
+    if end - start < MIN_SECONDS:
+        low, high = (format_seconds(value) if value is not None else "" for value in (request.start, request.end))
+        expected = f"a second or more within {format_seconds(first)} to {format_seconds(last)} s"
         raise InputError("time range", f"{low} to {high} s", expected)
     return start, end
 
 
-def roles_of(match: Match, order: MatchOrder, span: tuple[float, float]) -> tuple[Role, ...]:
+def build_roles(match: Match, request: MatchRequest, span: tuple[float, float]) -> tuple[Role, ...]:
     """Build the roles of all players present in a span, or of the requested players.
 
     Args:
@@ -75,59 +75,59 @@ def roles_of(match: Match, order: MatchOrder, span: tuple[float, float]) -> tupl
         InputError: for an unknown player, or if no player is present.
     """
     known = {player.id: player for player in match.players}
-    for wanted in order.players:
-        if wanted not in known:
-            raise InputError("players", f"{wanted!r}", f"some of {', '.join(known)}")
-    liked = lags(match.positions[:, _sampled(match, span)])
-    found = [_role(match, number, player, span, order.fps) for number, player in enumerate(match.players)
-             if not order.players or player.id in order.players]  # fmt: skip
-    roles = [replace(role, lag=float(liked[role.number])) for role in found if role is not None]
+    for player_id in request.players:
+        if player_id not in known:
+            raise InputError("players", f"{player_id!r}", f"some of {', '.join(known)}")
+    lags = choose_lags(match.positions[:, _select_samples(match, span)])
+    found = [_build_role(match, number, player, span, request.fps) for number, player in enumerate(match.players)
+             if not request.players or player.id in request.players]  # fmt: skip
+    roles = [replace(role, lag=float(lags[role.number])) for role in found if role is not None]
     if not roles:
-        raise InputError("time range", f"no player is present {_from_to(span)}", "a time of play")
+        raise InputError("time range", f"no player is present {_describe_span(span)}", "a time of play")
     return tuple(roles)
 
 
-def absent_lines(order: MatchOrder, roles: Sequence[Role], span: tuple[float, float]) -> list[str]:
+def list_absent_players(request: MatchRequest, roles: Sequence[Role], span: tuple[float, float]) -> list[str]:
     """List a message for each requested player who is absent in `span` s."""
-    there = {role.player.id for role in roles}
-    away = [player for player in order.players if player not in there]
-    return [f"player {player} is left out: absent {_from_to(span)}" for player in away]
+    present = {role.player.id for role in roles}
+    absent = [player for player in request.players if player not in present]
+    return [f"player {player} is left out: absent {_describe_span(span)}" for player in absent]
 
 
-def _from_to(span: tuple[float, float]) -> str:
-    return f"from {told_time(span[0])} to {told_time(span[1])} s"
+def _describe_span(span: tuple[float, float]) -> str:
+    return f"from {format_seconds(span[0])} to {format_seconds(span[1])} s"
 
 
-def _sampled(match: Match, span: tuple[float, float]) -> np.ndarray:
+def _select_samples(match: Match, span: tuple[float, float]) -> np.ndarray:
     """Select samples of the span, about NEIGHBOUR_RATE per second."""
     inside = np.flatnonzero((match.times >= span[0] - 1e-9) & (match.times <= span[1] + 1e-9))
-    return inside[:: max(1, round(match.fps / NEAR_SAMPLES))]
+    return inside[:: max(1, round(match.fps / NEIGHBOUR_RATE))]
 
 
-def _role(match: Match, number: int, player: MatchPlayer, span: tuple[float, float], fps: float) -> Role | None:
+def _build_role(match: Match, number: int, player: MatchPlayer, span: tuple[float, float], fps: float) -> Role | None:
     """Build the role of a player; None if they are present for less than MIN_SECONDS."""
     tracks, notes = [], []
     try:
-        for begin, end in match.stretches(player.id):
-            begin, end = _on_frames(max(begin, span[0]), min(end, span[1]), fps)
-            if end - begin >= SHORTEST:
+        for begin, end in match.list_stretches(player.id):
+            begin, end = _limit_to_frames(max(begin, span[0]), min(end, span[1]), fps)
+            if end - begin >= MIN_SECONDS:
                 step = 1.0 / match.fps  # up to the feed's samples around them
-                track, found = clean(match.track(player.id, begin - step, end + step))
+                track, found = clean_track(match.track(player.id, begin - step, end + step))
                 begin, end = max(begin, track.times[0]), min(end, track.times[-1])
-                tracks.append(cut_track(track, *_on_frames(begin, end, fps)))
+                tracks.append(cut_track(track, *_limit_to_frames(begin, end, fps)))
                 notes += found.lines
     except InputError as error:
         return Role(player=player, reason=str(error), number=number)
-    own = tuple(tracks)
-    return Role(player=player, measured=own, asked=own, notes=tuple(notes), number=number) if own else None
+    cleaned = tuple(tracks)
+    return Role(player=player, measured=cleaned, target_tracks=cleaned, notes=tuple(notes), number=number) if cleaned else None
 
 
-def _on_frames(start: float, end: float, fps: float) -> tuple[float, float]:
+def _limit_to_frames(start: float, end: float, fps: float) -> tuple[float, float]:
     """Limit a span to frames of the match's clock: the first not before `start`, the last not after `end`, s."""
     return float(np.ceil(start * fps - 1e-6) + 0.0) / fps, float(np.floor(end * fps + 1e-6)) / fps
 
 
-def pushed_apart(
+def separate_roles(
     roles: Sequence[Role], times: np.ndarray, touches: Mapping[str, Sequence[float]]
 ) -> tuple[tuple[Role, ...], dict[str, float]]:
     """Separate the target tracks of the players (`match.crowd.spacing`).
@@ -140,32 +140,32 @@ def pushed_apart(
         The roles, and figures: `longest_m`, `mean_m` where a player is moved, `seconds` in which a player is moved,
             summed over all players.
     """
-    places = np.stack([_on_times(role.measured, times) for role in roles])
+    places = np.stack([_sample_positions(role.measured, times) for role in roles])
     step = float(np.median(np.diff(times)))
-    keep = [keeping(len(times), (np.asarray(touches.get(role.player.id, ())) - times[0]) / step, 1.0 / step)
+    firmness = [compute_firmness(len(times), (np.asarray(touches.get(role.player.id, ())) - times[0]) / step, 1.0 / step)
             for role in roles]  # fmt: skip
-    shifts = spaced(times, places, np.stack(keep))
+    shifts = compute_spacing(times, places, np.stack(firmness))
     moved = np.linalg.norm(shifts, axis=2)
-    some = moved > 1e-3
-    figures = {"longest_m": float(moved.max()), "mean_m": float(moved[some].mean()) if some.any() else 0.0,
-               "seconds": float(some.sum() * step)}  # fmt: skip
-    return tuple(_shifted(role, times, shift) for role, shift in zip(roles, shifts)), figures
+    is_moved = moved > 1e-3
+    figures = {"longest_m": float(moved.max()), "mean_m": float(moved[is_moved].mean()) if is_moved.any() else 0.0,
+               "seconds": float(is_moved.sum() * step)}  # fmt: skip
+    return tuple(_shift_role(role, times, shift) for role, shift in zip(roles, shifts)), figures
 
 
-def _on_times(tracks: Sequence[Track], times: np.ndarray) -> np.ndarray:
+def _sample_positions(tracks: Sequence[Track], times: np.ndarray) -> np.ndarray:
     """Sample a player's positions (N, 2) m at `times` (N,) s, NaN where absent."""
     out = np.full((len(times), 2), np.nan)
     for track in tracks:
-        there = (times >= track.times[0] - 1e-9) & (times <= track.times[-1] + 1e-9)
+        present = (times >= track.times[0] - 1e-9) & (times <= track.times[-1] + 1e-9)
         for axis in (0, 1):
-            out[there, axis] = np.interp(times[there], track.times, track.positions[:, axis])
+            out[present, axis] = np.interp(times[present], track.times, track.positions[:, axis])
     return out
 
 
-def _shifted(role: Role, times: np.ndarray, shift: np.ndarray) -> Role:
+def _shift_role(role: Role, times: np.ndarray, shift: np.ndarray) -> Role:
     """Shift a role's target by (N, 2) m from what was measured; unchanged where the shift is zero."""
     if not shift.any():
         return role
-    asked = (replace(track, positions=track.positions + interpolate(track.times, times, shift))
+    tracks = (replace(track, positions=track.positions + interpolate_columns(track.times, times, shift))
              for track in role.measured)  # fmt: skip
-    return replace(role, asked=tuple(asked))
+    return replace(role, target_tracks=tuple(tracks))

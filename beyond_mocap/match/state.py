@@ -11,11 +11,11 @@ from dataclasses import dataclass, field
 from .. import __version__
 from ..motion.track.match_data import Match
 from .folder import MatchFolder
-from .order import MatchOrder
-from .parts import Part
-from .pieces.pool import Done, peak_memory
+from .order import MatchRequest
+from .parts import PlayerPlans
+from .pieces.pool import TaskResult, measure_peak_memory
 
-EVERY = 1.0
+WRITE_INTERVAL = 1.0
 """s between two writes of a state in which only the number of finished windows has changed."""
 
 
@@ -34,65 +34,65 @@ class MatchState:
     """
 
     folder: MatchFolder
-    told: dict
+    report: dict
     players: dict[str, dict] = field(default_factory=dict)
     seconds: dict[str, float] = field(default_factory=dict)
-    own_seconds: dict[str, float] = field(default_factory=dict)
+    main_seconds: dict[str, float] = field(default_factory=dict)
     worker_memory: float = 0.0
     worker_seconds: dict[str, float] = field(default_factory=dict)
-    _written: float = 0.0
+    _write_time: float = 0.0
 
-    def player(self, player: str, **news) -> None:
+    def update_player(self, player: str, **values) -> None:
         """Update a player's row and write the state."""
-        self.players[player].update(news)
-        self.write()
+        self.players[player].update(values)
+        self.write_state()
 
-    def counted(self, player: str) -> None:
+    def count_window(self, player: str) -> None:
         """Count one more searched window of a player."""
         self.players[player]["units_done"] += 1
-        if time.monotonic() - self._written > EVERY:
-            self.write()
+        if time.monotonic() - self._write_time > WRITE_INTERVAL:
+            self.write_state()
 
-    def tell(self, **news) -> None:
+    def update_report(self, **values) -> None:
         """Update values of the match and write the state."""
-        self.told.update(news)
-        self.write()
+        self.report.update(values)
+        self.write_state()
 
-    def write(self) -> None:
+    def write_state(self) -> None:
         """Write match.json."""
         rows = [{name: value for name, value in row.items() if value is not None} for row in self.players.values()]
-        memory = {"main": round(peak_memory(), 1), "worker": round(self.worker_memory, 1)}
+        memory = {"main": round(measure_peak_memory(), 1), "worker": round(self.worker_memory, 1)}
         spent = {stage: round(seconds, 3) for stage, seconds in self.worker_seconds.items()}
-        self.folder.tell({**self.told, "players": rows, "seconds": self.seconds, "main_cpu_s": self.own_seconds,
+        self.folder.write_state({**self.report, "players": rows, "seconds": self.seconds, "main_cpu_s": self.main_seconds,
                           "worker_cpu_s": spent, "peak_memory_mb": memory})  # fmt: skip
-        self._written = time.monotonic()
+        self._write_time = time.monotonic()
 
-    def spent(self, stage: str) -> Callable[[Done], None]:
+    def build_result_counter(self, stage: str) -> Callable[[TaskResult], None]:
         """Build the function that adds the cost of each piece of a stage."""
 
-        def told(done: Done) -> None:
+        def count_result(done: TaskResult) -> None:
             self.worker_memory = max(self.worker_memory, done.memory)
             self.worker_seconds[stage] = self.worker_seconds.get(stage, 0.0) + done.seconds
 
-        return told
+        return count_result
 
-    def took(self, stage: str, begun: tuple[float, float]) -> None:
+    def record_stage(self, stage: str, started: tuple[float, float]) -> None:
         """Record a finished stage that started at `started` (`read_clocks`)."""
-        self.seconds[stage], self.own_seconds[stage] = (round(b - a, 3) for a, b in zip(begun, now()))
+        self.seconds[stage], self.main_seconds[stage] = (round(b - a, 3) for a, b in zip(started, read_clocks()))
 
     @property
-    def failed(self) -> list[dict]:
+    def failed_rows(self) -> list[dict]:
         """Rows of the players who could not be synthesized."""
         return [row for row in self.players.values() if row["status"] == "failed"]
 
 
-def now() -> tuple[float, float]:
+def read_clocks() -> tuple[float, float]:
     """Read the wall clock and this process's processor time, s."""
     return time.perf_counter(), time.process_time()
 
 
-def begun(
-    folder: MatchFolder, order: MatchOrder, identity: Mapping, match: Match, span: tuple[float, float]
+def build_state(
+    folder: MatchFolder, request: MatchRequest, identity: Mapping, match: Match, span: tuple[float, float]
 ) -> MatchState:
     """Build the state of a match before its work starts.
 
@@ -107,16 +107,16 @@ def begun(
     """
     sides = [team.name for team in match.teams if team.name and team.ground != "referee"]
     return MatchState(folder, {
-        "software": __version__, "status": "running", "title": " - ".join(sides[:2]) or order.tracking.stem,
-        "identity": dict(identity), "order": order.told(), "from_s": span[0], "to_s": span[1], "fps": order.fps,
+        "software": __version__, "status": "running", "title": " - ".join(sides[:2]) or request.tracking.stem,
+        "identity": dict(identity), "order": request.to_plain(), "from_s": span[0], "to_s": span[1], "fps": request.fps,
         "pitch_m": [match.length, match.width], "provider": match.provider,
         "periods_s": [list(period) for period in match.periods], "teams": [vars(team) for team in match.teams],
         "ball": None, "events": None, "crowd": None, "data": list(dict.fromkeys((*match.notes, *match.report))),
-        "notes": [], "workers": order.scheduler or order.workers,
+        "notes": [], "workers": request.scheduler or request.workers,
     })  # fmt: skip
 
 
-def row_of(part: Part, finished: str | None = None) -> dict:
+def build_player_row(part: PlayerPlans, finished: str | None = None) -> dict:
     """Build a player's row at the start.
 
     Args:

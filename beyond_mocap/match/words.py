@@ -22,38 +22,38 @@ from pathlib import Path
 
 import numpy as np
 
-from ..annotation import KeyMoment, Span, Timeline, format_timeline, parse_timeline, read_text, validate
+from ..annotation import KeyMoment, Span, Timeline, format_timeline, parse_timeline, read_text, check_timeline
 from ..annotation.ball_contact import takes_with_foot
-from ..annotation.event_words import EventWords, read_event_words
+from ..annotation.event_words import EventLabelTable, read_event_labels
 from ..ball.tracked import kinds
 from ..ball.tracked.solve import SolvedBall, SolvedTouch
 from ..base.digest import hex_digest
-from ..files.event_data import CERTAIN, MatchEvent, MatchEvents
+from ..files.event_data import CERTAIN_TOUCHES, MatchEvent, MatchEvents
 from ..files.whole import atomic_write
 from ..motion.track.match_data import Match
-from .event_clock import AlignedEvents, aligned
+from .event_clock import AlignedEvents, align_events
 
-LEAST_CONFIDENCE = 0.3
+MIN_CONFIDENCE = 0.3
 """Touches with less confidence give no key moment."""
 
-NEAREST = 0.5
+MIN_DISTANCE_SECONDS = 0.5
 """s: of two touches of a player that are closer, one becomes a key moment."""
 
 TOUCHES, EVENTS, BOTH, USER = "touches", "events", "touches and events", "user"
 """Sources of a moment."""
 
-_RUNNING = 2.0  # m/s, from which the player is running at a touch
+_RUNNING_SPEED = 2.0  # m/s, from which the player is running at a touch
 _HIGH_FOOT, _HIGH_HAND, _LOW_HAND = 0.45, 1.5, 0.7  # m of the ball's centre
-_JUMP = 2.05  # m of the ball's centre, too high for a header without a jump
-_CAUGHT = 3.0  # m/s of the ball after a save: a slower ball was caught
-_CHAIN = 3.0  # s between touches of one dribble
-_SHORTEST = 0.8  # s of a dribble
-_FORGETS = 0.2  # share of a touch's doubt that remains if an event confirms it
-_TOLD = 0.4  # confidence of an event without a touch
-_SHOWN_BY = 0.5  # s around an event without a touch in which another moment of the player stands for it
-_LIKE_EVENT = {kind.name: (kind.event, kind.details) for kind in kinds.TOUCH_KINDS}
+_JUMP_HEIGHT = 2.05  # m of the ball's centre, too high for a header without a jump
+_CAUGHT_SPEED = 3.0  # m/s of the ball after a save: a slower ball was caught
+_CHAIN_SECONDS = 3.0  # s between touches of one dribble
+_MIN_DRIBBLE = 0.8  # s of a dribble
+_DOUBT_WITH_EVENT = 0.2  # share of a touch's doubt that remains if an event confirms it
+_EVENT_CONFIDENCE = 0.4  # confidence of an event without a touch
+_SAME_MOMENT_SECONDS = 0.5  # s around an event without a touch in which another moment of the player stands for it
+_TOUCH_EVENTS = {kind.name: (kind.event, kind.details) for kind in kinds.TOUCH_KINDS}
 _DRIBBLE = next(kind for kind in kinds.TOUCH_KINDS if kind.name == kinds.DRIBBLE)
-_HEAD = re.compile(r"#.*\[([0-9a-f]{8})\]\s*")
+_HEADER = re.compile(r"#.*\[([0-9a-f]{8})\]\s*")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,14 +69,14 @@ class Moment:
     """
 
     time: float
-    words: tuple[str, ...]
+    labels: tuple[str, ...]
     source: str
     confidence: float
     end: float | None = None
 
 
 @dataclass(frozen=True)
-class MatchWords:
+class MatchLabels:
     """The labels of a match.
 
     Attributes:
@@ -90,7 +90,7 @@ class MatchWords:
     figures: Mapping[str, object] = field(default_factory=dict)
 
 
-def timeline_of(moments: Iterable[Moment], start: float = -np.inf, end: float = np.inf) -> Timeline:
+def build_timeline(moments: Iterable[Moment], start: float = -np.inf, end: float = np.inf) -> Timeline:
     """Build a timeline from moments, cut to a span.
 
     Args:
@@ -103,15 +103,15 @@ def timeline_of(moments: Iterable[Moment], start: float = -np.inf, end: float = 
     spans, keys = [], []
     for moment in moments:
         if moment.end is None:
-            keys += [KeyMoment(moment.time, moment.words)] * (start <= moment.time <= end)
+            keys += [KeyMoment(moment.time, moment.labels)] * (start <= moment.time <= end)
         elif min(moment.end, end) > max(moment.time, start):
-            spans.append(Span(max(moment.time, start), min(moment.end, end), moment.words))
+            spans.append(Span(max(moment.time, start), min(moment.end, end), moment.labels))
     return Timeline(tuple(spans), tuple(keys))
 
 
-def words_of(
-    match: Match, solved: SolvedBall | None, events: MatchEvents | None = None, table: EventWords | None = None
-) -> MatchWords:
+def label_match(
+    match: Match, solved: SolvedBall | None, events: MatchEvents | None = None, table: EventLabelTable | None = None
+) -> MatchLabels:
     """Label all players of a match.
 
     A touch becomes a key moment with the labels that the table has for it, or for the event paired with it; its time is
@@ -129,29 +129,29 @@ def words_of(
     Raises:
         InputError: if events fit no better than by chance.
     """
-    table = table or read_event_words()
+    table = table or read_event_labels()
     touches = solved.touches if solved else ()
     span = (float(solved.times[0]), float(solved.times[-1])) if solved else None
-    onto = aligned(events, touches, match.halves, span) if events and solved else None
-    told = {touch: event for event, touch in enumerate(onto.touches) if touch >= 0} if onto else {}
+    aligned = align_events(events, touches, match.halves, span) if events and solved else None
+    event_by_touch = {touch: event for event, touch in enumerate(aligned.touches) if touch >= 0} if aligned else {}
     heights, left_out, players = has_heights(match), Counter(), {}
     for player, path in zip(match.players, match.positions):
-        own = [(i, touch) for i, touch in enumerate(touches) if touch.player == player.id]
-        found = [moment for i, touch in own if (moment := moment_of(
-            touch, match.times, path, heights, table, event=onto.events[told[i]] if i in told else None,
+        player_touches = [(i, touch) for i, touch in enumerate(touches) if touch.player == player.id]
+        found = [moment for i, touch in player_touches if (moment := build_touch_moment(
+            touch, match.times, path, heights, table, event=aligned.events[event_by_touch[i]] if i in event_by_touch else None,
         ))]  # fmt: skip
-        sure = [moment for moment in found if moment.confidence >= LEAST_CONFIDENCE]
-        if onto:
-            sure += _untouched(player.id, onto, span, times=match.times, path=path, table=table, beside=found)
-        kept = apart(sure)
-        left_out["doubtful"] += sum(moment.confidence < LEAST_CONFIDENCE for moment in found)
-        left_out["close"] += len(sure) - len(kept)
-        players[player.id] = ordered([*kept, *dribbles([touch for _, touch in own])])
-    notes = (*(events.notes if events else ()), *(onto.notes if onto else ()), *_notes(touches, left_out))
-    return MatchWords(players, notes, _figures(onto, touches, span) if onto else {})
+        confident = [moment for moment in found if moment.confidence >= MIN_CONFIDENCE]
+        if aligned:
+            confident += _label_untouched_events(player.id, aligned, span, times=match.times, path=path, table=table, others=found)
+        selected = select_separate_moments(confident)
+        left_out["doubtful"] += sum(moment.confidence < MIN_CONFIDENCE for moment in found)
+        left_out["close"] += len(confident) - len(selected)
+        players[player.id] = sort_moments([*selected, *find_dribbles([touch for _, touch in player_touches])])
+    notes = (*(events.notes if events else ()), *(aligned.notes if aligned else ()), *_describe_left_out(touches, left_out))
+    return MatchLabels(players, notes, _measure_event_fit(aligned, touches, span) if aligned else {})
 
 
-def write_words(path: str | os.PathLike, player: str, moments: Iterable[Moment]) -> None:
+def write_labels(path: str | os.PathLike, player: str, moments: Iterable[Moment]) -> None:
     """Write one player's moments.
 
     Args:
@@ -161,22 +161,22 @@ def write_words(path: str | os.PathLike, player: str, moments: Iterable[Moment])
     Raises:
         InputError: if the file cannot be written.
     """
-    lines = [f"{_line(moment)}  # {moment.source} {moment.confidence:.2f}\n" for moment in ordered(moments)]
-    told = "edit freely. An edited file is kept and used, any other is regenerated"
-    atomic_write(path, f"# labels of {' '.join(player.split())}: {told} [{_digest(lines)}]\n{''.join(lines)}")
+    lines = [f"{_format_moment(moment)}  # {moment.source} {moment.confidence:.2f}\n" for moment in sort_moments(moments)]
+    text = "edit freely. An edited file is kept and used, any other is regenerated"
+    atomic_write(path, f"# labels of {' '.join(player.split())}: {text} [{_compute_digest(lines)}]\n{''.join(lines)}")
 
 
-def edited(path: str | os.PathLike) -> bool:
+def is_edited(path: str | os.PathLike) -> bool:
     """Say whether the file exists and a person wrote it or has changed it since it was written."""
     if not Path(path).is_file():
         return False
     lines = read_text(path).splitlines(keepends=True)
-    head = _HEAD.fullmatch(lines[0]) if lines else None
-    return head is None or head[1] != _digest(lines[1:])
+    head = _HEADER.fullmatch(lines[0]) if lines else None
+    return head is None or head[1] != _compute_digest(lines[1:])
 
 
-def read_words(
-    path: str | os.PathLike, automatic: Sequence[Moment] = (), known_words: Iterable[str] = ()
+def read_labels(
+    path: str | os.PathLike, automatic: Sequence[Moment] = (), known_labels: Iterable[str] = ()
 ) -> tuple[Moment, ...]:
     """Read the moments in a file.
 
@@ -190,39 +190,39 @@ def read_words(
         InputError: with the line, if it is not a timeline or has unknown labels.
     """
     timeline = parse_timeline(read_text(path), str(path))
-    validate(timeline, known_words, where=str(path))
-    known = {_line(moment): moment for moment in automatic}
-    found = [Moment(time=key.time, words=key.words, source=USER, confidence=1.0) for key in timeline.keys]
-    found += [Moment(time=span.start, words=span.words, source=USER, confidence=1.0, end=span.end)
+    check_timeline(timeline, known_labels, where=str(path))
+    known = {_format_moment(moment): moment for moment in automatic}
+    found = [Moment(time=key.time, labels=key.words, source=USER, confidence=1.0) for key in timeline.keys]
+    found += [Moment(time=span.start, labels=span.words, source=USER, confidence=1.0, end=span.end)
               for span in timeline.spans]  # fmt: skip
-    return ordered(known.get(_line(moment), moment) for moment in found)
+    return sort_moments(known.get(_format_moment(moment), moment) for moment in found)
 
 
-def _untouched(player: str, onto: AlignedEvents, span, times, path, table, beside) -> list[Moment]:
+def _label_untouched_events(player: str, aligned: AlignedEvents, span, times, path, table, others) -> list[Moment]:
     """Label one player's certain events without a touch, unless another of their moments stands for the event."""
     out = []
-    for index, event in enumerate(onto.events):
-        time = float(onto.times[index])
-        if event.player != player or event.kind not in CERTAIN or onto.touches[index] >= 0:
+    for index, event in enumerate(aligned.events):
+        time = float(aligned.times[index])
+        if event.player != player or event.kind not in CERTAIN_TOUCHES or aligned.touches[index] >= 0:
             continue
-        if not span[0] <= time <= span[1] or any(abs(one.time - time) < _SHOWN_BY for one in beside):
+        if not span[0] <= time <= span[1] or any(abs(one.time - time) < _SAME_MOMENT_SECONDS for one in others):
             continue
-        filled_in = {**seen_words(time, times, path), "side": event.side}
-        words = table.words(event.kind, event.part or "foot", event.details, filled_in)
-        out += [Moment(time=round(time, 3), words=words, source=EVENTS, confidence=_TOLD)] * bool(words)
+        values = {**find_gait_label(time, times, path), "side": event.side}
+        labels = table.find_labels(event.kind, event.part or "foot", event.details, values)
+        out += [Moment(time=round(time, 3), labels=labels, source=EVENTS, confidence=_EVENT_CONFIDENCE)] * bool(labels)
     return out
 
 
-def _figures(onto: AlignedEvents, touches, span) -> dict[str, object]:
+def _measure_event_fit(aligned: AlignedEvents, touches, span) -> dict[str, object]:
     """Measure how the events fit: counts, and each period's clock."""
-    inside = [i for i, time in enumerate(onto.times) if span[0] <= time <= span[1] and onto.events[i].played]
-    certain = [i for i in inside if onto.events[i].kind in CERTAIN]
-    off = [touches[onto.touches[i]].time - onto.times[i] for i in inside if onto.touches[i] >= 0]
+    inside = [i for i, time in enumerate(aligned.times) if span[0] <= time <= span[1] and aligned.events[i].may_be_touch]
+    certain = [i for i in inside if aligned.events[i].kind in CERTAIN_TOUCHES]
+    off = [touches[aligned.touches[i]].time - aligned.times[i] for i in inside if aligned.touches[i] >= 0]
     return {
         "events": len(inside), "with_touch": len(off), "certain": len(certain),
-        "certain_with_touch": sum(onto.touches[i] >= 0 for i in certain),
+        "certain_with_touch": sum(aligned.touches[i] >= 0 for i in certain),
         "residual_s": {"median": float(np.median(off)), "sd": float(np.std(off))} if off else None,
-        "clocks": {str(number): vars(clock) for number, clock in onto.clocks.items()},
+        "clocks": {str(number): vars(clock) for number, clock in aligned.clocks.items()},
     }  # fmt: skip
 
 
@@ -232,8 +232,8 @@ def has_heights(match: Match) -> bool:
     return bool(seen.any() and np.isfinite(match.ball[seen, 2]).mean() > 0.8)
 
 
-def moment_of(
-    touch: SolvedTouch, times: np.ndarray, path: np.ndarray, heights: bool, table: EventWords,
+def build_touch_moment(
+    touch: SolvedTouch, times: np.ndarray, path: np.ndarray, heights: bool, table: EventLabelTable,
     event: MatchEvent | None = None,
 ) -> Moment | None:  # fmt: skip
     """Build the key moment of a touch.
@@ -248,100 +248,100 @@ def moment_of(
     Returns:
         The key moment, None if the table has no labels for it.
     """
-    kind, details = _LIKE_EVENT[touch.kind]
-    if touch.kind == kinds.SAVE and np.linalg.norm(touch.after) > _CAUGHT:
+    kind, details = _TOUCH_EVENTS[touch.kind]
+    if touch.kind == kinds.SAVE and np.linalg.norm(touch.after) > _CAUGHT_SPEED:
         details = (*details, "parried")
-    filled_in = {**seen_words(touch.time, times, path), **height_words(touch.part, touch.position[2], heights)}
+    values = {**find_gait_label(touch.time, times, path), **find_height_labels(touch.part, touch.position[2], heights)}
     if event is None:
-        words = table.words(kind, touch.part, details, filled_in)
-        return _moment(touch, words, TOUCHES, touch.confidence)
-    part, filled_in = event.part or touch.part, {**filled_in, "side": event.side}
+        labels = table.find_labels(kind, touch.part, details, values)
+        return _build_moment(touch, labels, TOUCHES, touch.confidence)
+    part, values = event.part or touch.part, {**values, "side": event.side}
     if part != touch.part:
-        filled_in.update(height_words(part, touch.position[2], heights))
-    words = table.words(event.kind, part, event.details, filled_in) or table.words(kind, part, details, filled_in)
-    return _moment(touch, words, BOTH, 1.0 - _FORGETS * (1.0 - touch.confidence))
+        values.update(find_height_labels(part, touch.position[2], heights))
+    labels = table.find_labels(event.kind, part, event.details, values) or table.find_labels(kind, part, details, values)
+    return _build_moment(touch, labels, BOTH, 1.0 - _DOUBT_WITH_EVENT * (1.0 - touch.confidence))
 
 
-def _moment(touch: SolvedTouch, words: tuple[str, ...], source: str, sure: float) -> Moment | None:
-    if not words:
+def _build_moment(touch: SolvedTouch, labels: tuple[str, ...], source: str, confidence: float) -> Moment | None:
+    if not labels:
         return None
-    return Moment(time=round(touch.time, 3), words=words, source=source, confidence=round(sure, 3))
+    return Moment(time=round(touch.time, 3), labels=labels, source=source, confidence=round(confidence, 3))
 
 
-def seen_words(time: float, times: np.ndarray, path: np.ndarray) -> dict[str, str]:
+def find_gait_label(time: float, times: np.ndarray, path: np.ndarray) -> dict[str, str]:
     """Find the gait label at a moment, from a player's path (N, 2) m at `times` (N,) s."""
     near = slice(*np.searchsorted(times, [time - 0.3, time + 0.3]))
-    there = np.isfinite(path[near]).all(axis=1)
-    seen, when = path[near][there], times[near][there]
+    is_known = np.isfinite(path[near]).all(axis=1)
+    seen, when = path[near][is_known], times[near][is_known]
     if len(seen) < 2:
         return {}
-    away = np.linalg.norm(seen[-1] - seen[0]) / (when[-1] - when[0])
-    return {"gait": "running" if away > _RUNNING else "standing"}
+    speed = np.linalg.norm(seen[-1] - seen[0]) / (when[-1] - when[0])
+    return {"gait": "running" if speed > _RUNNING_SPEED else "standing"}
 
 
-def height_words(part: str, height: float, known: bool) -> dict[str, str]:
+def find_height_labels(part: str, height: float, known: bool) -> dict[str, str]:
     """Find the height and jump labels of a touch with the ball's centre at `height` m."""
     if not known:
         return {}
     if part == "hand":
         return {"height": "high" if height > _HIGH_HAND else "low" if height < _LOW_HAND else "middle"}
-    return {"height": "high" if height > _HIGH_FOOT else "low", "jump": "jump" if height > _JUMP else ""}
+    return {"height": "high" if height > _HIGH_FOOT else "low", "jump": "jump" if height > _JUMP_HEIGHT else ""}
 
 
-def apart(moments: Iterable[Moment]) -> list[Moment]:
+def select_separate_moments(moments: Iterable[Moment]) -> list[Moment]:
     """Select moments of one player at least MIN_DISTANCE_SECONDS apart, the most certain first: events before
     touches, sent before received balls.
     """
-    kept: list[Moment] = []
-    for moment in sorted(moments, key=_weight, reverse=True):
-        if all(abs(moment.time - other.time) >= NEAREST for other in kept):
-            kept.append(moment)
-    return kept
+    selected: list[Moment] = []
+    for moment in sorted(moments, key=_compute_weight, reverse=True):
+        if all(abs(moment.time - other.time) >= MIN_DISTANCE_SECONDS for other in selected):
+            selected.append(moment)
+    return selected
 
 
-def _weight(moment: Moment) -> tuple[float, float]:
-    told = 0.5 * (moment.source in (EVENTS, BOTH)) + 0.3 * (not takes_with_foot(moment.words))
-    return moment.confidence + told, -moment.time
+def _compute_weight(moment: Moment) -> tuple[float, float]:
+    bonus = 0.5 * (moment.source in (EVENTS, BOTH)) + 0.3 * (not takes_with_foot(moment.labels))
+    return moment.confidence + bonus, -moment.time
 
 
-def dribbles(touches: list[SolvedTouch]) -> list[Moment]:
+def find_dribbles(touches: list[SolvedTouch]) -> list[Moment]:
     """Find the stretches in which one player dribbles: consecutive touches, at least one of them a dribble's."""
     out, first = [], 0
     for index in range(1, len(touches) + 1):
-        if index < len(touches) and touches[index].time - touches[index - 1].time < _CHAIN:
+        if index < len(touches) and touches[index].time - touches[index - 1].time < _CHAIN_SECONDS:
             if touches[index - 1].kind in (kinds.DRIBBLE, kinds.RECEIVE):
                 continue
         chain, first = touches[first:index], index
-        lasts = chain[-1].time - chain[0].time
-        if lasts >= _SHORTEST and any(touch.kind == kinds.DRIBBLE for touch in chain):
-            sure = float(np.mean([touch.confidence for touch in chain]))
-            out.append(Moment(time=round(chain[0].time, 3), words=_DRIBBLE.labels, source=TOUCHES,
-                              confidence=round(sure, 3), end=round(chain[-1].time, 3)))
+        duration = chain[-1].time - chain[0].time
+        if duration >= _MIN_DRIBBLE and any(touch.kind == kinds.DRIBBLE for touch in chain):
+            confidence = float(np.mean([touch.confidence for touch in chain]))
+            out.append(Moment(time=round(chain[0].time, 3), labels=_DRIBBLE.labels, source=TOUCHES,
+                              confidence=round(confidence, 3), end=round(chain[-1].time, 3)))
     return out
 
 
-def ordered(moments: Iterable[Moment]) -> tuple[Moment, ...]:
+def sort_moments(moments: Iterable[Moment]) -> tuple[Moment, ...]:
     """Sort moments by time, stretches before key moments."""
     return tuple(sorted(moments, key=lambda moment: (moment.time, moment.end is None)))
 
 
-def _notes(touches, left_out: Counter) -> list[str]:
+def _describe_left_out(touches, left_out: Counter) -> list[str]:
     """Describe how many touches are left out, and why."""
-    strangers = sum(not touch.player for touch in touches)
-    told = [
-        (strangers, "touches of the ball by untracked players"),
-        (left_out["doubtful"], f"touches are ignored, with confidence below {LEAST_CONFIDENCE:g}"),
-        (left_out["close"], f"touches are ignored, within {NEAREST:g} s of a more certain one of the same player"),
+    untracked = sum(not touch.player for touch in touches)
+    counts = [
+        (untracked, "touches of the ball by untracked players"),
+        (left_out["doubtful"], f"touches are ignored, with confidence below {MIN_CONFIDENCE:g}"),
+        (left_out["close"], f"touches are ignored, within {MIN_DISTANCE_SECONDS:g} s of a more certain one of the same player"),
     ]
-    return [f"{count} {what}" for count, what in told if count]
+    return [f"{count} {what}" for count, what in counts if count]
 
 
-def _line(moment: Moment) -> str:
+def _format_moment(moment: Moment) -> str:
     """Format a moment as the contract's line."""
-    return format_timeline(timeline_of([moment])).rstrip("\n")
+    return format_timeline(build_timeline([moment])).rstrip("\n")
 
 
-def _digest(lines: Iterable[str]) -> str:
+def _compute_digest(lines: Iterable[str]) -> str:
     """Compute the digest of lines, without their ends."""
-    said = "\n".join(line.rstrip() for line in lines if line.strip())
-    return hex_digest(said, digits=8)
+    content = "\n".join(line.rstrip() for line in lines if line.strip())
+    return hex_digest(content, digits=8)

@@ -17,42 +17,42 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d
 
 from ..base.banded_least_squares import BandedLeastSquares
-from ..base.time_series import hann_smooth, run_numbers
-from ..base.vectors import arctan2, cross
+from ..base.time_series import hann_smooth, number_runs
+from ..base.vectors import arctan2, cross_product
 from . import quaternion
-from .contacts import sole_height
-from .humanoid import Limb, identify
-from .limb import two_bone
-from .motion import pose_kinematics
+from .contacts import measure_sole_height
+from .humanoid import Limb, identify_joints
+from .limb import solve_two_bone
+from .motion import compute_pose
 from .skeleton import Skeleton
 
-SMOOTH, PULL = 0.005, 3e-4
+SMOOTH_WEIGHT, PULL_WEIGHT = 0.005, 3e-4
 """Weights of `solve_shift`: of the third difference of the shift, and of the shift itself."""
 
 HEEL_SHARE = 0.2
 """Weight of a heel while its toe is in contact too, against the toe's 1."""
 
-MOST_DROP, MOST_RISE = 0.04, 0.35
+MAX_DROP, MAX_HEEL_RISE = 0.04, 0.35
 """Metres that the pelvis is lowered, and radians that a heel is raised about its toe, at most."""
 
-HOLD = 1e6
+HOLD_WEIGHT = 1e6
 """Weight of a shift that is given: so much larger than all others that it stays."""
 
-MOST_SHIFT = 0.25
-EASE, SPARE, SPARE_ALOFT = 0.012, 0.004, 0.02
+MAX_SHIFT = 0.25
+EASE_DISTANCE, RESERVE, AIR_RESERVE = 0.012, 0.004, 0.02
 """Metres below full length from which a leg eases (`limb.soften_distance`), and reserves of length that are left in
 contact and in the air: a leg that is nearly straight pops at the knee. A leg that was straighter in the recording may
 be as straight."""
 
-LEAST_EASE, LEAST_SPARE = 0.003, 0.002
+MIN_EASE_DISTANCE, MIN_RESERVE = 0.003, 0.002
 """The same of legs that were straight in the recording."""
 
-_EASED_ROUNDS, _SLIDES_FROM = 3, 0.004  # rounds of relaxing the contact weights; metres of sliding that need none
-_BEHIND = 3  # frames at 30 per second over which a rise or drop is spread
+_RELAX_ROUNDS, _SLIDE_TOLERANCE = 3, 0.004  # rounds of relaxing the contact weights; metres of sliding that need none
+_SPREAD_FRAMES = 3  # frames at 30 per second over which a rise or drop is spread
 
 
 @dataclass(frozen=True, eq=False)
-class Planted:
+class PlantResult:
     """A motion with planted feet.
 
     Attributes:
@@ -90,37 +90,37 @@ class Foot:
     left: np.ndarray
     weight: np.ndarray
     length: np.ndarray
-    own: np.ndarray
+    recorded_slack: np.ndarray
 
     @property
-    def moves(self) -> np.ndarray:
+    def displacements(self) -> np.ndarray:
         """(T - 1, 2, 2) metres that heel and toe move over the ground from frame to frame."""
         return np.stack([np.diff(self.heel[:, :2], axis=0), np.diff(self.toe[:, :2], axis=0)], axis=1)
 
-    def moved(self, by: np.ndarray) -> Foot:
+    def move(self, shift: np.ndarray) -> Foot:
         """Return the foot moved by `shift` (T, 3) m."""
-        return replace(self, heel=self.heel + by, toe=self.toe + by)
+        return replace(self, heel=self.heel + shift, toe=self.toe + shift)
 
     @property
-    def ease(self) -> np.ndarray:
+    def ease_distance(self) -> np.ndarray:
         """(T,) metres below full length from which the leg eases."""
-        return np.clip(self.own, LEAST_EASE, EASE)
+        return np.clip(self.recorded_slack, MIN_EASE_DISTANCE, EASE_DISTANCE)
 
     @property
-    def longest(self) -> np.ndarray:
+    def max_reach(self) -> np.ndarray:
         """(T,) metres, the leg's greatest length in contact."""
-        return self.length - np.clip(self.own, LEAST_SPARE, SPARE)
+        return self.length - np.clip(self.recorded_slack, MIN_RESERVE, RESERVE)
 
     @property
-    def carries(self) -> np.ndarray:
+    def contact_weight(self) -> np.ndarray:
         """(T,) contact weight of the foot, the larger one of heel and toe."""
         return self.weight.max(axis=1)
 
 
-def plant(
-    skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray, standing: np.ndarray, fps: float,
-    sinks: float = MOST_DROP, moves: np.ndarray | None = None, levels: bool = True,
-) -> Planted:
+def plant_feet(
+    skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray, heel_toe_contacts: np.ndarray, fps: float,
+    max_drop: float = MAX_DROP, foot_moves: np.ndarray | None = None, level_feet: bool = True,
+) -> PlantResult:
     """Plant the feet of a motion on the ground, z = 0, where they are in contact.
 
     The feet keep their own rotation except for a rotation about the vertical that holds a flat foot's direction, and
@@ -144,38 +144,38 @@ def plant(
     Raises:
         InputError: if the skeleton has no legs.
     """
-    body = identify(skeleton)
-    places, world = pose_kinematics(skeleton, root, rotations)
-    scale, spread = 30.0 / fps, int(round(_BEHIND * fps / 30.0))
-    moves = np.zeros((len(root), 2, 4)) if moves is None else moves
-    feet = [laid_foot(places, world, limb, standing[:, side]) for side, limb in enumerate((body.left, body.right))]
-    feet = [turned_flat(foot.moved(moves[:, side, :3]), scale) for side, foot in enumerate(feet)]
-    lifts = [lift_to_ground(foot, sole_height(skeleton), scale) if levels else np.zeros(len(root)) for foot in feet]
-    firm = [foot.weight for foot in feet]
+    body = identify_joints(skeleton)
+    places, world = compute_pose(skeleton, root, rotations)
+    scale, spread = 30.0 / fps, int(round(_SPREAD_FRAMES * fps / 30.0))
+    foot_moves = np.zeros((len(root), 2, 4)) if foot_moves is None else foot_moves
+    feet = [build_foot(places, world, limb, heel_toe_contacts[:, side]) for side, limb in enumerate((body.left, body.right))]
+    feet = [align_flat_foot(foot.move(foot_moves[:, side, :3]), scale) for side, foot in enumerate(feet)]
+    lifts = [lift_to_ground(foot, measure_sole_height(skeleton), scale) if level_feet else np.zeros(len(root)) for foot in feet]
+    weights = [foot.weight for foot in feet]
     # solve with full weights first; stances that the legs cannot reach are relaxed and solved again
-    for turn in range(_EASED_ROUNDS + 1):
+    for attempt in range(_RELAX_ROUNDS + 1):
         goals = [
-            _goal(foot, weight, lift, tilt=tilt, scale=scale, spread=spread)
-            for foot, weight, lift, tilt in zip(feet, firm, lifts, np.moveaxis(moves[..., 3], 1, 0))
+            _compute_ankle_goal(foot, weight, lift, tilt=tilt, scale=scale, spread=spread)
+            for foot, weight, lift, tilt in zip(feet, weights, lifts, np.moveaxis(foot_moves[..., 3], 1, 0))
         ]
-        drop = pelvis_drop(feet, [goal for goal, _ in goals], spread, sinks)
-        short = [lacking(foot, goal, drop) for foot, (goal, _) in zip(feet, goals)]
-        if turn == _EASED_ROUNDS or max(s.max(initial=0.0) for s in short) <= _SLIDES_FROM:
+        drop = compute_pelvis_drop(feet, [goal for goal, _ in goals], spread, max_drop)
+        short = [measure_shortfall(foot, goal, drop) for foot, (goal, _) in zip(feet, goals)]
+        if attempt == _RELAX_ROUNDS or max(s.max(initial=0.0) for s in short) <= _SLIDE_TOLERANCE:
             break
-        firm = [held_less(weight, s) for weight, s in zip(firm, short)]
+        weights = [relax_contact_weights(weight, s) for weight, s in zip(weights, short)]
     root = root - drop[:, None] * [0.0, 0.0, 1.0]
     correction, miss = np.zeros((len(root), 2)), np.zeros((len(root), 2))
     out = rotations
-    for side, (foot, (target, turned)) in enumerate(zip(feet, goals)):
-        target = _within_reach(foot, target, drop)
+    for side, (foot, (target, foot_rotation)) in enumerate(zip(feet, goals)):
+        target = _limit_to_reach(foot, target, drop)
         chain = (foot.limb.upper_leg, foot.limb.lower_leg, foot.limb.foot)
-        reached = two_bone(skeleton, root, out, chain, target, end_rotation=turned, soft=foot.ease)
+        reached = solve_two_bone(skeleton, root, out, chain, target, end_rotation=foot_rotation, soft=foot.ease_distance)
         out, miss[:, side] = reached.rotations, reached.miss
         correction[:, side] = np.linalg.norm(target - places[:, foot.limb.foot], axis=1)
-    return Planted(root, out, correction, miss)
+    return PlantResult(root, out, correction, miss)
 
 
-def laid_foot(places: np.ndarray, world: np.ndarray, limb: Limb, stands: np.ndarray) -> Foot:
+def build_foot(places: np.ndarray, world: np.ndarray, limb: Limb, contacts: np.ndarray) -> Foot:
     """Build one foot of a body.
 
     Args:
@@ -187,54 +187,54 @@ def laid_foot(places: np.ndarray, world: np.ndarray, limb: Limb, stands: np.ndar
         The foot.
     """
     hip, knee, heel, toe = (places[:, j] for j in (limb.upper_leg, limb.lower_leg, limb.foot, limb.toe_or_foot))
-    weight = firmness(stands)
+    weight = compute_contact_weights(contacts)
     length = np.linalg.norm(knee - hip, axis=1) + np.linalg.norm(heel - knee, axis=1)
     own = length - np.linalg.norm(heel - hip, axis=1)
     along = toe - heel if limb.toe is not None else quaternion.rotate(world[:, limb.foot], np.array([1.0, 0.0, 0.0]))
     yaw = arctan2(along[:, 1], along[:, 0])
     left = np.stack([-np.sin(yaw), np.cos(yaw), np.zeros(len(yaw))], axis=1)
     return Foot(limb=limb, hip=hip, heel=heel, toe=toe, rotation=world[:, limb.foot], left=left, weight=weight,
-                length=length, own=own)
+                length=length, recorded_slack=own)
 
 
-def firmness(stands: np.ndarray) -> np.ndarray:
+def compute_contact_weights(contacts: np.ndarray) -> np.ndarray:
     """Compute the contact weights (T, 2) of heel and toe from contacts (T, 2) bool.
 
     1 inside a stance, 0.5 in its first and last frame, while the foot arrives, else 0. The heel yields to a toe in
     contact.
     """
-    padded = np.pad(stands, ((1, 1), (0, 0)), mode="edge")
-    inner = stands & padded[:-2] & padded[2:]
-    weight = np.where(inner, 1.0, np.where(stands, 0.5, 0.0))
+    padded = np.pad(contacts, ((1, 1), (0, 0)), mode="edge")
+    inner = contacts & padded[:-2] & padded[2:]
+    weight = np.where(inner, 1.0, np.where(contacts, 0.5, 0.0))
     weight[:, 0] *= 1.0 - (1.0 - HEEL_SHARE) * weight[:, 1]
     return weight
 
 
-def turned_flat(foot: Foot, scale: float) -> Foot:
+def align_flat_foot(foot: Foot, scale: float) -> Foot:
     """Rotate a foot about its heel and the vertical so that it keeps its direction while it is flat; scale: 30 / rate.
     """
     yaw = np.unwrap(arctan2(-foot.left[:, 0], foot.left[:, 1]))
     flat = np.minimum(foot.weight[:, 0] / HEEL_SHARE, foot.weight[:, 1]).clip(0.0, 1.0)
-    spin = quaternion.about_up(shift(np.diff(yaw)[:, None], flat[:, None], scale)[:, 0])
+    spin = quaternion.from_up_angle(solve_shift(np.diff(yaw)[:, None], flat[:, None], scale)[:, 0])
     toe = foot.heel + quaternion.rotate(spin, foot.toe - foot.heel)
     left = quaternion.rotate(spin, foot.left)
     return replace(foot, toe=toe, rotation=quaternion.multiply(spin, foot.rotation), left=left)
 
 
-def _goal(
+def _compute_ankle_goal(
     foot: Foot, weight: np.ndarray, lift: np.ndarray, tilt: np.ndarray, scale: float, spread: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """Compute the ankle's goal (T, 3) and the foot's world rotation (T, 4); lift (T,) m, tilt (T,) radians of the heel.
     """
-    ground, weight = held_shift(foot.moves, weight, scale)
+    ground, weight = solve_limited_shift(foot.displacements, weight, scale)
     moved = np.column_stack([ground, lift])
-    rise = spread_over(heel_rise(foot, moved) * foot.weight[:, 1], spread) + tilt
-    roll = quaternion.about_axis(foot.left, rise)
+    rise = spread_peaks(solve_heel_rise(foot, moved) * foot.weight[:, 1], spread) + tilt
+    roll = quaternion.from_axis_angle(foot.left, rise)
     ankle = foot.toe + moved + quaternion.rotate(roll, foot.heel - foot.toe)
     return ankle, quaternion.multiply(roll, foot.rotation)
 
 
-def heel_rise(foot: Foot, moved: np.ndarray) -> np.ndarray:
+def solve_heel_rise(foot: Foot, shift: np.ndarray) -> np.ndarray:
     """Solve the smallest angle by which a heel rises about its toe so that the leg reaches its ankle.
 
     With u from toe to hip, a from toe to heel, n the foot's left: |u - R a|^2 = L^2 is A cos r + B sin r = K.
@@ -245,20 +245,20 @@ def heel_rise(foot: Foot, moved: np.ndarray) -> np.ndarray:
     Returns:
         (T,) radians, at most MAX_HEEL_RISE.
     """
-    u, a, n = foot.hip - foot.toe - moved, foot.heel - foot.toe, foot.left
+    u, a, n = foot.hip - foot.toe - shift, foot.heel - foot.toe, foot.left
     across = np.sum(a * n, axis=1, keepdims=True)
     level = a - across * n
     # even, odd and target are A, B and K of the docstring; `level` is the part of a that rotates
-    even, odd = np.sum(u * level, axis=1), np.sum(u * cross(n, level), axis=1)
-    length = foot.longest
-    asked = 0.5 * (np.sum(u * u, axis=1) + np.sum(a * a, axis=1) - length**2) - across[:, 0] * np.sum(u * n, axis=1)
+    even, odd = np.sum(u * level, axis=1), np.sum(u * cross_product(n, level), axis=1)
+    length = foot.max_reach
+    target = 0.5 * (np.sum(u * u, axis=1) + np.sum(a * a, axis=1) - length**2) - across[:, 0] * np.sum(u * n, axis=1)
     most = np.hypot(even, odd)
-    rise = arctan2(odd, even) - np.arccos(np.clip(asked / np.maximum(most, 1e-9), -1.0, 1.0))
-    return np.where((asked > even) & (odd > 0.0), np.clip(rise, 0.0, MOST_RISE), 0.0)
+    rise = arctan2(odd, even) - np.arccos(np.clip(target / np.maximum(most, 1e-9), -1.0, 1.0))
+    return np.where((target > even) & (odd > 0.0), np.clip(rise, 0.0, MAX_HEEL_RISE), 0.0)
 
 
-def held_shift(
-    velocity: np.ndarray, weight: np.ndarray, scale: float, most: float = MOST_SHIFT
+def solve_limited_shift(
+    velocity: np.ndarray, weight: np.ndarray, scale: float, max_shift: float = MAX_SHIFT
 ) -> tuple[np.ndarray, np.ndarray]:
     """Solve the shift of a foot with stances relaxed that would need too large a shift.
 
@@ -272,28 +272,28 @@ def held_shift(
     Returns:
         The shift (T, 2) in metres, and the weights (T, 2) with which it was found.
     """
-    ground = shift(velocity, weight, scale)
+    ground = solve_shift(velocity, weight, scale)
     for _ in range(4):
         far = np.where(weight.max(axis=1) > 0, np.linalg.norm(ground, axis=1), 0.0)
-        if far.max(initial=0.0) <= most:
+        if far.max(initial=0.0) <= max_shift:
             break
-        weight = held_less(weight, far - most)
-        ground = shift(velocity, weight, scale)
+        weight = relax_contact_weights(weight, far - max_shift)
+        ground = solve_shift(velocity, weight, scale)
     return ground, weight
 
 
-def held_less(weight: np.ndarray, excess: np.ndarray) -> np.ndarray:
+def relax_contact_weights(weight: np.ndarray, excess: np.ndarray) -> np.ndarray:
     """Relax the weights (T, 2) of those stances in which `excess` (T,) metres is above 0: to a third or less at 10 cm.
     """
     stance = weight.max(axis=1) > 0
     # label numbers the stances from 1; frames without contact have 0 and collect nothing
-    label = run_numbers(stance)
+    label = number_runs(stance)
     worst = np.zeros(label.max(initial=0) + 1)
     np.maximum.at(worst, label, np.where(stance, np.maximum(excess, 0.0), 0.0))
     return weight / (1.0 + worst[label] / 0.02)[:, None] ** 2
 
 
-def shift(velocity: np.ndarray, weight: np.ndarray, scale: float = 1.0, kept: np.ndarray | None = None) -> np.ndarray:
+def solve_shift(velocity: np.ndarray, weight: np.ndarray, scale: float = 1.0, fixed_shifts: np.ndarray | None = None) -> np.ndarray:
     """Solve the smooth shift D that cancels velocities where they carry weight.
 
     Minimizes sum w |D' + v|^2 + SMOOTH_WEIGHT |D'''|^2 + PULL_WEIGHT |D|^2, with differences per frame at 30 frames per
@@ -310,19 +310,19 @@ def shift(velocity: np.ndarray, weight: np.ndarray, scale: float = 1.0, kept: np
     count = len(weight)
     if velocity.ndim == 2:
         velocity = velocity[:, None, :]
-    firm = np.minimum(weight[1:], weight[:-1])
-    total = firm.sum(axis=1)
-    pushed = np.einsum("tp,tpk->tk", firm, velocity)
+    weights = np.minimum(weight[1:], weight[:-1])
+    total = weights.sum(axis=1)
+    weighted_velocity = np.einsum("tp,tpk->tk", weights, velocity)
     squares = BandedLeastSquares(count, columns=velocity.shape[2])
     # row t of the normal equations: D[t + 1] - D[t] = -v[t] adds -w v to equation t + 1 and +w v to equation t
-    squares.right[1:] -= pushed
-    squares.right[:-1] += pushed
+    squares.right[1:] -= weighted_velocity
+    squares.right[:-1] += weighted_velocity
     squares.add_difference(1, total)
-    squares.add_difference(3, SMOOTH / scale**4)
-    squares.add_value(PULL * scale**2)
-    if kept is not None:
-        given = ~np.isnan(kept[:, 0])
-        squares.add_value(HOLD * given, goal=np.where(given[:, None], kept, 0.0))
+    squares.add_difference(3, SMOOTH_WEIGHT / scale**4)
+    squares.add_value(PULL_WEIGHT * scale**2)
+    if fixed_shifts is not None:
+        is_fixed = ~np.isnan(fixed_shifts[:, 0])
+        squares.add_value(HOLD_WEIGHT * is_fixed, goal=np.where(is_fixed[:, None], fixed_shifts, 0.0))
     return squares.solve()
 
 
@@ -343,26 +343,26 @@ def lift_to_ground(foot: Foot, sole: float, scale: float) -> np.ndarray:
     flat = weight.min(axis=1) > 0
     rest = float(np.median((heel - toe)[flat])) if np.any(flat) else float(np.percentile(heel, 5))
     low = np.stack([heel - max(rest, 0.0), toe], axis=1)
-    lift = settled(-(low * weight).sum(axis=1), weight.sum(axis=1), scale)
+    lift = fit_smooth_curve(-(low * weight).sum(axis=1), weight.sum(axis=1), scale)
     for _ in range(3):
         below = np.minimum(low.min(axis=1) + lift, 0.0)
         if below.min() > -1e-3:
             break
         sunk = np.where(below < -1e-3, 1.0, 0.0)
-        lift = lift + settled(-below * sunk, sunk, scale)
+        lift = lift + fit_smooth_curve(-below * sunk, sunk, scale)
     return lift
 
 
-def settled(right: np.ndarray, weight: np.ndarray, scale: float, smooth: float = SMOOTH) -> np.ndarray:
+def fit_smooth_curve(weighted_values: np.ndarray, weight: np.ndarray, scale: float, smooth: float = SMOOTH_WEIGHT) -> np.ndarray:
     """Fit the smooth curve (T,) that is `weighted_values` / `weight` where the weight is large, and small elsewhere."""
     squares = BandedLeastSquares(len(weight))
     squares.add_difference(3, smooth / scale**6)
     squares.add_value(weight + 2e-2)
-    squares.right += right
+    squares.right += weighted_values
     return squares.solve()[:, 0]
 
 
-def pelvis_drop(feet: list[Foot], goals: list[np.ndarray], spread: int, most: float) -> np.ndarray:
+def compute_pelvis_drop(feet: list[Foot], goals: list[np.ndarray], spread: int, most: float) -> np.ndarray:
     """Compute how far the pelvis is lowered so that ankles in contact can be reached.
 
     Args:
@@ -375,33 +375,33 @@ def pelvis_drop(feet: list[Foot], goals: list[np.ndarray], spread: int, most: fl
     """
     need = np.zeros(len(goals[0]))
     for foot, goal in zip(feet, goals):
-        length = foot.longest
+        length = foot.max_reach
         level = np.linalg.norm(goal[:, :2] - foot.hip[:, :2], axis=1)
         highest = goal[:, 2] + np.sqrt(np.maximum(length**2 - level**2, 0.0))
         lacks = np.where(level < length, foot.hip[:, 2] - highest, most)
-        need = np.maximum(need, np.where(foot.carries > 0, lacks, 0.0))
-    return spread_over(np.clip(need, 0.0, most), spread)
+        need = np.maximum(need, np.where(foot.contact_weight > 0, lacks, 0.0))
+    return spread_peaks(np.clip(need, 0.0, most), spread)
 
 
-def spread_over(need: np.ndarray, reach: int) -> np.ndarray:
+def spread_peaks(need: np.ndarray, reach: int) -> np.ndarray:
     """Build a smooth curve (T,) that is nowhere below `need` (T,), widened by `reach` frames."""
     return hann_smooth(maximum_filter1d(need, 2 * reach + 1, mode="nearest"), reach)
 
 
-def lacking(foot: Foot, goal: np.ndarray, drop: np.ndarray) -> np.ndarray:
+def measure_shortfall(foot: Foot, goal: np.ndarray, drop: np.ndarray) -> np.ndarray:
     """Measure the metres (T,) that the leg of a foot in contact is too short for its goal (T, 3); drop (T,) of the
     pelvis.
     """
     reach = goal - foot.hip + drop[:, None] * [0.0, 0.0, 1.0]
-    return np.where(foot.carries > 0, np.linalg.norm(reach, axis=1) - foot.longest, 0.0)
+    return np.where(foot.contact_weight > 0, np.linalg.norm(reach, axis=1) - foot.max_reach, 0.0)
 
 
-def _within_reach(foot: Foot, goal: np.ndarray, drop: np.ndarray) -> np.ndarray:
+def _limit_to_reach(foot: Foot, goal: np.ndarray, drop: np.ndarray) -> np.ndarray:
     """Limit the goals (T, 3) of feet in the air to the leg's length, or to its length in the recording."""
     hip = foot.hip - drop[:, None] * [0.0, 0.0, 1.0]
     reach = goal - hip
     far = np.linalg.norm(reach, axis=1)
-    own = np.minimum(np.linalg.norm(foot.heel - foot.hip, axis=1), foot.longest)
-    longest = np.maximum(foot.length - SPARE_ALOFT, own)
-    over = np.maximum(far - longest, 0.0) * (1.0 - np.minimum(foot.carries, 1.0))
+    own = np.minimum(np.linalg.norm(foot.heel - foot.hip, axis=1), foot.max_reach)
+    longest = np.maximum(foot.length - AIR_RESERVE, own)
+    over = np.maximum(far - longest, 0.0) * (1.0 - np.minimum(foot.contact_weight, 1.0))
     return goal - reach * (over / far)[:, None]

@@ -8,10 +8,10 @@ import numpy as np
 
 from ..base.errors import InputError
 from . import quaternion
-from .humanoid import identify
+from .humanoid import identify_joints
 from .motion import Motion, forward_kinematics
 
-USUAL_ALONG, USUAL_OFF = 0.62, 0.035
+BALL_ALONG_HAND, BALL_OFF_PALM = 0.62, 0.035
 """The centre of a ball that is held ready to be thrown: as a share of the distance from wrist to fingertip, and metres
 out of the palm; it lies on the fingers' middle parts."""
 _HAND_OF_ARM = 0.72  # wrist to fingertip against elbow to wrist: 0.108 and 0.146 of the height, Drillis & Contini 1966
@@ -51,16 +51,16 @@ class Hand:
         """(T,) seconds from frame 0."""
         return np.arange(len(self)) / self.fps
 
-    def carried(self, place: np.ndarray) -> np.ndarray:
+    def to_world(self, point: np.ndarray) -> np.ndarray:
         """Return the world positions (T, 3), metres, of a point (3,) of the hand's frame."""
-        return self.origin + np.einsum("tij,j->ti", self.rotation, np.asarray(place, float))
+        return self.origin + np.einsum("tij,j->ti", self.rotation, np.asarray(point, float))
 
-    def taken_back(self, points: np.ndarray) -> np.ndarray:
+    def to_hand(self, points: np.ndarray) -> np.ndarray:
         """Return points (T, 3) m of the world, one a frame, in the hand's frame: (T, 3) metres."""
         return np.einsum("tji,tj->ti", self.rotation, points - self.origin)
 
 
-def hand_of(motion: Motion, side: str) -> Hand:
+def build_hand(motion: Motion, side: str) -> Hand:
     """Build the hand of a solved motion.
 
     Args:
@@ -71,17 +71,17 @@ def hand_of(motion: Motion, side: str) -> Hand:
     Raises:
         InputError: if the skeleton has no such hand or forearm.
     """
-    limb = getattr(identify(motion.skeleton), side)
+    limb = getattr(identify_joints(motion.skeleton), side)
     if limb.hand is None or limb.lower_arm is None:
         raise InputError("release", f"a skeleton without a {side} hand", "joints for the hand and the forearm")
     places, rotations = forward_kinematics(motion)
-    finger, reach = _finger(motion, limb)
+    finger, reach = _measure_finger(motion, limb)
     return Hand(side=side, fps=motion.fps, origin=places[:, limb.hand],
                 rotation=quaternion.to_matrix(rotations[:, limb.hand]), finger=finger, reach=reach,
                 elbow=places[:, limb.lower_arm])  # fmt: skip
 
 
-def _finger(motion: Motion, limb) -> tuple[np.ndarray, float]:
+def _measure_finger(motion: Motion, limb) -> tuple[np.ndarray, float]:
     """Measure the unit direction (3,) of the fingers in the hand's frame, and metres from the wrist to their tips.
 
     Uses the skeleton's own tip where it has a plausible one, else continues the forearm.
@@ -89,7 +89,7 @@ def _finger(motion: Motion, limb) -> tuple[np.ndarray, float]:
     skeleton, hand = motion.skeleton, limb.hand
     forearm = float(np.linalg.norm(skeleton.offsets[hand]))
     usual = _HAND_OF_ARM * forearm
-    tips = _tips(skeleton, hand)
+    tips = _collect_tips(skeleton, hand)
     lengths = np.linalg.norm(tips, axis=-1)
     longest = float(lengths.max(initial=0.0))
     if longest > 0.1 * usual:
@@ -97,7 +97,7 @@ def _finger(motion: Motion, limb) -> tuple[np.ndarray, float]:
     return skeleton.offsets[hand] / max(forearm, 1e-9), usual
 
 
-def _tips(skeleton, hand: int) -> np.ndarray:
+def _collect_tips(skeleton, hand: int) -> np.ndarray:
     """Collect the positions (N, 3) m of the joints and end sites below the hand, at rest, in the hand's frame."""
     at = {hand: np.zeros(3)}
     for joint in range(hand + 1, len(skeleton)):
@@ -107,7 +107,7 @@ def _tips(skeleton, hand: int) -> np.ndarray:
     return np.array([place for joint, place in at.items() if joint != hand] + ends).reshape(-1, 3)
 
 
-def usual_centre(finger: np.ndarray, reach: float, palm: np.ndarray | None = None) -> np.ndarray:
+def estimate_ball_centre(finger: np.ndarray, reach: float, palm: np.ndarray | None = None) -> np.ndarray:
     """Estimate where the centre of a ball lies in a hand.
 
     Args:
@@ -117,4 +117,4 @@ def usual_centre(finger: np.ndarray, reach: float, palm: np.ndarray | None = Non
     Returns:
         (3,) metres, hand frame.
     """
-    return USUAL_ALONG * reach * finger + (0.0 if palm is None else USUAL_OFF * np.asarray(palm, float))
+    return BALL_ALONG_HAND * reach * finger + (0.0 if palm is None else BALL_OFF_PALM * np.asarray(palm, float))

@@ -18,7 +18,7 @@ import numpy as np
 from ..base.errors import InputError
 from ..base.vectors import arctan2
 from . import quaternion
-from .motion import Motion, forward_kinematics, pose_kinematics
+from .motion import Motion, forward_kinematics, compute_pose
 from .retargeting import structure
 from .skeleton import Skeleton
 
@@ -103,7 +103,7 @@ class Humanoid:
         return self.neck_or_chest if self.head is None else self.head
 
 
-def side_and_part(name: str) -> tuple[str, str]:
+def split_joint_name(name: str) -> tuple[str, str]:
     """Split a joint's name into its side ("left", "right", "") and the rest without prefix, blanks and case."""
     plain = re.sub(r"^.*[:|]", "", name)
     while _PREFIX.search(plain):
@@ -120,7 +120,7 @@ def side_and_part(name: str) -> tuple[str, str]:
     return "", re.sub(r"[_\-. ]", "", plain).lower()
 
 
-def identify(skeleton: Skeleton) -> Humanoid:
+def identify_joints(skeleton: Skeleton) -> Humanoid:
     """Identify the meaning of a skeleton's joints, by names, else by the structure of its rest pose.
 
     Args:
@@ -131,10 +131,10 @@ def identify(skeleton: Skeleton) -> Humanoid:
         InputError: if no legs can be found.
     """
     tips = (skeleton.end_parents, skeleton.end_offsets.tobytes())
-    return _identify(skeleton.names, skeleton.parents, skeleton.offsets.tobytes(), tips)
+    return _identify_from_arrays(skeleton.names, skeleton.parents, skeleton.offsets.tobytes(), tips)
 
 
-def identify_posed(motion: Motion) -> Humanoid:
+def identify_posed_joints(motion: Motion) -> Humanoid:
     """Identify joints as `identify_joints` does, but tell left from right by recorded poses where names say nothing.
 
     A rest pose may be folded up; recorded feet point forward and knees bend backward.
@@ -147,41 +147,41 @@ def identify_posed(motion: Motion) -> Humanoid:
         InputError: if no legs can be found.
     """
     skeleton = motion.skeleton
-    parts = [side_and_part(name) for name in skeleton.names]
-    roles = _named(parts)
+    parts = [split_joint_name(name) for name in skeleton.names]
+    roles = _find_named_roles(parts)
     if not _has_legs(roles):
         frames = np.unique(np.linspace(0, len(motion) - 1, 64).astype(int))
-        roles = _fitting(_found(skeleton, motion.root_positions[frames], motion.rotations[frames]), roles)
-    return assemble(skeleton.names, skeleton.parents, roles)
+        roles = _choose_roles(_find_structural_roles(skeleton, motion.root_positions[frames], motion.rotations[frames]), roles)
+    return build_humanoid(skeleton.names, skeleton.parents, roles)
 
 
 @lru_cache(maxsize=256)
-def _identify(names: tuple[str, ...], parents: tuple[int, ...], offsets: bytes, tips: tuple) -> Humanoid:
+def _identify_from_arrays(names: tuple[str, ...], parents: tuple[int, ...], offsets: bytes, tips: tuple) -> Humanoid:
     """Identify joints from hashable parts of a skeleton, so that results can be cached."""
-    roles = _named([side_and_part(name) for name in names])
+    roles = _find_named_roles([split_joint_name(name) for name in names])
     if not _has_legs(roles):
         ends = np.frombuffer(tips[1]).reshape(-1, 3)
         skeleton = Skeleton(names, parents, np.frombuffer(offsets).reshape(-1, 3), tips[0], ends)
-        roles = _fitting(_found(skeleton, np.zeros((1, 3)), quaternion.identity(1, len(names))), roles)
-    return assemble(names, parents, roles)
+        roles = _choose_roles(_find_structural_roles(skeleton, np.zeros((1, 3)), quaternion.identity(1, len(names))), roles)
+    return build_humanoid(names, parents, roles)
 
 
-def _found(skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray) -> dict[str, int] | None:
+def _find_structural_roles(skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray) -> dict[str, int] | None:
     """Find roles by structure from poses: root (T, 3) metres, local rotations (T, J, 4)."""
-    places, world = pose_kinematics(skeleton, root, rotations)
+    places, world = compute_pose(skeleton, root, rotations)
     tips = places.copy()
     for joint, offset in zip(skeleton.end_parents, skeleton.end_offsets):
         tips[:, joint] = places[:, joint] + quaternion.rotate(world[:, joint], offset)
-    return structure.find(skeleton.parents, places, tips)
+    return structure.find_roles(skeleton.parents, places, tips)
 
 
-def _fitting(found: dict[str, int] | None, named: dict[str, int]) -> dict[str, int]:
+def _choose_roles(found: dict[str, int] | None, named: dict[str, int]) -> dict[str, int]:
     """Choose the roles found by structure, or the named ones if structure finds none or takes a named arm for a leg."""
     arms = {joint for role, joint in named.items() if role.endswith(("arm", "hand"))}
     return named if not found or arms & {found[role] for role in _LEG_ROLES} else found
 
 
-def assemble(names: tuple[str, ...], parents: tuple[int, ...], roles: Mapping[str, int]) -> Humanoid:
+def build_humanoid(names: tuple[str, ...], parents: tuple[int, ...], roles: Mapping[str, int]) -> Humanoid:
     """Build a humanoid from known roles.
 
     Hips, spine, neck and head that are not named are found from where legs and arms hang.
@@ -204,26 +204,26 @@ def assemble(names: tuple[str, ...], parents: tuple[int, ...], roles: Mapping[st
         )
     legs = [roles["left upper_leg"], roles["right upper_leg"]]
     arms = [roles[part] for part in ("left upper_arm", "right upper_arm") if part in roles]
-    crossing = structure.common_ancestor(parents, legs)
-    if "hips" not in roles or not set(legs) <= set(structure.below(parents, roles["hips"])):
+    crossing = structure.find_common_ancestor(parents, legs)
+    if "hips" not in roles or not set(legs) <= set(structure.list_descendants(parents, roles["hips"])):
         roles["hips"] = crossing
-    if arms and roles["hips"] not in structure.path(parents, arms[0]):
-        roles["hips"] = structure.common_ancestor(parents, [*legs, *arms])
-    chest = structure.common_ancestor(parents, arms) if len(arms) == 2 else None
+    if arms and roles["hips"] not in structure.list_ancestors(parents, arms[0]):
+        roles["hips"] = structure.find_common_ancestor(parents, [*legs, *arms])
+    chest = structure.find_common_ancestor(parents, arms) if len(arms) == 2 else None
     if chest is not None:
-        roles.update({**structure.neck_and_head(parents, chest, set(roles.values()), roles), **roles})
+        roles.update({**structure.find_neck_and_head(parents, chest, set(roles.values()), roles), **roles})
     top = roles.get("neck", roles.get("head"))
     spine = structure.list_between(parents, roles["hips"], top) if top is not None else []
     if not spine and chest is not None and chest != roles["hips"]:
         spine = [*structure.list_between(parents, roles["hips"], chest), chest]
     limbs = {side: Limb(**{part: roles.get(f"{side} {part}") for part in _LIMB_NAMES}) for side in ("left", "right")}
-    mirror = _mirror([side_and_part(name) for name in names], parents, roles)
+    mirror = _find_mirror_joints([split_joint_name(name) for name in names], parents, roles)
     neck, head = roles.get("neck"), roles.get("head")
     return Humanoid(hips=roles["hips"], spine=tuple(spine), neck=neck, head=head, left=limbs["left"],
                     right=limbs["right"], mirror=mirror)
 
 
-def roles_of(body: Humanoid) -> dict[str, int]:
+def list_roles(body: Humanoid) -> dict[str, int]:
     """List every role that the body has with its joint, without the spine: the inverse of `build_humanoid`."""
     found = {"hips": body.hips, "neck": body.neck, "head": body.head}
     for side, limb in (("left", body.left), ("right", body.right)):
@@ -238,15 +238,15 @@ def _has_legs(roles: Mapping[str, int]) -> bool:
     return all(role in roles for role in _LEG_ROLES)
 
 
-def _named(parts) -> dict[str, int]:
+def _find_named_roles(parts) -> dict[str, int]:
     """Find the roles that names show."""
-    roles: dict[str, int | None] = {centre: _centre(parts, centre) for centre in _CENTRE_NAMES}
+    roles: dict[str, int | None] = {centre: _find_centre_joint(parts, centre) for centre in _CENTRE_NAMES}
     for side in ("left", "right"):
-        roles.update({f"{side} {part}": joint for part, joint in _limb(parts, side).items()})
+        roles.update({f"{side} {part}": joint for part, joint in _find_limb(parts, side).items()})
     return {role: joint for role, joint in roles.items() if joint is not None}
 
 
-def _limb(parts, side: str) -> dict[str, int | None]:
+def _find_limb(parts, side: str) -> dict[str, int | None]:
     """Find the joints of one side's limb parts by name; None for a part without a name."""
     places = {rest: i for i, (s, rest) in reversed(list(enumerate(parts))) if s == side}
     found = {part: next((places[o] for o in names if o in places), None) for part, names in _LIMB_NAMES.items()}
@@ -258,22 +258,22 @@ def _limb(parts, side: str) -> dict[str, int | None]:
     return found
 
 
-def _centre(parts, part: str) -> int | None:
+def _find_centre_joint(parts, part: str) -> int | None:
     places = {rest: i for i, (s, rest) in reversed(list(enumerate(parts))) if not s}
     return next((places[o] for o in _CENTRE_NAMES[part] if o in places), None)
 
 
-def _mirror(parts, parents, roles: Mapping[str, int]) -> tuple[int, ...]:
+def _find_mirror_joints(parts, parents, roles: Mapping[str, int]) -> tuple[int, ...]:
     """Find for each joint the one on the other side (itself where there is none)."""
     other = {"left": "right", "right": "left", "": ""}
     places = {part: i for i, part in reversed(list(enumerate(parts)))}
     if any(side for side, _ in parts):
         return tuple(places.get((other[side], rest), i) if side else i for i, (side, rest) in enumerate(parts))
     pairs = [(roles[role], roles.get("right" + role[4:])) for role in roles if role.startswith("left ")]
-    return structure.mirrored(parents, [(a, b) for a, b in pairs if b is not None])
+    return structure.find_mirror_joints(parents, [(a, b) for a, b in pairs if b is not None])
 
 
-def heading_from_positions(skeleton: Skeleton, positions: np.ndarray) -> np.ndarray:
+def compute_heading_from_positions(skeleton: Skeleton, positions: np.ndarray) -> np.ndarray:
     """Compute the heading of a body about Z.
 
     The axis across the body is the sum of the vectors from right to left upper legs and from right to left upper arms,
@@ -288,32 +288,32 @@ def heading_from_positions(skeleton: Skeleton, positions: np.ndarray) -> np.ndar
     Raises:
         InputError: if the skeleton has no legs.
     """
-    body = identify(skeleton)
+    body = identify_joints(skeleton)
     across = positions[..., body.left.upper_leg, :] - positions[..., body.right.upper_leg, :]
     if body.left.upper_arm is not None and body.right.upper_arm is not None:
         across = across + positions[..., body.left.upper_arm, :] - positions[..., body.right.upper_arm, :]
     return arctan2(-across[..., 0], across[..., 1])
 
 
-def heading(motion: Motion) -> np.ndarray:
+def compute_heading(motion: Motion) -> np.ndarray:
     """Compute the heading about Z of every frame: (T,) radians, unwrapped."""
     positions, _ = forward_kinematics(motion)
-    return np.unwrap(heading_from_positions(motion.skeleton, positions))
+    return np.unwrap(compute_heading_from_positions(motion.skeleton, positions))
 
 
 LEG_SHARE = 0.485
 """Length of upper plus lower leg as a share of the stature (`adult`, after Drillis and Contini 1966)."""
 
 
-def stature(skeleton: Skeleton) -> float:
+def estimate_stature(skeleton: Skeleton) -> float:
     """Estimate the stature in metres of a body with these legs; recordings seldom have a joint at the top of the head.
     """
-    return leg_length(skeleton) / LEG_SHARE
+    return measure_leg_length(skeleton) / LEG_SHARE
 
 
-def leg_length(skeleton: Skeleton) -> float:
+def measure_leg_length(skeleton: Skeleton) -> float:
     """Measure the mean length in metres of upper plus lower legs."""
-    body = identify(skeleton)
+    body = identify_joints(skeleton)
     lengths = [
         np.linalg.norm(skeleton.offsets[limb.lower_leg]) + np.linalg.norm(skeleton.offsets[limb.foot])
         for limb in (body.left, body.right)

@@ -15,18 +15,18 @@ from typing import Any
 import numpy as np
 
 from ..base.errors import InputError
-from ..base.vectors import cross, unit_vectors
+from ..base.vectors import cross_product, unit_vectors
 from . import quaternion
-from .motion import pose_kinematics
-from .retargeting.structure import list_between, path
+from .motion import compute_pose
+from .retargeting.structure import list_between, list_ancestors
 from .skeleton import Skeleton
 
 # below this distance of the knee from the line hip-ankle (share of the limb's length) its direction comes from other
 # frames
-CLEAR_BEND = 0.06
+MIN_BEND = 0.06
 
 
-def soft_distance(distance: np.ndarray, longest: np.ndarray, soft: float | np.ndarray, xp=np) -> np.ndarray:
+def soften_distance(distance: np.ndarray, longest: np.ndarray, soft: float | np.ndarray, xp=np) -> np.ndarray:
     """Soften a limb's reach near full extension, so that a knee does not snap straight.
 
     The result equals the requested distance up to `soft` below the limb's length and then approaches that length (C1).
@@ -44,7 +44,7 @@ def soft_distance(distance: np.ndarray, longest: np.ndarray, soft: float | np.nd
     return xp.where(distance > start, longest - soft * xp.exp(-beyond / soft), distance)
 
 
-def inner_angle(upper, lower, length) -> np.ndarray:
+def compute_inner_angle(upper, lower, length) -> np.ndarray:
     """Compute the angle between two bones at the joint between them, by the law of cosines.
 
     Args:
@@ -56,7 +56,7 @@ def inner_angle(upper, lower, length) -> np.ndarray:
     return np.arccos(np.clip((upper**2 + lower**2 - length**2) / (2.0 * upper * lower), -1.0, 1.0))
 
 
-def bend(
+def solve_limb_bend(
     top: np.ndarray, target: np.ndarray, upper: np.ndarray, lower: np.ndarray, pole: np.ndarray,
     soft: float | np.ndarray = 0.01,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -76,20 +76,20 @@ def bend(
         direction of the limb x pole.
     """
     line = target - top
-    asked = np.linalg.norm(line, axis=-1)
+    target_distance = np.linalg.norm(line, axis=-1)
     direction = unit_vectors(line, np.array([0.0, 0.0, -1.0]))
     nearest = np.abs(upper - lower) + 0.02 * (upper + lower)
-    reach = np.maximum(soft_distance(asked, upper + lower, soft), nearest)
+    reach = np.maximum(soften_distance(target_distance, upper + lower, soft), nearest)
     across = pole - np.sum(pole * direction, axis=-1, keepdims=True) * direction
-    across = _unit_across(across, direction)
+    across = _normalize_across(across, direction)
     # position of the middle joint along the line and its height off it, from the triangle's three sides
     along = (upper**2 - lower**2 + reach**2) / (2.0 * reach)
     height = np.sqrt(np.maximum(upper**2 - along**2, 0.0))
     middle = top + along[..., None] * direction + height[..., None] * across
-    return middle, top + reach[..., None] * direction, cross(direction, across)
+    return middle, top + reach[..., None] * direction, cross_product(direction, across)
 
 
-def bone_frame(direction: np.ndarray, hinge: np.ndarray) -> np.ndarray:
+def build_bone_frame(direction: np.ndarray, hinge: np.ndarray) -> np.ndarray:
     """Build the rotations (..., 4) that turn -Z onto a bone and +Y onto the part of -hinge that is square to it.
 
     A leg that hangs straight down with its knee pointing along +X has direction -Z and hinge -Y: the identity.
@@ -101,13 +101,13 @@ def bone_frame(direction: np.ndarray, hinge: np.ndarray) -> np.ndarray:
         (..., 4) unit quaternions.
     """
     left = -(hinge - np.sum(hinge * direction, axis=-1, keepdims=True) * direction)
-    left = _unit_across(left, direction)
-    forward = cross(left, -direction)
+    left = _normalize_across(left, direction)
+    forward = cross_product(left, -direction)
     return quaternion.from_matrix(np.stack([forward, left, -direction], axis=-1))
 
 
 @dataclass(frozen=True, eq=False)
-class Reached:
+class LimbSolution:
     """The result of two-bone inverse kinematics.
 
     Attributes:
@@ -119,11 +119,11 @@ class Reached:
     miss: np.ndarray
 
 
-def two_bone(
+def solve_two_bone(
     skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray, joints: tuple[int, int, int], target: np.ndarray, *,
     end_rotation: np.ndarray | None = None, keep_end_rotation: bool = True, pole: np.ndarray | None = None,
     soft: float | np.ndarray = 0.01,
-) -> Reached:
+) -> LimbSolution:
     """Solve the local rotations with which a limb's end joint is at a target.
 
     Bones are never stretched; a target out of reach is approached along the line from the upper joint.
@@ -147,19 +147,19 @@ def two_bone(
     Source: Tolani, Goswami and Badler 2000.
     """
     _check_chain(skeleton, joints)
-    places, world = pose_kinematics(skeleton, root, rotations)
+    places, world = compute_pose(skeleton, root, rotations)
     end: dict[str, Any] = {"end_rotation": end_rotation, "keep_end_rotation": keep_end_rotation}
-    found, miss = bent_limb(skeleton, places, world, joints, target, pole=pole, soft=soft, **end)
+    found, miss = solve_posed_limb(skeleton, places, world, joints, target, pole=pole, soft=soft, **end)
     out = np.array(rotations, dtype=float)
     for joint, local in found.items():
         out[:, joint] = local
-    return Reached(quaternion.continuous(out), miss)
+    return LimbSolution(quaternion.unify_signs(out), miss)
 
 
-def bent_limb(
+def solve_posed_limb(
     skeleton: Skeleton, places: np.ndarray, world: np.ndarray, joints: tuple[int, int, int], target: np.ndarray, *,
     end_rotation: np.ndarray | None = None, keep_end_rotation: bool = True, pole: np.ndarray | None = None,
-    soft: float | np.ndarray = 0.01, clear: float | np.ndarray = CLEAR_BEND,
+    soft: float | np.ndarray = 0.01, min_bend: float | np.ndarray = MIN_BEND,
 ) -> tuple[dict[int, np.ndarray], np.ndarray]:
     """Solve a limb as `solve_two_bone` does, for a body whose joint positions and world rotations are known.
 
@@ -177,35 +177,35 @@ def bent_limb(
     target = np.asarray(target, dtype=float)
     top, knee, ankle = places[:, upper], places[:, middle], places[:, end]
     lengths = (np.linalg.norm(knee - top, axis=-1), np.linalg.norm(ankle - knee, axis=-1))
-    old_pole = _own_pole(top, knee, ankle, world[:, upper], clear)
-    swing = quaternion.between(ankle - top, target - top)
+    old_pole = _estimate_pole(top, knee, ankle, world[:, upper], min_bend)
+    swing = quaternion.rotation_between(ankle - top, target - top)
     new_pole = quaternion.rotate(swing, old_pole) if pole is None else np.asarray(pole, dtype=float)
-    new_knee, new_ankle, new_hinge = bend(top, target, *lengths, new_pole, soft)
-    old_hinge = cross(unit_vectors(ankle - top, np.array([0.0, 0.0, -1.0])), old_pole)
+    new_knee, new_ankle, new_hinge = solve_limb_bend(top, target, *lengths, new_pole, soft)
+    old_hinge = cross_product(unit_vectors(ankle - top, np.array([0.0, 0.0, -1.0])), old_pole)
     # how much each bone rotates: its new frame (direction, hinge) times the inverse of its old one
-    turns = [
-        quaternion.multiply(_frame_bone(b - a, new_hinge), quaternion.inverse(_frame_bone(d - c, old_hinge)))
+    bone_rotations = [
+        quaternion.multiply(_build_frame_for_bone(b - a, new_hinge), quaternion.inverse(_build_frame_for_bone(d - c, old_hinge)))
         for a, b, c, d in ((top, new_knee, top, knee), (new_knee, new_ankle, knee, ankle))
     ]
     new_world = world.copy()
-    _turn_chain(skeleton, new_world, upper, middle, turns[0])
-    _turn_chain(skeleton, new_world, middle, end, turns[1])
+    _rotate_chain(skeleton, new_world, upper, middle, bone_rotations[0])
+    _rotate_chain(skeleton, new_world, middle, end, bone_rotations[1])
     if end_rotation is not None:
         new_world[:, end] = end_rotation
     elif not keep_end_rotation:
-        new_world[:, end] = quaternion.multiply(turns[1], world[:, end])
+        new_world[:, end] = quaternion.multiply(bone_rotations[1], world[:, end])
     changed = [upper, *list_between(skeleton.parents, upper, end), end]
-    local = {joint: _compute_local(skeleton, new_world, joint) for joint in changed}
+    local = {joint: _compute_local_rotation(skeleton, new_world, joint) for joint in changed}
     return local, np.linalg.norm(new_ankle - target, axis=-1)
 
 
-def _unit_across(v: np.ndarray, direction: np.ndarray) -> np.ndarray:
+def _normalize_across(v: np.ndarray, direction: np.ndarray) -> np.ndarray:
     """Normalize vectors (..., 3); where they have no length take any unit vector square to `direction` (..., 3)."""
     length = np.linalg.norm(v, axis=-1, keepdims=True)
-    return v / length if np.all(length > 1e-9) else unit_vectors(v, _any_normal(direction))
+    return v / length if np.all(length > 1e-9) else unit_vectors(v, _find_normal(direction))
 
 
-def _any_normal(direction: np.ndarray) -> np.ndarray:
+def _find_normal(direction: np.ndarray) -> np.ndarray:
     other = np.where(np.abs(direction[..., :1]) < 0.9, np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0]))
     normal = other - np.sum(other * direction, axis=-1, keepdims=True) * direction
     return normal / np.linalg.norm(normal, axis=-1, keepdims=True)
@@ -215,29 +215,29 @@ def _check_chain(skeleton: Skeleton, joints: tuple[int, int, int]) -> None:
     """Check that each of the joints hangs below the one before (InputError)."""
     upper, middle, end = joints
     for high, low in ((upper, middle), (middle, end)):
-        if high == low or high not in path(skeleton.parents, low):
+        if high == low or high not in list_ancestors(skeleton.parents, low):
             raise InputError("limb", f"{skeleton.names[low]} does not hang below {skeleton.names[high]}", "a chain")
 
 
-def _turn_chain(skeleton: Skeleton, world: np.ndarray, high: int, low: int, turn: np.ndarray) -> None:
+def _rotate_chain(skeleton: Skeleton, world: np.ndarray, high: int, low: int, rotation: np.ndarray) -> None:
     """Rotate all joints from `high` (included) down to `low` (not included) in `world` (T, J, 4)."""
     for joint in (high, *list_between(skeleton.parents, high, low)):
-        world[:, joint] = quaternion.multiply(turn, world[:, joint])
+        world[:, joint] = quaternion.multiply(rotation, world[:, joint])
 
 
-def _compute_local(skeleton: Skeleton, world: np.ndarray, joint: int) -> np.ndarray:
+def _compute_local_rotation(skeleton: Skeleton, world: np.ndarray, joint: int) -> np.ndarray:
     """Return the local rotation (T, 4) of a joint from world rotations (T, J, 4)."""
     parent = skeleton.parents[joint]
     return world[:, joint] if parent < 0 else quaternion.multiply(quaternion.inverse(world[:, parent]), world[:, joint])
 
 
-def _frame_bone(direction: np.ndarray, hinge: np.ndarray) -> np.ndarray:
+def _build_frame_for_bone(direction: np.ndarray, hinge: np.ndarray) -> np.ndarray:
     """Build the frame of a bone of any length (..., 3)."""
-    return bone_frame(unit_vectors(direction, np.array([0.0, 0.0, -1.0])), hinge)
+    return build_bone_frame(unit_vectors(direction, np.array([0.0, 0.0, -1.0])), hinge)
 
 
-def _own_pole(
-    top: np.ndarray, knee: np.ndarray, ankle: np.ndarray, upper_world: np.ndarray, clear: float | np.ndarray
+def _estimate_pole(
+    top: np.ndarray, knee: np.ndarray, ankle: np.ndarray, upper_world: np.ndarray, min_bend: float | np.ndarray
 ) -> np.ndarray:
     """Estimate the direction (T, 3) in which the middle joint points in the given pose, unit, square to the line top-
     ankle.
@@ -257,7 +257,7 @@ def _own_pole(
     steady = quaternion.rotate(upper_world, mean / np.linalg.norm(mean))
     steady = unit_vectors(steady - np.sum(steady * line, axis=-1, keepdims=True) * line, off)
     # a frame that bends the other way, as blended poses may, gets no weight: its knee would flip
-    right_way = np.sum(unit_vectors(off, steady) * steady, axis=-1, keepdims=True)
-    weight = np.clip(bent / np.reshape(clear, (-1, 1)), 0.0, 1.0) ** 2 * np.clip(2.0 * right_way, 0.0, 1.0)
+    agreement = np.sum(unit_vectors(off, steady) * steady, axis=-1, keepdims=True)
+    weight = np.clip(bent / np.reshape(min_bend, (-1, 1)), 0.0, 1.0) ** 2 * np.clip(2.0 * agreement, 0.0, 1.0)
     mixed = weight * unit_vectors(off, steady) + (1.0 - weight) * steady
     return unit_vectors(mixed, steady)

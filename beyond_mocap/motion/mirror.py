@@ -29,17 +29,17 @@ import numpy as np
 
 from ..base.vectors import unit_vector
 from . import quaternion
-from .humanoid import Humanoid, identify
-from .motion import Motion, local_rotations, pose_kinematics
+from .humanoid import Humanoid, identify_joints
+from .motion import Motion, compute_local_rotations, compute_pose
 from .skeleton import Skeleton
 
 _FLIPS = np.stack([np.diag(signs) for signs in ((-1.0, 1, 1), (1.0, -1, 1), (1.0, 1, -1), (-1.0, -1, -1))])
-_WORLD = _FLIPS[1]
-_PULL = 1e-3  # weight of D_j against the bones: decides what bones leave open, and moves them by less than 0.01 degrees
+_WORLD_MIRROR = _FLIPS[1]
+_PULL_WEIGHT = 1e-3  # weight of D_j against the bones: decides what bones leave open, and moves them by less than 0.01 degrees
 _SYMMETRIC = 0.1  # squared misfit of the rest pose with its mirror image, over its bones' squared lengths
 _GEOMETRY_WEIGHT = 4.0
-_CHANGE = 3.0  # lower cost that another D than the parent's needs to be chosen
-_FRAMES = 256  # frames of a motion that are looked at
+_CHANGE_COST = 3.0  # lower cost that another D than the parent's needs to be chosen
+_SAMPLED_FRAMES = 256  # frames of a motion that are looked at
 
 
 def mirror(motion: Motion) -> Motion:
@@ -56,41 +56,41 @@ def mirror(motion: Motion) -> Motion:
         InputError: if the skeleton has no legs.
     Source: Faustino 2024, section 3.1.2.
     """
-    body = identify(motion.skeleton)
-    corrections = quaternion.from_matrix(_WORLD @ _correspondence(motion, body))
-    _, world = pose_kinematics(motion.skeleton, motion.root_positions, motion.rotations)
+    body = identify_joints(motion.skeleton)
+    corrections = quaternion.from_matrix(_WORLD_MIRROR @ _solve_correspondence(motion, body))
+    _, world = compute_pose(motion.skeleton, motion.root_positions, motion.rotations)
     # quaternion form (w, x, y, z) of M R M:
     # M R M keeps the angle; its axis, a pseudovector, keeps its y and turns the others
-    turned = world[:, list(body.mirror)] * (1.0, -1.0, 1.0, -1.0)
-    world = quaternion.multiply(turned, corrections)
-    local = local_rotations(motion.skeleton, world)
-    return Motion(motion.skeleton, motion.root_positions * np.diag(_WORLD), local, motion.fps)
+    mirrored = world[:, list(body.mirror)] * (1.0, -1.0, 1.0, -1.0)
+    world = quaternion.multiply(mirrored, corrections)
+    local = compute_local_rotations(motion.skeleton, world)
+    return Motion(motion.skeleton, motion.root_positions * np.diag(_WORLD_MIRROR), local, motion.fps)
 
 
-def _correspondence(motion: Motion, body: Humanoid) -> np.ndarray:
+def _solve_correspondence(motion: Motion, body: Humanoid) -> np.ndarray:
     """Solve C_j for all joints: (J, 3, 3), orthogonal, determinant -1."""
-    pairs = [_bone_pairs(motion.skeleton, body, joint) for joint in range(len(motion.skeleton))]
-    rest = _rest_mirror(motion.skeleton, body)
+    pairs = [_collect_bone_pairs(motion.skeleton, body, joint) for joint in range(len(motion.skeleton))]
+    rest = _compute_rest_mirror(motion.skeleton, body)
     bones, images = (np.concatenate(side) for side in zip(*pairs))
     if np.sum((bones @ rest - images) ** 2) <= _SYMMETRIC * np.sum(bones**2):
         chosen = [rest] * len(pairs)
     else:
-        chosen = _chosen(motion, body, rest, pairs)
-    return np.stack([_procrustes(*pair, usual) for pair, usual in zip(pairs, chosen)])
+        chosen = _choose_reflections(motion, body, rest, pairs)
+    return np.stack([_fit_reflection(*pair, usual) for pair, usual in zip(pairs, chosen)])
 
 
-def _rest_mirror(skeleton: Skeleton, body: Humanoid) -> np.ndarray:
+def _compute_rest_mirror(skeleton: Skeleton, body: Humanoid) -> np.ndarray:
     """Return the mirror (3, 3) of the rest pose: the reflection across the line from hip to hip."""
-    rest, _ = pose_kinematics(skeleton, np.zeros(3), quaternion.identity(len(skeleton)))
+    rest, _ = compute_pose(skeleton, np.zeros(3), quaternion.identity(len(skeleton)))
     across = rest[body.left.upper_leg] - rest[body.right.upper_leg]
     across = unit_vector(across)
     return np.eye(3) - 2.0 * np.outer(across, across)
 
 
-def _chosen(motion: Motion, body: Humanoid, rest: np.ndarray, pairs) -> list[np.ndarray]:
+def _choose_reflections(motion: Motion, body: Humanoid, rest: np.ndarray, pairs) -> list[np.ndarray]:
     """Choose D_j (3, 3) for all joints where the rest pose is not symmetric; `pairs` as from `_collect_bone_pairs`."""
-    usual = np.stack([rest, *_FLIPS])
-    frames = np.unique(np.linspace(0, len(motion) - 1, _FRAMES).astype(int))
+    candidates = np.stack([rest, *_FLIPS])
+    frames = np.unique(np.linspace(0, len(motion) - 1, _SAMPLED_FRAMES).astype(int))
     mean = quaternion.to_matrix(motion.rotations[frames]).mean(axis=0)
     chosen: list[np.ndarray] = []
     for joint, partner in enumerate(body.mirror):
@@ -98,11 +98,11 @@ def _chosen(motion: Motion, body: Humanoid, rest: np.ndarray, pairs) -> list[np.
             chosen.append(chosen[partner])
             continue
         before = chosen[motion.skeleton.parents[joint]] if joint else None
-        chosen.append(_choose(usual, pairs[joint], before, mean[joint], mean[partner]))
+        chosen.append(_choose_reflection(candidates, pairs[joint], before, mean[joint], mean[partner]))
     return chosen
 
 
-def _bone_pairs(skeleton: Skeleton, body: Humanoid, joint: int) -> tuple[np.ndarray, np.ndarray]:
+def _collect_bone_pairs(skeleton: Skeleton, body: Humanoid, joint: int) -> tuple[np.ndarray, np.ndarray]:
     """Collect the offsets (B, 3) in metres of the bones that start in `joint`, and of the matching ones of its partner.
     """
     partner = body.mirror[joint]
@@ -117,7 +117,7 @@ def _bone_pairs(skeleton: Skeleton, body: Humanoid, joint: int) -> tuple[np.ndar
     return bones[:, 0], bones[:, 1]
 
 
-def _choose(usual, pair, before, mean, partner_mean) -> np.ndarray:
+def _choose_reflection(candidates, pair, parent_reflection, mean, partner_mean) -> np.ndarray:
     """Choose the D (3, 3) of one joint from the candidates (D, 3, 3).
 
     In the mirrored body a local rotation is C_parent^-1 L_p C_j, which should look like L_j on average.
@@ -133,19 +133,19 @@ def _choose(usual, pair, before, mean, partner_mean) -> np.ndarray:
     """
     bones, images = pair
     length = max(np.sum(bones**2), 1e-12)
-    misfit = np.sum((bones @ usual.transpose(0, 2, 1) - images) ** 2, axis=(1, 2)) / length
+    misfit = np.sum((bones @ candidates.transpose(0, 2, 1) - images) ** 2, axis=(1, 2)) / length
     cost = _GEOMETRY_WEIGHT * misfit
-    if before is not None:
-        cost = cost + np.sum((before.T @ partner_mean @ usual - mean) ** 2, axis=(1, 2))
-        cost = cost - _CHANGE * np.all(usual == before, axis=(1, 2))
-    return usual[np.argmin(cost)]
+    if parent_reflection is not None:
+        cost = cost + np.sum((parent_reflection.T @ partner_mean @ candidates - mean) ** 2, axis=(1, 2))
+        cost = cost - _CHANGE_COST * np.all(candidates == parent_reflection, axis=(1, 2))
+    return candidates[np.argmin(cost)]
 
 
-def _procrustes(bones: np.ndarray, images: np.ndarray, pull: np.ndarray) -> np.ndarray:
+def _fit_reflection(bones: np.ndarray, images: np.ndarray, preferred: np.ndarray) -> np.ndarray:
     """Fit the orthogonal matrix of determinant -1 that carries bones (B, 3) to images (B, 3); `preferred` decides the
     rest.
     """
     # the same scale for a joint and its partner, so that their matrices are inverse to each other
     scale = np.sqrt(np.sum(bones**2) * np.sum(images**2)) or 1.0
-    u, _, v = np.linalg.svd(images.T @ bones / scale + _PULL * pull)
+    u, _, v = np.linalg.svd(images.T @ bones / scale + _PULL_WEIGHT * preferred)
     return u @ np.diag([1.0, 1.0, -np.linalg.det(u) * np.linalg.det(v)]) @ v

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..base.errors import InputError
 from . import quaternion
-from .skeleton import Skeleton, frozen_array
+from .skeleton import Skeleton, freeze_array
 
 _CUBIC_REACH = 8
 """Frames to either side on which a value between two frames depends; a spline's memory fades by 0.27 a frame."""
@@ -35,8 +35,8 @@ class Motion:
     fps: float
 
     def __post_init__(self):
-        root = frozen_array(self.root_positions)
-        rotations = frozen_array(quaternion.continuous(_unit(self.rotations)))
+        root = freeze_array(self.root_positions)
+        rotations = freeze_array(quaternion.unify_signs(_normalize_rotations(self.rotations)))
         if root.ndim != 2 or root.shape[1] != 3 or rotations.shape != (len(root), len(self.skeleton), 4):
             raise InputError(
                 "motion", f"root {root.shape}, rotations {rotations.shape}", f"(T, 3) and (T, {len(self.skeleton)}, 4)"
@@ -60,19 +60,19 @@ class Motion:
         return replace(self, root_positions=self.root_positions[start:stop], rotations=self.rotations[start:stop])
 
 
-def _unit(q: np.ndarray) -> np.ndarray:
+def _normalize_rotations(q: np.ndarray) -> np.ndarray:
     """Normalize quaternions, but leave unit ones as they are: dividing again would change the last bits at every copy.
     """
     q = np.asarray(q, dtype=float)
-    return q if np.all(np.abs(np.sum(q * q, axis=-1) - 1.0) < 1e-12) else quaternion.normalized(q)
+    return q if np.all(np.abs(np.sum(q * q, axis=-1) - 1.0) < 1e-12) else quaternion.normalize(q)
 
 
 def forward_kinematics(motion: Motion) -> tuple[np.ndarray, np.ndarray]:
     """Compute world positions (T, J, 3) in metres and world rotations (T, J, 4) of all joints."""
-    return pose_kinematics(motion.skeleton, motion.root_positions, motion.rotations)
+    return compute_pose(motion.skeleton, motion.root_positions, motion.rotations)
 
 
-def pose_kinematics(skeleton: Skeleton, root: np.ndarray, local: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def compute_pose(skeleton: Skeleton, root: np.ndarray, local: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Compute world positions and rotations of poses.
 
     Works joint by joint on component-first arrays: one contiguous run per component is what makes numpy fast here.
@@ -100,14 +100,14 @@ def pose_kinematics(skeleton: Skeleton, root: np.ndarray, local: np.ndarray) -> 
         world[joint, 1] = aw * bx + ax * bw + ay * bz - az * by
         world[joint, 2] = aw * by - ax * bz + ay * bw + az * bx
         world[joint, 3] = aw * bz + ax * by - ay * bx + az * bw
-        places[joint] = places[parent] + _turn(world[parent], skeleton.offsets[joint])
+        places[joint] = places[parent] + _rotate_vector(world[parent], skeleton.offsets[joint])
     return (
         places.transpose(2, 0, 1).reshape(*lead, len(skeleton), 3),
         world.transpose(2, 0, 1).reshape(*lead, len(skeleton), 4),
     )
 
 
-def _turn(q: np.ndarray, v: np.ndarray) -> np.ndarray:
+def _rotate_vector(q: np.ndarray, v: np.ndarray) -> np.ndarray:
     """Rotate one constant vector (3,) by component-first rotations (4, N): (3, N)."""
     w, x, y, z = q
     vx, vy, vz = v
@@ -115,7 +115,7 @@ def _turn(q: np.ndarray, v: np.ndarray) -> np.ndarray:
     return np.stack([vx + w * tx + y * tz - z * ty, vy + w * ty + z * tx - x * tz, vz + w * tz + x * ty - y * tx])
 
 
-def local_rotations(skeleton: Skeleton, world: np.ndarray) -> np.ndarray:
+def compute_local_rotations(skeleton: Skeleton, world: np.ndarray) -> np.ndarray:
     """Compute each joint's rotation relative to its parent's.
 
     Args:
@@ -129,7 +129,7 @@ def local_rotations(skeleton: Skeleton, world: np.ndarray) -> np.ndarray:
     return local
 
 
-def world_rotation(skeleton: Skeleton, local: np.ndarray, joint: int) -> np.ndarray:
+def compute_world_rotation(skeleton: Skeleton, local: np.ndarray, joint: int) -> np.ndarray:
     """Compute the world rotation (T, 4) of one joint from local rotations (T, J, 4)."""
     world = local[:, joint]
     while (joint := skeleton.parents[joint]) >= 0:
@@ -137,14 +137,14 @@ def world_rotation(skeleton: Skeleton, local: np.ndarray, joint: int) -> np.ndar
     return world
 
 
-def end_positions(motion: Motion) -> np.ndarray:
+def compute_end_positions(motion: Motion) -> np.ndarray:
     """Compute the world positions (T, E, 3) in metres of the skeleton's tips (BVH End Sites)."""
     positions, rotations = forward_kinematics(motion)
     parents = list(motion.skeleton.end_parents)
     return positions[:, parents] + quaternion.rotate(rotations[:, parents], motion.skeleton.end_offsets)
 
 
-def at_frames(motion: Motion, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def sample_frames(motion: Motion, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Sample a motion at fractional frames: positions linear, rotations slerped.
 
     Args:
@@ -164,7 +164,7 @@ def at_frames(motion: Motion, frames: np.ndarray) -> tuple[np.ndarray, np.ndarra
     return root, quaternion.slerp(motion.rotations[low], motion.rotations[high], weight[:, None])
 
 
-def cubic_at(motion: Motion, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def sample_frames_cubic(motion: Motion, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Sample a motion at fractional frames on cubic splines through its frames.
 
     Linear steps (`sample_frames`) have a corner at every frame. Joints that rotate fast are followed much better by
@@ -190,7 +190,7 @@ def cubic_at(motion: Motion, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray
     near = slice(low, high + 1)
     rows = np.concatenate([motion.root_positions[near], motion.rotations[near].reshape(high + 1 - low, -1)], axis=1)
     found = CubicSpline(np.arange(low, high + 1), rows)(frames)
-    return found[:, :3], quaternion.normalized(found[:, 3:].reshape(len(frames), -1, 4))
+    return found[:, :3], quaternion.normalize(found[:, 3:].reshape(len(frames), -1, 4))
 
 
 def resample(motion: Motion, fps: float) -> Motion:
@@ -205,11 +205,11 @@ def resample(motion: Motion, fps: float) -> Motion:
     if abs(fps - motion.fps) < 1e-9:
         return motion
     count = int(np.floor(motion.duration * fps + 1e-6)) + 1
-    root, rotations = at_frames(motion, np.arange(count) * (motion.fps / fps))
+    root, rotations = sample_frames(motion, np.arange(count) * (motion.fps / fps))
     return Motion(motion.skeleton, root, rotations, fps)
 
 
-def place(motion: Motion, angle: float | np.ndarray = 0.0, offset=(0.0, 0.0, 0.0)) -> Motion:
+def place_motion(motion: Motion, angle: float | np.ndarray = 0.0, offset=(0.0, 0.0, 0.0)) -> Motion:
     """Rotate a motion about the world's Z axis and move it.
 
     Args:
@@ -219,13 +219,13 @@ def place(motion: Motion, angle: float | np.ndarray = 0.0, offset=(0.0, 0.0, 0.0
     Returns:
         The placed motion.
     """
-    turn = quaternion.about_up(np.broadcast_to(angle, (len(motion),)))
+    rotation = quaternion.from_up_angle(np.broadcast_to(angle, (len(motion),)))
     rotations = motion.rotations.copy()
-    rotations[:, 0] = quaternion.multiply(turn, rotations[:, 0])
-    return replace(motion, root_positions=quaternion.rotate(turn, motion.root_positions) + offset, rotations=rotations)
+    rotations[:, 0] = quaternion.multiply(rotation, rotations[:, 0])
+    return replace(motion, root_positions=quaternion.rotate(rotation, motion.root_positions) + offset, rotations=rotations)
 
 
-def concatenate(motions: list[Motion]) -> Motion:
+def concatenate_motions(motions: list[Motion]) -> Motion:
     """Concatenate motions of one skeleton and rate; nothing is aligned or blended."""
     first = motions[0]
     return replace(

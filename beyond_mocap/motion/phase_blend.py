@@ -14,15 +14,15 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-from ..base.vectors import distance_along
+from ..base.vectors import distances_along
 from . import quaternion
-from .humanoid import heading_from_positions
-from .motion import Motion, at_frames, forward_kinematics
-from .track import zero_phase_hann
+from .humanoid import compute_heading_from_positions
+from .motion import Motion, sample_frames, forward_kinematics
+from .track import smooth_zero_phase_hann
 
 _SWAY_SECONDS = 0.7
 # two landings of one foot are at least this far apart, seconds: nearer ones are one landing whose label flickers
-_NEAREST = 0.25
+_MIN_LANDING_SECONDS = 0.25
 _LEFT, _RIGHT = 0, 1
 
 
@@ -41,8 +41,8 @@ class Strides:
 
     motion: Motion
     landings: np.ndarray
-    first: int
-    standing: np.ndarray
+    first_side: int
+    heel_toe_contacts: np.ndarray
     facing: np.ndarray
     path: np.ndarray
 
@@ -59,20 +59,20 @@ class Strides:
     @property
     def metres(self) -> np.ndarray:
         """(K - 1,) distance that the body travels with each step, metres."""
-        return np.diff(_at(distance_along(self.path), self.landings))
+        return np.diff(_interpolate_frames(distances_along(self.path), self.landings))
 
     @property
     def speed(self) -> float:
         """Mean speed over all steps, m/s."""
         return float(self.metres.sum() / self.seconds.sum())
 
-    def later(self) -> "Strides":
+    def remove_first_step(self) -> "Strides":
         """Return the same strides without the first step."""
-        return Strides(motion=self.motion, landings=self.landings[1:], first=1 - self.first, standing=self.standing,
+        return Strides(motion=self.motion, landings=self.landings[1:], first_side=1 - self.first_side, heel_toe_contacts=self.heel_toe_contacts,
                        facing=self.facing, path=self.path)
 
 
-def strides(motion: Motion, standing: np.ndarray) -> Strides | None:
+def find_strides(motion: Motion, heel_toe_contacts: np.ndarray) -> Strides | None:
     """Find the longest stretch of a motion in which the feet land in turn.
 
     Args:
@@ -81,32 +81,32 @@ def strides(motion: Motion, standing: np.ndarray) -> Strides | None:
     Returns:
         The stretch, or None if it has fewer than two steps.
     """
-    sides, frames = _landings(standing, motion.fps)
+    sides, frames = _detect_landings(heel_toe_contacts, motion.fps)
     # runs of landings whose sides alternate; the longest one wins
     edges = np.flatnonzero(np.diff(sides) == 0) + 1
     first, last = max(zip([0, *edges], [*edges, len(sides)]), key=lambda run: run[1] - run[0])
     if last - first < 3:
         return None
     positions, _ = forward_kinematics(motion)
-    facing = np.unwrap(heading_from_positions(motion.skeleton, positions))
-    path = zero_phase_hann(positions[:, 0, :2], motion.fps, _SWAY_SECONDS)
-    return Strides(motion=motion, landings=frames[first:last], first=int(sides[first]), standing=standing,
+    facing = np.unwrap(compute_heading_from_positions(motion.skeleton, positions))
+    path = smooth_zero_phase_hann(positions[:, 0, :2], motion.fps, _SWAY_SECONDS)
+    return Strides(motion=motion, landings=frames[first:last], first_side=int(sides[first]), heel_toe_contacts=heel_toe_contacts,
                    facing=facing, path=path)
 
 
-def _landings(standing: np.ndarray, fps: float) -> tuple[np.ndarray, np.ndarray]:
+def _detect_landings(heel_toe_contacts: np.ndarray, fps: float) -> tuple[np.ndarray, np.ndarray]:
     """Detect all landings in order of time: sides (K,) and frames (K,); heel or toe touches down after both were up."""
     sides, frames = [], []
     for side in (_LEFT, _RIGHT):
-        down = np.flatnonzero(np.diff(standing[:, side].any(axis=1).astype(np.int8)) == 1) + 0.5
-        kept = down[np.diff(down, prepend=-np.inf) > _NEAREST * fps]
+        down = np.flatnonzero(np.diff(heel_toe_contacts[:, side].any(axis=1).astype(np.int8)) == 1) + 0.5
+        kept = down[np.diff(down, prepend=-np.inf) > _MIN_LANDING_SECONDS * fps]
         sides += [side] * len(kept)
         frames += kept.tolist()
     order = np.argsort(frames, kind="stable")
     return np.array(sides, int)[order], np.array(frames, float)[order]
 
 
-def blend(slow: Strides, fast: Strides, speed: float, fps: float) -> tuple[Motion, np.ndarray]:
+def blend_strides(slow: Strides, fast: Strides, speed: float, fps: float) -> tuple[Motion, np.ndarray]:
     """Blend two recordings of locomotion to a mean speed, from the origin along +X.
 
     The result has as many steps as the shorter recording, each mixed from another step of both.
@@ -119,9 +119,9 @@ def blend(slow: Strides, fast: Strides, speed: float, fps: float) -> tuple[Motio
         The motion, and the contacts (T, 2, 2) bool of left and right, heel and toe.
     Source: Faustino 2024, section 6.2; Park, Shin and Shin 2002.
     """
-    slow, fast = _in_step(slow, fast)
+    slow, fast = _align_first_foot(slow, fast)
     steps = min(slow.steps, fast.steps)
-    weight = _weight(slow, fast, steps, speed)
+    weight = _solve_blend_weight(slow, fast, steps, speed)
     # durations are mixed in the logarithm, so that a step of half and one of double duration average to the same one
     seconds = np.exp((1.0 - weight) * np.log(slow.seconds[:steps]) + weight * np.log(fast.seconds[:steps]))
     ends = np.concatenate([[0.0], np.cumsum(seconds)])
@@ -129,25 +129,25 @@ def blend(slow: Strides, fast: Strides, speed: float, fps: float) -> tuple[Motio
     # phase counts steps: 0 at the first landing, 1 at the second, ...; `rate` is its derivative, steps per second
     phase = PchipInterpolator(ends, np.arange(steps + 1.0))(times)
     rate = PchipInterpolator(ends, np.arange(steps + 1.0)).derivative()(times)
-    a, b = (_sampled(one, phase, steps) for one in (slow, fast))
-    mixed = {name: (1.0 - weight) * a[name] + weight * b[name] for name in ("height", "sway", "turn", "way", "inside")}
-    facing = _integral(mixed["turn"] * rate, fps)
-    path = _integral(quaternion.turned_level(mixed["way"], facing) * rate[:, None], fps)
-    rotations = quaternion.slerp(a["pose"], b["pose"], np.full((len(times), 1), weight))
-    rotations[:, 0] = quaternion.multiply(quaternion.about_up(facing), rotations[:, 0])
-    ground = path + quaternion.turned_level(mixed["sway"], facing)
+    slow_samples, fast_samples = (_sample_at_phase(one, phase, steps) for one in (slow, fast))
+    mixed = {name: (1.0 - weight) * slow_samples[name] + weight * fast_samples[name] for name in ("height", "sway", "turn", "way", "inside")}
+    facing = _integrate(mixed["turn"] * rate, fps)
+    path = _integrate(quaternion.rotate_level(mixed["way"], facing) * rate[:, None], fps)
+    rotations = quaternion.slerp(slow_samples["pose"], fast_samples["pose"], np.full((len(times), 1), weight))
+    rotations[:, 0] = quaternion.multiply(quaternion.from_up_angle(facing), rotations[:, 0])
+    ground = path + quaternion.rotate_level(mixed["sway"], facing)
     root = np.concatenate([ground, mixed["height"][:, None]], axis=1)
-    return Motion(slow.motion.skeleton, root, quaternion.continuous(rotations), fps), mixed["inside"] > 0.0
+    return Motion(slow.motion.skeleton, root, quaternion.unify_signs(rotations), fps), mixed["inside"] > 0.0
 
 
-def _in_step(a: Strides, b: Strides) -> tuple[Strides, Strides]:
+def _align_first_foot(a: Strides, b: Strides) -> tuple[Strides, Strides]:
     """Make both begin with the same foot: the longer one loses its first step where they do not."""
-    if a.first == b.first:
+    if a.first_side == b.first_side:
         return a, b
-    return (a.later(), b) if a.steps > b.steps else (a, b.later())
+    return (a.remove_first_step(), b) if a.steps > b.steps else (a, b.remove_first_step())
 
 
-def _weight(slow: Strides, fast: Strides, steps: int, speed: float) -> float:
+def _solve_blend_weight(slow: Strides, fast: Strides, steps: int, speed: float) -> float:
     """Solve the share of `fast` with which the mixture has a mean speed of `speed` m/s."""
     share = np.linspace(0.0, 1.0, 65)
     metres = (1.0 - share) * slow.metres[:steps].sum() + share * fast.metres[:steps].sum()
@@ -155,27 +155,27 @@ def _weight(slow: Strides, fast: Strides, steps: int, speed: float) -> float:
     return float(np.interp(speed, metres / np.exp(logs).sum(axis=1), share))
 
 
-def _sampled(one: Strides, phase: np.ndarray, steps: int) -> dict[str, np.ndarray]:
+def _sample_at_phase(strides: Strides, phase: np.ndarray, steps: int) -> dict[str, np.ndarray]:
     """Sample a recording at phases (T,), counted in steps.
 
     Returns:
         pose (T, J, 4) relative to the heading, height (T,) metres, sway (T, 2) metres in the heading frame, turn (T,)
         radians and way (T, 2) metres per step, and inside (T, 2, 2): steps from each point's nearest stance boundary.
     """
-    curve = PchipInterpolator(np.arange(steps + 1.0), one.landings[: steps + 1])
+    curve = PchipInterpolator(np.arange(steps + 1.0), strides.landings[: steps + 1])
     frames, pace = curve(phase), curve.derivative()(phase)
-    root, pose = at_frames(one.motion, frames)
-    facing, path = _at(one.facing, frames), _at(one.path, frames)
-    pose[:, 0] = quaternion.multiply(quaternion.about_up(-facing), pose[:, 0])
+    root, pose = sample_frames(strides.motion, frames)
+    facing, path = _interpolate_frames(strides.facing, frames), _interpolate_frames(strides.path, frames)
+    pose[:, 0] = quaternion.multiply(quaternion.from_up_angle(-facing), pose[:, 0])
     return {
-        "pose": pose, "height": root[:, 2], "sway": quaternion.turned_level(root[:, :2] - path, -facing),
-        "turn": _at(np.gradient(one.facing), frames) * pace,
-        "way": quaternion.turned_level(_at(np.gradient(one.path, axis=0), frames), -facing) * pace[:, None],
-        "inside": _inside(one.standing, frames) / pace[:, None, None],
+        "pose": pose, "height": root[:, 2], "sway": quaternion.rotate_level(root[:, :2] - path, -facing),
+        "turn": _interpolate_frames(np.gradient(strides.facing), frames) * pace,
+        "way": quaternion.rotate_level(_interpolate_frames(np.gradient(strides.path, axis=0), frames), -facing) * pace[:, None],
+        "inside": _measure_stance_distance(strides.heel_toe_contacts, frames) / pace[:, None, None],
     }
 
 
-def _inside(standing: np.ndarray, frames: np.ndarray) -> np.ndarray:
+def _measure_stance_distance(heel_toe_contacts: np.ndarray, frames: np.ndarray) -> np.ndarray:
     """Measure how many frames (T, 2, 2) away the nearest start or end of a stance is, negative outside of stances.
 
     Mixing these distances moves a stance's start and end from one recording's to the other's; mixing the labels would
@@ -184,21 +184,21 @@ def _inside(standing: np.ndarray, frames: np.ndarray) -> np.ndarray:
     out = np.empty((len(frames), 2, 2))
     for side in (_LEFT, _RIGHT):
         for point in (0, 1):
-            on = standing[:, side, point]
+            on = heel_toe_contacts[:, side, point]
             edges = np.flatnonzero(np.diff(on.astype(np.int8))) + 0.5
             away = np.abs(frames[:, None] - edges).min(axis=1) if len(edges) else np.full(len(frames), float(len(on)))
             out[:, side, point] = np.where(on[np.round(frames).astype(int)], away, -away)
     return out
 
 
-def _at(values: np.ndarray, frames: np.ndarray) -> np.ndarray:
+def _interpolate_frames(values: np.ndarray, frames: np.ndarray) -> np.ndarray:
     """Interpolate values (T, ...) linearly at fractional frames (N,): (N, ...)."""
     low = np.clip(np.floor(frames).astype(int), 0, max(len(values) - 2, 0))
     share = (frames - low).reshape(-1, *[1] * (values.ndim - 1))
     return values[low] * (1.0 - share) + values[np.minimum(low + 1, len(values) - 1)] * share
 
 
-def _integral(values: np.ndarray, fps: float) -> np.ndarray:
+def _integrate(values: np.ndarray, fps: float) -> np.ndarray:
     """Integrate values (T, ...) per second over time, 0 at the first frame: (T, ...)."""
     total = np.cumsum(0.5 * (values[1:] + values[:-1]), axis=0) / fps
     return np.concatenate([np.zeros_like(values[:1]), total])

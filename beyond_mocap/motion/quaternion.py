@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..base.vectors import arctan2, cross, unit_vectors
+from ..base.vectors import arctan2, cross_product, unit_vectors
 
 IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
 IDENTITY.setflags(write=False)
@@ -50,7 +50,7 @@ def inverse(q: np.ndarray) -> np.ndarray:
     return np.asarray(q) * np.array([1.0, -1.0, -1.0, -1.0])
 
 
-def normalized(q: np.ndarray) -> np.ndarray:
+def normalize(q: np.ndarray) -> np.ndarray:
     """Scale quaternions (..., 4) to length one; a zero quaternion becomes the identity."""
     return unit_vectors(np.asarray(q, dtype=float), IDENTITY, 1e-12)
 
@@ -66,11 +66,11 @@ def rotate(q: np.ndarray, v: np.ndarray) -> np.ndarray:
     """
     q, v = np.asarray(q), np.asarray(v)
     w, u = q[..., :1], q[..., 1:]
-    t = 2.0 * cross(u, v)
-    return v + w * t + cross(u, t)
+    t = 2.0 * cross_product(u, v)
+    return v + w * t + cross_product(u, t)
 
 
-def about_axis(axis: np.ndarray, angle: float | np.ndarray) -> np.ndarray:
+def from_axis_angle(axis: np.ndarray, angle: float | np.ndarray) -> np.ndarray:
     """Build rotations about an axis.
 
     Args:
@@ -83,23 +83,23 @@ def about_axis(axis: np.ndarray, angle: float | np.ndarray) -> np.ndarray:
     return np.concatenate([np.cos(half)[..., None], np.sin(half)[..., None] * np.asarray(axis, dtype=float)], axis=-1)
 
 
-def about_up(angle: np.ndarray) -> np.ndarray:
+def from_up_angle(angle: np.ndarray) -> np.ndarray:
     """Build rotations (..., 4) by `angle` (...,) radians about the world's up axis Z."""
     half = 0.5 * np.asarray(angle, dtype=float)
     zero = np.zeros_like(half)
     return np.stack([np.cos(half), zero, zero, np.sin(half)], axis=-1)
 
 
-def turned_level(v: np.ndarray, angle: np.ndarray) -> np.ndarray:
+def rotate_level(v: np.ndarray, angle: np.ndarray) -> np.ndarray:
     """Rotate vectors on the ground (..., 2) by `angle` (...,) radians about the world's up axis: (..., 2)."""
     cosine, sine = np.cos(angle), np.sin(angle)
     x, y = v[..., 0], v[..., 1]
     return np.stack([cosine * x - sine * y, sine * x + cosine * y], axis=-1)
 
 
-def turned_about_up(v: np.ndarray, angle: np.ndarray) -> np.ndarray:
+def rotate_about_up(v: np.ndarray, angle: np.ndarray) -> np.ndarray:
     """Rotate vectors (..., 3) by `angle` (...,) radians about the world's up axis: (..., 3)."""
-    return np.concatenate([turned_level(v[..., :2], angle), v[..., 2:]], axis=-1)
+    return np.concatenate([rotate_level(v[..., :2], angle), v[..., 2:]], axis=-1)
 
 
 def from_rotation_vector(v: np.ndarray) -> np.ndarray:
@@ -136,10 +136,10 @@ def from_euler(angles: np.ndarray, order: str) -> np.ndarray:
     out = None
     for index, letter in enumerate(order):
         half = 0.5 * angles[..., index]
-        turn = np.zeros((*half.shape, 4))
-        turn[..., 0] = np.cos(half)
-        turn[..., 1 + _AXES[letter]] = np.sin(half)
-        out = turn if out is None else multiply(out, turn)
+        rotation = np.zeros((*half.shape, 4))
+        rotation[..., 0] = np.cos(half)
+        rotation[..., 1 + _AXES[letter]] = np.sin(half)
+        out = rotation if out is None else multiply(out, rotation)
     return identity(*angles.shape[:-1]) if out is None else out
 
 
@@ -164,8 +164,8 @@ def to_euler(q: np.ndarray, order: str) -> np.ndarray:
     pole = cosine < 1e-9
     first = np.where(pole, arctan2(sign * m[..., k, j], m[..., j, j]), first)
     # from what remains after undoing the first rotation: near the pole both outer angles are noise, their sum is not
-    left = np.cos(first)[..., None] * m[..., j, :] + sign * np.sin(first)[..., None] * m[..., k, :]
-    third = np.where(pole, 0.0, arctan2(sign * left[..., i], left[..., j]))
+    residual = np.cos(first)[..., None] * m[..., j, :] + sign * np.sin(first)[..., None] * m[..., k, :]
+    third = np.where(pole, 0.0, arctan2(sign * residual[..., i], residual[..., j]))
     return np.stack([first, middle, third], axis=-1)
 
 
@@ -197,25 +197,25 @@ def from_matrix(m: np.ndarray) -> np.ndarray:
     )
     best = np.argmax(squares, axis=-1)
     q = np.stack([np.choose(best, component) for component in zip(*candidates)], axis=-1)
-    q = normalized(q)
+    q = normalize(q)
     return np.where(q[..., :1] < 0.0, -q, q)
 
 
-def between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+def rotation_between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Compute the shortest rotation that turns vectors a (..., 3) onto b (..., 3): (..., 4); opposites about any axis.
     """
     a = np.asarray(a, dtype=float)
     b = np.asarray(b, dtype=float)
-    a = unit_vectors(a, least=1e-12)
-    b = unit_vectors(b, least=1e-12)
+    a = unit_vectors(a, min_length=1e-12)
+    b = unit_vectors(b, min_length=1e-12)
     dot = np.sum(a * b, axis=-1, keepdims=True)
-    axis = cross(a, b)
+    axis = cross_product(a, b)
     other = np.where(np.abs(a[..., :1]) < 0.9, np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0]))
-    axis = np.where(dot < -1.0 + 1e-9, cross(a, other), axis)
-    return normalized(np.concatenate([np.maximum(1.0 + dot, 0.0), axis], axis=-1))
+    axis = np.where(dot < -1.0 + 1e-9, cross_product(a, other), axis)
+    return normalize(np.concatenate([np.maximum(1.0 + dot, 0.0), axis], axis=-1))
 
 
-def continuous(q: np.ndarray) -> np.ndarray:
+def unify_signs(q: np.ndarray) -> np.ndarray:
     """Choose the signs of rotations (T, ..., 4) so that neighbours in time are close (q and -q rotate alike)."""
     q = np.asarray(q, dtype=float)
     if len(q) < 2:
@@ -227,9 +227,9 @@ def continuous(q: np.ndarray) -> np.ndarray:
     return out
 
 
-def signed_like(q: np.ndarray, like: np.ndarray) -> np.ndarray:
+def match_signs(q: np.ndarray, reference: np.ndarray) -> np.ndarray:
     """Choose the signs of rotations (..., 4) that are nearer to `reference` (..., 4)."""
-    return np.where(np.sum(q * like, axis=-1, keepdims=True) < 0.0, -q, q)
+    return np.where(np.sum(q * reference, axis=-1, keepdims=True) < 0.0, -q, q)
 
 
 def slerp(a: np.ndarray, b: np.ndarray, weight: float | np.ndarray) -> np.ndarray:
@@ -251,15 +251,15 @@ def slerp(a: np.ndarray, b: np.ndarray, weight: float | np.ndarray) -> np.ndarra
     sine = np.where(small, 1.0, np.sin(theta))
     wa = np.where(small, 1.0 - weight, np.sin((1.0 - weight) * theta) / sine)
     wb = np.where(small, weight, np.sin(weight * theta) / sine)
-    return normalized(wa[..., None] * a + wb[..., None] * b)
+    return normalize(wa[..., None] * a + wb[..., None] * b)
 
 
-def yaw(q: np.ndarray) -> np.ndarray:
+def to_yaw(q: np.ndarray) -> np.ndarray:
     """Return the angle (...,) in radians of the rotation about Z nearest to rotations (..., 4) (their twist)."""
     q = np.asarray(q)
     return 2.0 * arctan2(q[..., 3], q[..., 0])
 
 
-def wrapped(angle):
+def wrap_angle(angle):
     """Wrap angles (...) in radians to the range from -pi up to pi."""
     return (angle + np.pi) % (2.0 * np.pi) - np.pi

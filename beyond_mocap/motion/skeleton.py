@@ -11,7 +11,7 @@ from ..base.digest import hex_digest
 from ..base.errors import InputError
 
 
-def frozen_array(values, dtype=float) -> np.ndarray:
+def freeze_array(values, dtype=float) -> np.ndarray:
     """Copy values into a read-only array."""
     out = np.array(values, dtype=dtype)
     out.setflags(write=False)
@@ -40,8 +40,8 @@ class Skeleton:
         object.__setattr__(self, "names", tuple(self.names))
         object.__setattr__(self, "parents", tuple(int(p) for p in self.parents))
         object.__setattr__(self, "end_parents", tuple(int(p) for p in self.end_parents))
-        object.__setattr__(self, "offsets", frozen_array(self.offsets).reshape(-1, 3))
-        object.__setattr__(self, "end_offsets", frozen_array(self.end_offsets).reshape(-1, 3))
+        object.__setattr__(self, "offsets", freeze_array(self.offsets).reshape(-1, 3))
+        object.__setattr__(self, "end_offsets", freeze_array(self.end_offsets).reshape(-1, 3))
         count = len(self.names)
         if not (count and len(self.parents) == len(self.offsets) == count):
             raise InputError("skeleton", f"{count} names, {len(self.parents)} parents, {len(self.offsets)} offsets")
@@ -68,12 +68,12 @@ class Skeleton:
         """Return the indices of the joints that hang on `joint`."""
         return tuple(i for i, p in enumerate(self.parents) if p == joint)
 
-    def tip(self, joint: int) -> np.ndarray:
+    def tip_offset(self, joint: int) -> np.ndarray:
         """Return the vector from a joint to its first end site (3,) m, in the joint's own axes; zero where it has none.
         """
         return next((o for p, o in zip(self.end_parents, self.end_offsets) if p == joint), np.zeros(3))
 
-    def part(self, joints: Collection[int]) -> tuple["Skeleton", list[int]]:
+    def select_joints(self, joints: Collection[int]) -> tuple["Skeleton", list[int]]:
         """Select joints and all above them.
 
         Args:
@@ -86,15 +86,15 @@ class Skeleton:
             while joint >= 0:
                 found.add(joint)
                 joint = self.parents[joint]
-        kept = sorted(found)
-        parents = [-1 if joint == 0 else kept.index(self.parents[joint]) for joint in kept]
-        return Skeleton(tuple(self.names[joint] for joint in kept), tuple(parents), self.offsets[kept]), kept
+        selected = sorted(found)
+        parents = [-1 if joint == 0 else selected.index(self.parents[joint]) for joint in selected]
+        return Skeleton(tuple(self.names[joint] for joint in selected), tuple(parents), self.offsets[selected]), selected
 
-    def scaled(self, size: float) -> "Skeleton":
+    def scale(self, factor: float) -> "Skeleton":
         """Return the skeleton of a body `factor` times as large."""
-        return replace(self, offsets=self.offsets * size, end_offsets=self.end_offsets * size)
+        return replace(self, offsets=self.offsets * factor, end_offsets=self.end_offsets * factor)
 
-    def same_bones(self, other: "Skeleton", tolerance: float = 1e-3) -> bool:
+    def has_same_bones(self, other: "Skeleton", tolerance: float = 1e-3) -> bool:
         """Whether names, parents and offsets agree, offsets within `tolerance` metres."""
         return (
             self.names == other.names

@@ -25,7 +25,7 @@ class Offset:
     speed: np.ndarray
     acceleration: np.ndarray
 
-    def faded(self, seconds: np.ndarray, rate: float) -> "Offset":
+    def evaluate_decay(self, seconds: np.ndarray, rate: float) -> "Offset":
         """Evaluate the decaying offset over time.
 
         Args:
@@ -38,6 +38,6 @@ class Offset:
         a = self.place
         b = self.speed + rate * a
         c = 0.5 * (self.acceleration + 2.0 * rate * self.speed + rate**2 * a)
-        left = np.exp(-rate * t)
+        remaining = np.exp(-rate * t)
         value, slope, bend = a + b * t + c * t**2, b + 2.0 * c * t, 2.0 * c
-        return Offset(left * value, left * (slope - rate * value), left * (bend - 2.0 * rate * slope + rate**2 * value))
+        return Offset(remaining * value, remaining * (slope - rate * value), remaining * (bend - 2.0 * rate * slope + rate**2 * value))

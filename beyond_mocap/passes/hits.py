@@ -20,19 +20,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..ball.contact import Tool, striking_surface
+from ..ball.contact import Tool, find_striking_surface
 from ..base.errors import InputError
 from ..motion import quaternion
-from ..motion.humanoid import heading_from_positions, identify, leg_length
+from ..motion.humanoid import compute_heading_from_positions, identify_joints, measure_leg_length
 from ..motion.motion import Motion, forward_kinematics
 from ..motion.skeleton import Skeleton
-from ..motion.track import zero_phase_hann
+from ..motion.track import smooth_zero_phase_hann
 
 _SIDED = ("foot", "hand", "tool")
 _SMOOTHING = 0.1  # s: Hann window over positions; markers and suits shake at an impact
 _APART = 0.25  # s: least distance of two fast frames; the part's return after a hit is closer
 _SLOW = 0.4  # of the highest speed in a hit motion: the part is at most so fast at its ends
-_RISES = 0.03  # m: least rise after the strike for the high frame to lie after it
+_LEAST_RISE_AFTER = 0.03  # m: least rise after the strike for the high frame to lie after it
 # with an automatic threshold: least rise in m above the part's typical height, and least speed in m/s, of a hit
 _LEAST_RISE = {"foot": 0.10, "head": 0.10, "chest": 0.08, "hand": 0.15, "tool": 0.20}
 _LEAST_SPEED = {"foot": 1.5, "head": 0.8, "chest": 0.6, "hand": 2.0, "tool": 2.5}
@@ -124,7 +124,7 @@ class Hits:
         return max(self.motions, key=lambda one: one.max_speed, default=None)
 
 
-def analyse(motion: Motion, part: str = "foot", side: str = "right", threshold: float | None = None,
+def detect_hits(motion: Motion, part: str = "foot", side: str = "right", threshold: float | None = None,
             joint: str | None = None, tool: Tool | None = None) -> Hits:
     """Detect the hits of one part of the body in a motion.
 
@@ -143,27 +143,27 @@ def analyse(motion: Motion, part: str = "foot", side: str = "right", threshold: 
         infinite values in the threshold or the poses.
     Source: Ball handling, section 3.
     """
-    _check(motion, threshold)
+    _check_input(motion, threshold)
     positions, rotations = forward_kinematics(motion)
-    place = strike_place(motion.skeleton, positions, rotations, part=joint or part, side=side, tool=tool)
+    place = compute_strike_place(motion.skeleton, positions, rotations, part=joint or part, side=side, tool=tool)
     side = side if part in _SIDED else ""
-    body = _Body.of(motion, positions)
-    way = _Way.of(place, body, part, motion.fps)
-    peaks = _peaks(way.height)
-    level = _threshold(way.height, peaks, part) if threshold is None else float(threshold)
-    highs = [frame for frame in peaks if way.height[frame] > level]
-    spans = _spans(way, highs)
+    body = _Body.from_motion(motion, positions)
+    trajectory = _PartTrajectory.from_positions(place, body, part, motion.fps)
+    peaks = _find_peaks(trajectory.height)
+    height_threshold = _find_threshold(trajectory.height, peaks, part) if threshold is None else float(threshold)
+    highs = [frame for frame in peaks if trajectory.height[frame] > height_threshold]
+    spans = _find_spans(trajectory, highs)
     if threshold is None:
-        other = _other_foot(motion.skeleton, positions, side, motion.fps) if part == "foot" else None
-        spans = [span for span in spans if _is_hit(span, part, way, body, other)]
-    found = tuple(_hit_motion(part, side, span, way, body) for span in spans)
-    return Hits(part=part, side=side, fps=motion.fps, threshold=level, height=way.height, speed=way.speed, place=place,
-                highs=tuple(sorted({*highs, *(one.high for one in found)})), fasts=tuple(_apart(way.speed, motion.fps)),
-                motions=found, ball_stretches=tuple(one.ball_stretch for one in found),
-                links=_between(found, len(motion)))
+        other = _other_foot_speed(motion.skeleton, positions, side, motion.fps) if part == "foot" else None
+        spans = [span for span in spans if _is_hit(span, part, trajectory, body, other)]
+    hit_motions = tuple(_build_hit_motion(part, side, span, trajectory, body) for span in spans)
+    return Hits(part=part, side=side, fps=motion.fps, threshold=height_threshold, height=trajectory.height, speed=trajectory.speed, place=place,
+                highs=tuple(sorted({*highs, *(one.high for one in hit_motions)})), fasts=tuple(_find_fast_frames(trajectory.speed, motion.fps)),
+                motions=hit_motions, ball_stretches=tuple(one.ball_stretch for one in hit_motions),
+                links=_find_links(hit_motions, len(motion)))
 
 
-def strongest(motion: Motion, part: str, side: str = "", tool: Tool | None = None) -> HitMotion | None:
+def find_strongest_hit(motion: Motion, part: str, side: str = "", tool: Tool | None = None) -> HitMotion | None:
     """Find the hit motion with the highest speed of a part.
 
     Args:
@@ -177,11 +177,11 @@ def strongest(motion: Motion, part: str, side: str = "", tool: Tool | None = Non
         InputError: as `detect_hits`.
     """
     sides = (side,) if side else (("left", "right") if part in _SIDED else ("",))
-    found = [hit for one in sides if (hit := analyse(motion, part, one, tool=tool).strongest)]
-    return max(found, key=lambda hit: hit.max_speed, default=None)
+    hits = [hit for one in sides if (hit := detect_hits(motion, part, one, tool=tool).strongest)]
+    return max(hits, key=lambda hit: hit.max_speed, default=None)
 
 
-def hit_at(motion: Motion, frame: int, span: tuple[int, int], part: str = "foot", side: str = "right",
+def build_hit_at(motion: Motion, frame: int, span: tuple[int, int], part: str = "foot", side: str = "right",
            tool: Tool | None = None) -> HitMotion:
     """Build the hit motion of a strike whose frame is known.
 
@@ -199,18 +199,18 @@ def hit_at(motion: Motion, frame: int, span: tuple[int, int], part: str = "foot"
     Raises:
         InputError: as `detect_hits`.
     """
-    _check(motion, None)
+    _check_input(motion, None)
     positions, rotations = forward_kinematics(motion)
-    place = strike_place(motion.skeleton, positions, rotations, part=part, side=side, tool=tool)
-    body = _Body.of(motion, positions)
+    place = compute_strike_place(motion.skeleton, positions, rotations, part=part, side=side, tool=tool)
+    body = _Body.from_motion(motion, positions)
     first = int(np.clip(span[0], 0, len(motion) - 3))
     last = int(np.clip(span[1], first + 2, len(motion) - 1))
     key = int(np.clip(frame, first + 1, last - 1))
     side = side if part in _SIDED else ""
-    return _hit_motion(part, side, (first, last), way=_Way.of(place, body, part, motion.fps), body=body, key=key)
+    return _build_hit_motion(part, side, (first, last), trajectory=_PartTrajectory.from_positions(place, body, part, motion.fps), body=body, key=key)
 
 
-def strike_place(skeleton: Skeleton, positions: np.ndarray, rotations: np.ndarray, part: str, side: str,
+def compute_strike_place(skeleton: Skeleton, positions: np.ndarray, rotations: np.ndarray, part: str, side: str,
                  tool: Tool | None = None) -> np.ndarray:
     """Compute the middle of the striking part.
 
@@ -226,10 +226,10 @@ def strike_place(skeleton: Skeleton, positions: np.ndarray, rotations: np.ndarra
     Raises:
         InputError: if the skeleton lacks the part.
     """
-    return np.mean(striking_surface(skeleton, part, side, tool).line(positions, rotations), axis=0)
+    return np.mean(find_striking_surface(skeleton, part, side, tool).compute_line(positions, rotations), axis=0)
 
 
-def _check(motion: Motion, threshold: float | None) -> None:
+def _check_input(motion: Motion, threshold: float | None) -> None:
     if len(motion) < 3:
         raise InputError("motion", f"{len(motion)} frames", "three or more")
     if threshold is not None and not np.isfinite(threshold):
@@ -257,21 +257,21 @@ class _Body:
     size: float
 
     @staticmethod
-    def of(motion: Motion, positions: np.ndarray) -> "_Body":
+    def from_motion(motion: Motion, positions: np.ndarray) -> "_Body":
         """Measure the body of a motion with world joint positions (T, J, 3) m."""
-        body = identify(motion.skeleton)
+        body = identify_joints(motion.skeleton)
         # the floor is the height that toes fall below in 2 % of the frames only
         toes = positions[:, [body.left.toe_or_foot, body.right.toe_or_foot], 2]
-        pelvis = zero_phase_hann(positions[:, body.hips], motion.fps, _SMOOTHING)
-        path = zero_phase_hann(pelvis[:, :2], motion.fps, 0.5)
-        facing = np.unwrap(heading_from_positions(motion.skeleton, positions))
-        speed = np.linalg.norm(_rate(path, motion.fps), axis=1)
+        pelvis = smooth_zero_phase_hann(positions[:, body.hips], motion.fps, _SMOOTHING)
+        path = smooth_zero_phase_hann(pelvis[:, :2], motion.fps, 0.5)
+        facing = np.unwrap(compute_heading_from_positions(motion.skeleton, positions))
+        speed = np.linalg.norm(_differentiate(path, motion.fps), axis=1)
         return _Body(pelvis=pelvis, speed=speed, facing=facing, ground=float(np.percentile(toes, 2)),
-                     size=leg_length(motion.skeleton))
+                     size=measure_leg_length(motion.skeleton))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class _Way:
+class _PartTrajectory:
     """Smoothed trajectory of the part.
 
     Attributes:
@@ -290,73 +290,73 @@ class _Way:
     fps: float
 
     @staticmethod
-    def of(place: np.ndarray, body: _Body, part: str, fps: float) -> "_Way":
+    def from_positions(place: np.ndarray, body: _Body, part: str, fps: float) -> "_PartTrajectory":
         """Smooth the part's positions (T, 3) m and derive its velocity, height and speed."""
-        smooth = zero_phase_hann(place, fps, _SMOOTHING)
-        velocity = _rate(smooth, fps)
-        against = _rate(smooth - body.pelvis, fps) if part in ("head", "chest") else velocity
-        return _Way(place=smooth, velocity=velocity, height=smooth[:, 2] - body.ground,
-                    speed=np.linalg.norm(against, axis=1), fps=fps)
+        smooth = smooth_zero_phase_hann(place, fps, _SMOOTHING)
+        velocity = _differentiate(smooth, fps)
+        relative_velocity = _differentiate(smooth - body.pelvis, fps) if part in ("head", "chest") else velocity
+        return _PartTrajectory(place=smooth, velocity=velocity, height=smooth[:, 2] - body.ground,
+                    speed=np.linalg.norm(relative_velocity, axis=1), fps=fps)
 
 
-def _other_foot(skeleton: Skeleton, positions: np.ndarray, side: str, fps: float) -> np.ndarray:
+def _other_foot_speed(skeleton: Skeleton, positions: np.ndarray, side: str, fps: float) -> np.ndarray:
     """Compute the speed (T,) m/s of the foot that does not strike."""
-    limb = getattr(identify(skeleton), "left" if side == "right" else "right")
+    limb = getattr(identify_joints(skeleton), "left" if side == "right" else "right")
     place = positions[:, [limb.foot, limb.toe_or_foot]].mean(axis=1)
-    return np.linalg.norm(_rate(zero_phase_hann(place, fps, _SMOOTHING), fps), axis=1)
+    return np.linalg.norm(_differentiate(smooth_zero_phase_hann(place, fps, _SMOOTHING), fps), axis=1)
 
 
-def _rate(values: np.ndarray, fps: float) -> np.ndarray:
+def _differentiate(values: np.ndarray, fps: float) -> np.ndarray:
     """Differentiate values (T, k) over time by central differences, per second."""
     return np.gradient(values, axis=0) * fps
 
 
-def _peaks(values: np.ndarray) -> list[int]:
+def _find_peaks(values: np.ndarray) -> list[int]:
     """Find the frames of `values` (T,) that are higher than their neighbours; of a plateau the first frame."""
     rising = values[1:-1] > values[:-2]
     return (np.flatnonzero(rising & (values[1:-1] >= values[2:])) + 1).tolist()
 
 
-def _apart(speed: np.ndarray, fps: float) -> list[int]:
+def _find_fast_frames(speed: np.ndarray, fps: float) -> list[int]:
     """Find the fast frames; of those closer than _APART seconds only the fastest (section 3: the part's return after a
     hit).
     """
-    kept: list[int] = []
-    for frame in sorted(_peaks(speed), key=lambda frame: -speed[frame]):
-        if all(abs(frame - other) >= _APART * fps for other in kept):
-            kept.append(frame)
-    return sorted(kept)
+    fast_frames: list[int] = []
+    for frame in sorted(_find_peaks(speed), key=lambda frame: -speed[frame]):
+        if all(abs(frame - other) >= _APART * fps for other in fast_frames):
+            fast_frames.append(frame)
+    return sorted(fast_frames)
 
 
-def _threshold(height: np.ndarray, peaks: list[int], part: str) -> float:
+def _find_threshold(height: np.ndarray, peaks: list[int], part: str) -> float:
     """Compute the height in m that best divides the peaks into low and high ones (Otsu 1979).
 
     It is at least a part's least rise above its typical height: a foot on the ground, head and chest of a standing
     person.
     """
-    usual = float(np.percentile(height, 50 if part in ("head", "chest") else 10))
-    least = usual + _LEAST_RISE.get(part, 0.10)
+    usual_height = float(np.percentile(height, 50 if part in ("head", "chest") else 10))
+    least_height = usual_height + _LEAST_RISE.get(part, 0.10)
     tops = np.sort(height[peaks])
     if len(tops) < 2:
-        return least
+        return least_height
     # Otsu: for each cut of the sorted peaks, the means on both sides and the variance between them
-    before = np.cumsum(tops)[:-1] / np.arange(1, len(tops))
-    after = (tops.sum() - np.cumsum(tops)[:-1]) / np.arange(len(tops) - 1, 0, -1)
+    mean_below = np.cumsum(tops)[:-1] / np.arange(1, len(tops))
+    mean_above = (tops.sum() - np.cumsum(tops)[:-1]) / np.arange(len(tops) - 1, 0, -1)
     # between-class variance, without its constant factor
-    spread = np.arange(1, len(tops)) * np.arange(len(tops) - 1, 0, -1) * (after - before) ** 2
+    spread = np.arange(1, len(tops)) * np.arange(len(tops) - 1, 0, -1) * (mean_above - mean_below) ** 2
     cut = int(np.argmax(spread))
-    return max(least, float(0.5 * (tops[cut] + tops[cut + 1])))
+    return max(least_height, float(0.5 * (tops[cut] + tops[cut + 1])))
 
 
-def _spans(way: _Way, highs: list[int]) -> list[tuple[int, int]]:
+def _find_spans(trajectory: _PartTrajectory, highs: list[int]) -> list[tuple[int, int]]:
     """Find (first, last) of the hit motion around each high frame; overlapping ones are merged."""
-    speed, lows = way.speed, [0, *_peaks(-way.height), len(way.height) - 1]
+    speed, lows = trajectory.speed, [0, *_find_peaks(-trajectory.height), len(trajectory.height) - 1]
     spans: list[tuple[int, int]] = []
     for high in highs:
         if spans and high < spans[-1][1]:
             continue
-        first = _lowest(speed, high, [low for low in reversed(lows) if low < high])
-        last = _lowest(speed, high, [low for low in lows if low > high])
+        first = _find_lowest(speed, high, [low for low in reversed(lows) if low < high])
+        last = _find_lowest(speed, high, [low for low in lows if low > high])
         # the hit motion before it ends here at the latest
         if spans and first < spans[-1][1]:
             first = spans[-1][1]
@@ -364,7 +364,7 @@ def _spans(way: _Way, highs: list[int]) -> list[tuple[int, int]]:
     return spans
 
 
-def _lowest(speed: np.ndarray, high: int, lows: list[int]) -> int:
+def _find_lowest(speed: np.ndarray, high: int, lows: list[int]) -> int:
     """Find, on one side of `high`, the nearest lowest frame by which the part has slowed down.
 
     Args:
@@ -381,43 +381,43 @@ def _lowest(speed: np.ndarray, high: int, lows: list[int]) -> int:
     return lows[-1]
 
 
-def _is_hit(span: tuple[int, int], part: str, way: _Way, body: _Body, other: np.ndarray | None) -> bool:
+def _is_hit(span: tuple[int, int], part: str, trajectory: _PartTrajectory, body: _Body, other: np.ndarray | None) -> bool:
     """Whether the part is faster than a step or an arm's swing at this speed of the body.
 
     Feet that walk reach 2.7 times the body's speed plus half a metre per second, in a run 2.1 times; recorded kicks
     more
     than 4 times. A striking foot is also faster than the supporting one (`other`, (T,) m/s): in a jump both are alike.
     """
-    key = span[0] + int(np.argmax(way.speed[span[0] : span[1] + 1]))
-    if key in span or way.speed[key] < _LEAST_SPEED.get(part, 1.0):
+    key = span[0] + int(np.argmax(trajectory.speed[span[0] : span[1] + 1]))
+    if key in span or trajectory.speed[key] < _LEAST_SPEED.get(part, 1.0):
         return False
     if part in ("head", "chest"):
         return True
-    if other is not None and way.speed[key] - other[key] < 1.0:
+    if other is not None and trajectory.speed[key] - other[key] < 1.0:
         return False
     pace = body.speed[key]
-    return way.speed[key] > min(3.0 * (pace + 0.5), 2.3 * pace + 2.5)
+    return trajectory.speed[key] > min(3.0 * (pace + 0.5), 2.3 * pace + 2.5)
 
 
-def _hit_motion(part: str, side: str, span: tuple[int, int], way: _Way, body: _Body,
+def _build_hit_motion(part: str, side: str, span: tuple[int, int], trajectory: _PartTrajectory, body: _Body,
                 key: int | None = None) -> HitMotion:
     """Build the hit motion of a span of frames; `key` None: the fastest frame."""
     first, last = span
-    key = first + int(np.argmax(way.speed[first : last + 1])) if key is None else key
-    high = _high(way.height, first, key, last)
-    fasts = _fastest(way.speed, first, high), _fastest(way.speed, high, last)
+    key = first + int(np.argmax(trajectory.speed[first : last + 1])) if key is None else key
+    high = _find_high(trajectory.height, first, key, last)
+    fasts = _find_fastest(trajectory.speed, first, high), _find_fastest(trajectory.speed, high, last)
     frames = np.array([first, fasts[0], high, fasts[1], last])
     turns = body.facing[first : last + 1]
     facing = float(np.arctan2(np.sin(turns).mean(), np.cos(turns).mean()))
-    turn = quaternion.about_up(np.array(-facing))
-    steps = np.diff(way.place[frames] - body.pelvis[frames] * [1.0, 1.0, 0.0], axis=0)
+    turn = quaternion.from_up_angle(np.array(-facing))
+    steps = np.diff(trajectory.place[frames] - body.pelvis[frames] * [1.0, 1.0, 0.0], axis=0)
     return HitMotion(part=part, side=side, first=first, last=last, high=high, fasts=fasts, key=key,
-                     max_speed=float(way.speed[list(fasts)].max()), vectors=quaternion.rotate(turn, steps),
-                     times=np.diff(frames) / way.fps, velocity=quaternion.rotate(turn, way.velocity[key]),
-                     facing=facing, size=body.size, fps=way.fps)
+                     max_speed=float(trajectory.speed[list(fasts)].max()), vectors=quaternion.rotate(turn, steps),
+                     times=np.diff(frames) / trajectory.fps, velocity=quaternion.rotate(turn, trajectory.velocity[key]),
+                     facing=facing, size=body.size, fps=trajectory.fps)
 
 
-def _high(height: np.ndarray, first: int, key: int, last: int) -> int:
+def _find_high(height: np.ndarray, first: int, key: int, last: int) -> int:
     """Choose the high frame beside the key.
 
     It lies after the key where the part rises to it, and before the key where the part comes down, as a throwing arm
@@ -425,16 +425,16 @@ def _high(height: np.ndarray, first: int, key: int, last: int) -> int:
     """
     before = first + int(np.argmax(height[first : key + 1]))
     after = key + int(np.argmax(height[key : last + 1]))
-    return after if height[after] > height[key] + _RISES or height[after] >= height[before] else before
+    return after if height[after] > height[key] + _LEAST_RISE_AFTER or height[after] >= height[before] else before
 
 
-def _fastest(speed: np.ndarray, first: int, last: int) -> int:
+def _find_fastest(speed: np.ndarray, first: int, last: int) -> int:
     """Find the fast frame between two frames; where speed only rises or falls there, the fastest frame."""
-    inside = [first + 1 + frame for frame in _peaks(speed[first + 1 : last])]
+    inside = [first + 1 + frame for frame in _find_peaks(speed[first + 1 : last])]
     return max(inside or range(first, last + 1), key=lambda frame: speed[frame])
 
 
-def _between(motions, count: int) -> tuple[tuple[int, int], ...]:
+def _find_links(motions, count: int) -> tuple[tuple[int, int], ...]:
     """Find the (first, last) frames between hit motions, before the first and after the last one."""
     edges = [(-1, -1), *((one.first, one.last) for one in motions), (count, count)]
     found = [(a + 1, b - 1) for (_, a), (b, _) in zip(edges, edges[1:])]

@@ -18,7 +18,7 @@ from ..library.library import Library
 VERSION = 3
 
 
-def load(library: Library, name: str) -> dict[str, np.ndarray] | None:
+def load_arrays(library: Library, name: str) -> dict[str, np.ndarray] | None:
     """Load the arrays stored as `name` for the recordings of a library.
 
     Args:
@@ -27,18 +27,18 @@ def load(library: Library, name: str) -> dict[str, np.ndarray] | None:
     Returns:
         The arrays by name, or None if there is no valid file.
     """
-    if library.kept is None:
+    if library.cache_location is None:
         return None
-    place, key = library.kept
+    folder, key = library.cache_location
     try:
-        with np.load(Path(place) / f"{name}.npz", allow_pickle=False) as arrays:
-            found = {part: arrays[part] for part in arrays.files}
-        return found if bytes(found.pop("of").tobytes()) == _of(key) else None
+        with np.load(Path(folder) / f"{name}.npz", allow_pickle=False) as arrays:
+            stored = {part: arrays[part] for part in arrays.files}
+        return stored if bytes(stored.pop("of").tobytes()) == _encode_key(key) else None
     except Exception:  # a damaged file can raise any error of zipfile and numpy
         return None
 
 
-def save(library: Library, name: str, arrays: dict[str, np.ndarray]) -> None:
+def save_arrays(library: Library, name: str, arrays: dict[str, np.ndarray]) -> None:
     """Save arrays as `name`; the file is written completely or not at all.
 
     Args:
@@ -46,22 +46,22 @@ def save(library: Library, name: str, arrays: dict[str, np.ndarray]) -> None:
         name: file name without `.npz`.
         arrays: arrays by name, none with dtype object.
     """
-    if library.kept is None:
+    if library.cache_location is None:
         return
-    place, key = library.kept
+    folder, key = library.cache_location
     try:
-        Path(place).mkdir(parents=True, exist_ok=True)
+        Path(folder).mkdir(parents=True, exist_ok=True)
         # write to a temporary file in the same folder, then rename: readers never see half a file
-        handle, beside = tempfile.mkstemp(suffix=".part", dir=place)
+        handle, temporary = tempfile.mkstemp(suffix=".part", dir=folder)
     except OSError:
         return
     try:
         with os.fdopen(handle, "wb") as file:
-            np.savez(file, of=np.frombuffer(_of(key), np.uint8), **arrays)
-        os.replace(beside, Path(place) / f"{name}.npz")
+            np.savez(file, of=np.frombuffer(_encode_key(key), np.uint8), **arrays)
+        os.replace(temporary, Path(folder) / f"{name}.npz")
     except OSError:
-        Path(beside).unlink(missing_ok=True)
+        Path(temporary).unlink(missing_ok=True)
 
 
-def _of(key: str) -> bytes:
+def _encode_key(key: str) -> bytes:
     return f"{VERSION} {key}".encode()

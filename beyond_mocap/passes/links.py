@@ -16,14 +16,14 @@ import numpy as np
 from ..base.errors import InputError
 from ..library.library import Library
 from ..motion import quaternion
-from ..motion.humanoid import heading_from_positions, identify
-from ..motion.motion import Motion, at_frames, pose_kinematics
+from ..motion.humanoid import compute_heading_from_positions, identify_joints
+from ..motion.motion import Motion, sample_frames, compute_pose
 from . import kept
 from .pass_scene import BONES
 
-_FINE = 60.0  # Hz: velocities are central differences over two steps of this rate
+_DIFFERENCE_RATE = 60.0  # Hz: velocities are central differences over two steps of this rate
 
-_known: weakref.WeakKeyDictionary[Library, np.ndarray] = weakref.WeakKeyDictionary()  # library -> `measure_bones`
+_bones_of_library: weakref.WeakKeyDictionary[Library, np.ndarray] = weakref.WeakKeyDictionary()  # library -> `measure_bones`
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class BoneWeights:
                 raise InputError(f"{name} weights", f"{values}", expected)
 
 
-def aligned(motion: Motion, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def align_poses(motion: Motion, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Compute positions and velocities of BONES in the body's own frame: root above the origin, facing X.
 
     A hand or head that the skeleton lacks takes the chest's place.
@@ -60,27 +60,27 @@ def aligned(motion: Motion, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]
         positions: (N, 6, 3) m.
         velocities: (N, 6, 3) m/s.
     """
-    step = motion.fps / _FINE
-    before, here, after = (_bones(motion, frames + offset) for offset in (-step, 0.0, step))
+    step = motion.fps / _DIFFERENCE_RATE
+    earlier, now, later = (_find_bones(motion, frames + offset) for offset in (-step, 0.0, step))
     # frames really between the two samples: fewer at the clip's ends, where samples are clamped
-    taken = np.clip(frames + step, 0, len(motion) - 1) - np.clip(frames - step, 0, len(motion) - 1)
-    velocity = (after[0] - before[0]) * (motion.fps / np.maximum(taken, 1e-9))[:, None, None]
-    places, facing = here
+    spanned = np.clip(frames + step, 0, len(motion) - 1) - np.clip(frames - step, 0, len(motion) - 1)
+    velocity = (later[0] - earlier[0]) * (motion.fps / np.maximum(spanned, 1e-9))[:, None, None]
+    places, facing = now
     # remove the heading and the root's place on the ground
-    turn = quaternion.about_up(-facing)[:, None]
+    turn = quaternion.from_up_angle(-facing)[:, None]
     return quaternion.rotate(turn, places - places[:, :1] * [1.0, 1.0, 0.0]), quaternion.rotate(turn, velocity)
 
 
-def _bones(motion: Motion, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _find_bones(motion: Motion, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Compute world positions (N, 6, 3) m of BONES and the heading (N,) rad at fractional frames (N,)."""
-    root, local = at_frames(motion, frames)
-    places, _ = pose_kinematics(motion.skeleton, root, local)
-    body = identify(motion.skeleton)
+    root, local = sample_frames(motion, frames)
+    places, _ = compute_pose(motion.skeleton, root, local)
+    body = identify_joints(motion.skeleton)
     chest = body.chest
     joints = [body.hips, chest if body.head is None else body.head,
               *(chest if limb.hand is None else limb.hand for limb in (body.left, body.right)), body.left.toe_or_foot,
               body.right.toe_or_foot]
-    return places[:, joints], heading_from_positions(motion.skeleton, places)
+    return places[:, joints], compute_heading_from_positions(motion.skeleton, places)
 
 
 def weigh_bones(library: Library, weights: BoneWeights = BoneWeights()) -> np.ndarray:
@@ -108,18 +108,18 @@ def measure_bones(library: Library) -> np.ndarray:
     Returns:
         (N, 12, 3) float32: positions in m, then velocities in m/s, in the body's own frame.
     """
-    if library not in _known:
-        arrays = kept.load(library, "bones")
+    if library not in _bones_of_library:
+        arrays = kept.load_arrays(library, "bones")
         if arrays is None or len(arrays["bones"]) != len(library.frames):
-            arrays = {"bones": _measured(library)}
-            kept.save(library, "bones", arrays)
-        _known[library] = arrays["bones"]
-    return _known[library]
+            arrays = {"bones": _measure_clips(library)}
+            kept.save_arrays(library, "bones", arrays)
+        _bones_of_library[library] = arrays["bones"]
+    return _bones_of_library[library]
 
 
-def _measured(library: Library) -> np.ndarray:
+def _measure_clips(library: Library) -> np.ndarray:
     frames = library.frames
     parts = []
     for clip, first, count in zip(library.clips, frames.first, frames.count):
-        parts.append(np.concatenate(aligned(clip.motion, frames.source[first : first + count]), axis=1))
+        parts.append(np.concatenate(align_poses(clip.motion, frames.source[first : first + count]), axis=1))
     return np.concatenate(parts).astype(np.float32)

@@ -17,30 +17,30 @@ from ..base.easing import smoothstep
 from ..base.errors import InputError
 from ..library.library import Library
 from ..motion import quaternion
-from ..motion.humanoid import heading
+from ..motion.humanoid import compute_heading
 from ..motion.motion import Motion
 from ..motion.track.ball_path import BallPath
-from .bodies import BodySettings, least_seconds, player_motion
-from .hit_library import kind_of
+from .bodies import BodySettings, estimate_least_seconds, build_player_motion
+from .hit_library import classify_hit
 from .hits import HitMotion
 from .pass_plan import PassPlan
 from .pass_scene import GROUND, Example, Pass, PassScene
-from .passes import ball_of, ball_path, bone_weights, planned
+from .passes import build_ball, build_ball_path, build_bone_weights, plan_scene
 from .way import Stance
 
-LONG = 60.0
+STANDING_SECONDS = 60.0
 """Seconds that all players keep standing if the user does not act."""
-FADE = 0.4
+BLEND_SECONDS = 0.4
 """Seconds over which a player's previous motion blends into the new one."""
-AHEAD = 0.6
+BALL_DISTANCE = 0.6
 """Metres from the holder to the ball at the start."""
 _TAIL, _SWAY = 4.0, 2.5  # s: standing that is synthesized after a pass; its end that is repeated forth and back
-_STOPPED = 1.2  # s after the last strike at which the receiver can act
+_READY_SECONDS = 1.2  # s after the last strike at which the receiver can act
 _ROUNDS = 2  # plans before the final one, each moving the holder nearer to where the ball lies
 
 
 @dataclass(frozen=True, eq=False)
-class Played:
+class PlayerTimeline:
     """The motion of one player of a rally.
 
     Attributes:
@@ -51,11 +51,11 @@ class Played:
     start: float
     motion: Motion
 
-    def at(self, seconds: float) -> Stance:
+    def stance_at(self, seconds: float) -> Stance:
         """Compute where the player stands at `seconds` on the scene's clock."""
         frame = int(np.clip(round((seconds - self.start) * self.motion.fps), 0, len(self.motion) - 1))
         one = self.motion.frames(frame, frame + 1)
-        return Stance(tuple(float(v) for v in one.root_positions[0, :2]), float(heading(one)[0]))
+        return Stance(tuple(float(v) for v in one.root_positions[0, :2]), float(compute_heading(one)[0]))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -74,13 +74,13 @@ class Rally:
 
     scene: PassScene
     holder: str
-    players: dict[str, Played]
+    players: dict[str, PlayerTimeline]
     ball: BallPath
     start: float
-    free: float
+    ready_time: float
     passes: int = 0
 
-    def after(self, piece: Piece, at: float) -> Rally:
+    def add_pass(self, live_pass: LivePass, at: float) -> Rally:
         """Build the rally with a pass that begins on the next frame after `at` s.
 
         Args:
@@ -91,15 +91,15 @@ class Rally:
         """
         at = self.start + np.ceil((at - self.start) * self.scene.fps - 1e-6) / self.scene.fps
         players = dict(self.players)
-        for name, motion in piece.motions.items():
-            players[name] = _going_on(self.players[name], motion, at)
-        ball = _on_from(self.ball, piece.ball, at)
-        return replace(self, holder=piece.receiver, players=players, ball=ball, free=at + piece.seconds,
+        for name, motion in live_pass.motions.items():
+            players[name] = _continue_motion(self.players[name], motion, at)
+        ball = _continue_ball(self.ball, live_pass.ball, at)
+        return replace(self, holder=live_pass.receiver, players=players, ball=ball, ready_time=at + live_pass.seconds,
                        passes=self.passes + 1)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Piece:
+class LivePass:
     """One pass from standing to standing, with its own clock from 0.
 
     Attributes:
@@ -123,7 +123,7 @@ class Piece:
     warnings: tuple[str, ...]
 
 
-def begin(library: Library, scene: PassScene, holder: str, start: float = 0.0, progress=None, cancelled=None) -> Rally:
+def start_rally(library: Library, scene: PassScene, holder: str, start: float = 0.0, progress=None, cancelled=None) -> Rally:
     """Start a rally: all players stand where the scene says, the ball is in front of the holder.
 
     Args:
@@ -141,23 +141,23 @@ def begin(library: Library, scene: PassScene, holder: str, start: float = 0.0, p
     names = [player.name for player in scene.players]
     if holder not in names:
         raise InputError("holder", f"{holder!r}", f"one of {', '.join(names)}")
-    facing, place, radius = scene.facing(holder), scene.player(holder).place, ball_of(scene).radius
-    lies = np.array([place[0] + AHEAD * np.cos(facing), place[1] + AHEAD * np.sin(facing), radius])
+    facing, place, radius = scene.find_facing(holder), scene.find_player(holder).place, build_ball(scene).radius
+    ball_place = np.array([place[0] + BALL_DISTANCE * np.cos(facing), place[1] + BALL_DISTANCE * np.sin(facing), radius])
     times = np.arange(int(_TAIL * scene.fps) + 1) / scene.fps
-    ball = BallPath(times, np.tile(lies, (len(times), 1)), np.ones(len(times), bool))
+    ball = BallPath(times, np.tile(ball_place, (len(times), 1)), np.ones(len(times), bool))
     players = {}
     for number, player in enumerate(scene.players):
         if progress:
             progress(number / len(names), f"{player.name} standing")
-        stance = Stance(player.place, scene.facing(player.name))
-        moved = player_motion(library, stance, (), ball=ball, ball_radius=radius, fps=scene.fps,
-                              settings=_settings(scene), cancelled=cancelled)
-        players[player.name] = Played(start, _lasting(moved.take.motion))
-    return Rally(scene=scene, holder=holder, players=players, ball=_on_from(None, ball, start), start=start, free=start)
+        stance = Stance(player.place, scene.find_facing(player.name))
+        player_motion = build_player_motion(library, stance, (), ball=ball, ball_radius=radius, fps=scene.fps,
+                              settings=_build_settings(scene), cancelled=cancelled)
+        players[player.name] = PlayerTimeline(start, _extend_standing(player_motion.take.motion))
+    return Rally(scene=scene, holder=holder, players=players, ball=_continue_ball(None, ball, start), start=start, ready_time=start)
 
 
-def answer(library: Library, rally: Rally, now: float, hit: HitMotion, target: str, bounces: int = 0,
-           progress: Callable[[float, str], None] | None = None, cancelled: Callable[[], bool] | None = None) -> Piece:
+def build_answer(library: Library, rally: Rally, now: float, hit: HitMotion, target: str, bounces: int = 0,
+           progress: Callable[[float, str], None] | None = None, cancelled: Callable[[], bool] | None = None) -> LivePass:
     """Build the pass with which the holder answers a hit of the user: the most similar motion of the library (eq. 2).
 
     Args:
@@ -176,9 +176,9 @@ def answer(library: Library, rally: Rally, now: float, hit: HitMotion, target: s
         NotInLibrary: if no clip strikes with that part.
         Cancelled: if `cancelled` returns True.
     """
-    stances = {name: played.at(now) for name, played in rally.players.items()}
-    lies = rally.ball.positions[min(int(np.searchsorted(rally.ball.times, now)), len(rally.ball.times) - 1)]
-    one = Pass(rally.holder, target, kind_of(hit), bounces=bounces, part=hit.part, side=hit.side,
+    stances = {name: played.stance_at(now) for name, played in rally.players.items()}
+    ball_place = rally.ball.positions[min(int(np.searchsorted(rally.ball.times, now)), len(rally.ball.times) - 1)]
+    one = Pass(rally.holder, target, classify_hit(hit), bounces=bounces, part=hit.part, side=hit.side,
                example=Example("", hit=hit))
     scene = replace(
         rally.scene, passes=(one,), repeat=1, missed=0.0, dropped=0.0, lead_in=0.0, lead_out=_TAIL, serve=GROUND,
@@ -187,28 +187,28 @@ def answer(library: Library, rally: Rally, now: float, hit: HitMotion, target: s
             for player in rally.scene.players
         ),
     )
-    plan = _planned(library, scene, stances[rally.holder], lies=lies, progress=progress, cancelled=cancelled)
-    path = ball_path(plan)
-    path = replace(path, positions=_rolled(path, lies, plan.strikes[0].order.time))
+    plan = _plan_pass(library, scene, stances[rally.holder], ball_place=ball_place, progress=progress, cancelled=cancelled)
+    path = build_ball_path(plan)
+    path = replace(path, positions=_roll_ball(path, ball_place, plan.strikes[0].order.time))
     motions = {}
     for name in (one.giver, one.receiver):
-        moved = player_motion(library, stances[name], plan.orders(name), ball=path, ball_radius=ball_of(scene).radius,
-                              fps=scene.fps, settings=_settings(scene), cancelled=cancelled)
-        motions[name] = _lasting(moved.take.motion)
+        player_motion = build_player_motion(library, stances[name], plan.list_orders(name), ball=path, ball_radius=build_ball(scene).radius,
+                              fps=scene.fps, settings=_build_settings(scene), cancelled=cancelled)
+        motions[name] = _extend_standing(player_motion.take.motion)
     strikes = plan.strikes
     clip = library.clips[strikes[0].order.clip].path
-    seconds = strikes[-1].order.time + _STOPPED
-    return Piece(giver=one.giver, receiver=target, motions=motions, ball=path, strike=strikes[0].order.time,
+    seconds = strikes[-1].order.time + _READY_SECONDS
+    return LivePass(giver=one.giver, receiver=target, motions=motions, ball=path, strike=strikes[0].order.time,
                  seconds=seconds, clip=clip, warnings=plan.warnings)
 
 
-def _settings(scene: PassScene) -> BodySettings:
+def _build_settings(scene: PassScene) -> BodySettings:
     """Build the players' settings of a scene."""
-    weights = bone_weights(scene.weights)
+    weights = build_bone_weights(scene.weights)
     return BodySettings(transition=scene.transition, watch=scene.watch, seed=scene.seed, weights=weights)
 
 
-def _planned(library: Library, scene: PassScene, stance: Stance, lies: np.ndarray, progress, cancelled) -> PassPlan:
+def _plan_pass(library: Library, scene: PassScene, stance: Stance, ball_place: np.ndarray, progress, cancelled) -> PassPlan:
     """Plan the pass while the ball stays where it lies: the holder goes to where they strike it.
 
     Where the holder's motion is no kick from the ground, the ball hops up to them.
@@ -216,71 +216,71 @@ def _planned(library: Library, scene: PassScene, stance: Stance, lies: np.ndarra
     giver = scene.passes[0].giver
     try:
         for _ in range(_ROUNDS):
-            plan = planned(library, scene, progress, cancelled)
-            shift = lies[:2] - np.array(plan.strikes[0].order.ball[:2])
-            seconds = least_seconds(library, stance, plan.strikes[0].order)
-            place = np.array(scene.player(giver).place) + shift
+            plan = plan_scene(library, scene, progress, cancelled)
+            shift = ball_place[:2] - np.array(plan.strikes[0].order.ball[:2])
+            seconds = estimate_least_seconds(library, stance, plan.strikes[0].order)
+            place = np.array(scene.find_player(giver).place) + shift
             scene = replace(
                 scene, lead_in=max(seconds, 0.3),
                 players=tuple(replace(one, place=tuple(place)) if one.name == giver else one for one in scene.players),
             )
-        return planned(library, scene, progress, cancelled)
+        return plan_scene(library, scene, progress, cancelled)
     except InputError as error:
         if not str(error).startswith("serve"):
             raise
     players = tuple(replace(one, place=stance.place) if one.name == giver else one for one in scene.players)
-    return planned(library, replace(scene, serve=tuple(lies), players=players), progress, cancelled)
+    return plan_scene(library, replace(scene, serve=tuple(ball_place), players=players), progress, cancelled)
 
 
-def _rolled(path: BallPath, lies: np.ndarray, strike: float) -> np.ndarray:
+def _roll_ball(path: BallPath, ball_place: np.ndarray, strike: float) -> np.ndarray:
     """Compute the ball's positions (T, 3) m, blended from where it lies to where it is struck: a few centimetres."""
-    away = lies - path.positions[0]
-    return path.positions + (1.0 - smoothstep(path.times / max(strike, 1e-6)))[:, None] * away
+    offset = ball_place - path.positions[0]
+    return path.positions + (1.0 - smoothstep(path.times / max(strike, 1e-6)))[:, None] * offset
 
 
-def _lasting(motion: Motion) -> Motion:
+def _extend_standing(motion: Motion) -> Motion:
     """Extend a motion that ends standing by STANDING_SECONDS, playing its last seconds forth and back."""
     count = len(motion)
     sway = min(int(_SWAY * motion.fps), count - 1)
     # a triangle wave over the last `sway` frames
-    more = np.arange(1, int(LONG * motion.fps) + 1) % (2 * sway)
+    more = np.arange(1, int(STANDING_SECONDS * motion.fps) + 1) % (2 * sway)
     frames = np.concatenate([np.arange(count), count - 1 - np.where(more <= sway, more, 2 * sway - more)])
     return replace(motion, root_positions=motion.root_positions[frames], rotations=motion.rotations[frames])
 
 
-def _going_on(before: Played, motion: Motion, at: float) -> Played:
+def _continue_motion(before: PlayerTimeline, motion: Motion, at: float) -> PlayerTimeline:
     """Continue a player's motion with `motion` from `at` s on, blended in over BLEND_SECONDS."""
-    root, rotations = _faded(before, motion, at)
+    root, rotations = _blend_in(before, motion, at)
     past = np.clip(np.arange(round((at - before.start) * motion.fps)), 0, len(before.motion) - 1)
     root = np.concatenate([before.motion.root_positions[past], root])
     rotations = np.concatenate([before.motion.rotations[past], rotations])
-    return Played(before.start, replace(motion, root_positions=root, rotations=rotations))
+    return PlayerTimeline(before.start, replace(motion, root_positions=root, rotations=rotations))
 
 
-def _faded(before: Played, motion: Motion, at: float) -> tuple[np.ndarray, np.ndarray]:
+def _blend_in(before: PlayerTimeline, motion: Motion, at: float) -> tuple[np.ndarray, np.ndarray]:
     """Compute the root positions (T, 3) m and rotations (T, J, 4) of a motion that begins at `at` s, blended in."""
-    count = min(int(FADE * motion.fps) + 1, len(motion))
+    count = min(int(BLEND_SECONDS * motion.fps) + 1, len(motion))
     first = round((at - before.start) * motion.fps)
     frames = np.clip(np.arange(first, first + count), 0, len(before.motion) - 1)
     weight = smoothstep(np.arange(count) / max(count - 1, 1))[:, None]
     root, rotations = np.array(motion.root_positions), np.array(motion.rotations)
     root[:count] = (1.0 - weight) * before.motion.root_positions[frames] + weight * root[:count]
-    old = quaternion.signed_like(before.motion.rotations[frames], rotations[:count])
+    old = quaternion.match_signs(before.motion.rotations[frames], rotations[:count])
     rotations[:count] = quaternion.slerp(old, rotations[:count], weight)
     return root, rotations
 
 
-def _on_from(before: BallPath | None, path: BallPath, at: float) -> BallPath:
+def _continue_ball(before: BallPath | None, path: BallPath, at: float) -> BallPath:
     """Join the ball's path so far with `path` from `at` s on, then let it lie for STANDING_SECONDS."""
     step = path.times[1] - path.times[0]
-    more = int(round(LONG / step))
-    times = np.concatenate([path.times, path.times[-1] + step * np.arange(1, more + 1)]) + at
-    places = np.concatenate([path.positions, np.repeat(path.positions[-1:], more, axis=0)])
-    turns = path.rotations if path.rotations is not None else quaternion.identity(len(path.times))
-    turns = np.concatenate([turns, np.repeat(turns[-1:], more, axis=0)])
+    added = int(round(STANDING_SECONDS / step))
+    times = np.concatenate([path.times, path.times[-1] + step * np.arange(1, added + 1)]) + at
+    places = np.concatenate([path.positions, np.repeat(path.positions[-1:], added, axis=0)])
+    rotations = path.rotations if path.rotations is not None else quaternion.identity(len(path.times))
+    rotations = np.concatenate([rotations, np.repeat(rotations[-1:], added, axis=0)])
     if before is None:
-        return BallPath(times, places, np.ones(len(times), bool), turns)
-    kept = before.times < at - 0.5 * step
-    turns = quaternion.multiply(turns, before.rotations[kept][-1] if kept.any() else quaternion.identity(1)[0])
-    return BallPath(np.concatenate([before.times[kept], times]), np.concatenate([before.positions[kept], places]),
-                    np.ones(int(kept.sum()) + len(times), bool), np.concatenate([before.rotations[kept], turns]))
+        return BallPath(times, places, np.ones(len(times), bool), rotations)
+    is_before = before.times < at - 0.5 * step
+    rotations = quaternion.multiply(rotations, before.rotations[is_before][-1] if is_before.any() else quaternion.identity(1)[0])
+    return BallPath(np.concatenate([before.times[is_before], times]), np.concatenate([before.positions[is_before], places]),
+                    np.ones(int(is_before.sum()) + len(times), bool), np.concatenate([before.rotations[is_before], rotations]))

@@ -10,23 +10,23 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..ball.aim import Aimed, aim
-from ..ball.batch import after, launched
-from ..ball.contact import Tool, in_world
-from ..ball.physics import FASTEST, Ball, rolling_spin
-from ..base.errors import Cancelled
-from ..base.vectors import cross_level
+from ..ball.aim import AimResult, solve_launches
+from ..ball.batch import simulate_balls, build_balls
+from ..ball.contact import Tool, convert_to_world
+from ..ball.physics import HUMAN_BALL_SPEEDS, Ball, compute_rolling_spin
+from ..base.errors import UserCancelledError
+from ..base.vectors import cross_on_ground
 from ..motion import quaternion
-from .pass_scene import GROUND, Net, Pass, PassScene, served_by
+from .pass_scene import GROUND, Net, Pass, PassScene, find_server
 from .strike_choice import StrikeMoments
 
 ON_TARGET = 0.02
 """Metres from its target within which a ball counts as arrived."""
-SERVED_FROM, SERVED_HEIGHT = 0.4, 1.2
+SERVE_DISTANCE, SERVE_HEIGHT = 0.4, 1.2
 """Metres in front of the serving player, and above the ground, from where the first ball comes."""
-SERVED_SECONDS, SERVED_PER_METRE, LONGEST_SERVE = 0.5, 0.07, 3.0
+SERVE_SECONDS, SERVE_SECONDS_PER_METRE, LONGEST_SERVE = 0.5, 0.07, 3.0
 """Seconds that a serve flies, how many more for each metre, and the most."""
-TIMES = np.linspace(0.1, 2.5, 25)
+SAMPLE_TIMES = np.linspace(0.1, 2.5, 25)
 """Seconds after a strike at which natural trajectories are sampled."""
 SPEEDS = {"toss": (4.5, 8.0), "pass": (5.0, 12.0), "attack": (9.0, 25.0)}
 """Lowest and highest launch speed of each kind of pass, m/s."""
@@ -35,28 +35,28 @@ SPINS = {"toss": -0.1, "pass": -0.1, "attack": 0.2}
 
 Struck from below it spins back; struck hard it spins forward.
 """
-LONG = {"toss": 1.5, "pass": 1.5, "attack": 0.9}  # s
-PER_SECOND = 2.0
+LONG_TRAVEL = {"toss": 1.5, "pass": 1.5, "attack": 0.9}  # s
+COST_PER_SECOND = 2.0
 """m/s of cost for each second of travel beyond LONG_TRAVEL."""
 RISES = {"toss": (0.7, 0.95), "pass": (0.4, 0.8), "attack": (-0.4, 0.3)}
 """Sines of the lowest and highest launch angle above the ground of each kind of pass."""
-BEHIND, PER_RADIAN = np.radians(100.0), 2.0
+BEHIND, COST_PER_RADIAN = np.radians(100.0), 2.0
 """Rad from the heading beyond which a body does not see a ball come, and cost in m/s of each further radian."""
-MOST_MISS, PER_TRAVEL = 4.0, 0.8  # m: most that a miss counts; m/s for each metre that a hit motion travels
-IN_THE_WAY, PERSON, TALL = 6.0, 0.45, 1.9
+MOST_MISS, COST_PER_METRE = 4.0, 0.8  # m: most that a miss counts; m/s for each metre that a hit motion travels
+BLOCKED_COST, PLAYER_RADIUS, PLAYER_HEIGHT = 6.0, 0.45, 1.9
 """m/s of cost to fly through the middle of a player; radius in m of a player with room around; height in m."""
-THROUGH = 0.35 * IN_THE_WAY
+HIT_COST = 0.35 * BLOCKED_COST
 """Cost from which on a ball meets the body itself."""
-PUSHED = 2.0
+PUSH_COST = 2.0
 """m/s of cost for pushing a ball across the part's direction; pushing it backward costs twice as much."""
-RISES_STILL, PER_RISE = 1.0, 0.5
+STEADY_RISE, RISE_COST = 1.0, 0.5
 """m/s upward with which a ball can still arrive, and cost of each further m/s: it has bounced a moment ago."""
-OWN_BODY, TRUNK, TRUNK_FROM = 8.0, 0.22, 0.8
+TRUNK_COST, TRUNK_RADIUS, TRUNK_FROM = 8.0, 0.22, 0.8
 """m/s of cost to fly through the middle of a trunk; its radius and lower end in m."""
 TRUNK_TO = {"head": 1.35, "chest": 0.0}  # m, by the part that strikes
-UPRIGHT = 1.7
+TRUNK_HEIGHT = 1.7
 """Metres up to which a ball stays clear of the striking body, for parts that TRUNK_TO does not have."""
-A_MOMENT = 1e-3  # s before arrival at which a ball's velocity is read
+ARRIVAL_STEP = 1e-3  # s before arrival at which a ball's velocity is read
 _STEPS = 30  # pieces into which a flight is cut
 
 
@@ -84,17 +84,17 @@ class Site:
     tool: Tool | None
     size: float
     moments: StrikeMoments
-    asked: Pass | None
+    requested: Pass | None
 
     @property
     def height(self) -> float:
         """Approximate height in m above the ground at which a ball is met here."""
-        middle = 0.5 * (self.moments.struck.start + self.moments.struck.end)
+        middle = 0.5 * (self.moments.part_states.start + self.moments.part_states.end)
         return float(np.median(middle[:, 2]))
 
 
 @dataclass(frozen=True, eq=False)
-class Natural:
+class NaturalFlights:
     """Natural trajectories of a strike's ball (Fig. 6, black).
 
     Attributes:
@@ -105,7 +105,7 @@ class Natural:
 
     starts: np.ndarray
     velocities: np.ndarray
-    chosen: int
+    chosen_index: int
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -124,10 +124,10 @@ class Link:
     facing: float
     seconds: float
     velocity: np.ndarray
-    natural: Natural
+    natural: NaturalFlights
 
 
-class Court:
+class PassProblem:
     """A scene with the sites of all its strikes; the last one is where the last pass ends.
 
     Attributes:
@@ -139,40 +139,40 @@ class Court:
     def __init__(self, scene: PassScene, sites: list[Site], ball: Ball, cancelled: Callable[[], bool]):
         self.scene, self.sites, self.ball, self.cancelled = scene, sites, ball, cancelled
         self.last = len(sites) - 1
-        self.passes = [site.asked for site in sites[:-1]]
-        self.others = self._standing_by()
+        self.passes = [site.requested for site in sites[:-1]]
+        self.others = self._list_others()
 
-    def check(self) -> None:
+    def check_cancelled(self) -> None:
         """Raise Cancelled if the user cancels."""
         if self.cancelled():
-            raise Cancelled("cancelled")
+            raise UserCancelledError("cancelled")
 
-    def name(self, number: int) -> str:
+    def describe_pass(self, number: int) -> str:
         """Describe a pass for messages."""
         one = self.passes[number]
         return f"pass {number + 1}, from {one.giver} to {one.receiver}"
 
-    def fastest(self, number: int) -> float:
+    def find_fastest(self, number: int) -> float:
         """Highest speed in m/s that a human gives a ball at a strike."""
-        return FASTEST.get(self.sites[number].part, FASTEST["foot"])
+        return HUMAN_BALL_SPEEDS.get(self.sites[number].part, HUMAN_BALL_SPEEDS["foot"])
 
-    def whence(self, number: int) -> np.ndarray:
+    def find_origin(self, number: int) -> np.ndarray:
         """Place (2,) m from where the ball of a strike comes."""
         if number:
             return self.sites[number - 1].place
         serve = self.scene.serve
         if serve == GROUND:
-            return self.toward(0)[:2]
+            return self.find_target(0)[:2]
         if isinstance(serve, tuple):
             return np.array(serve[:2])
-        return np.array(self.scene.player(serve or served_by(self.scene)).place)
+        return np.array(self.scene.find_player(serve or find_server(self.scene)).place)
 
-    def toward(self, number: int) -> np.ndarray:
+    def find_target(self, number: int) -> np.ndarray:
         """Approximate target (3,) m of a strike's ball; the last one goes back to where it came from."""
         other = self.sites[number + 1 if number < self.last else number - 1]
         return np.array([*other.place, other.height])
 
-    def in_the_way(self, number: int, ways: np.ndarray) -> np.ndarray:
+    def compute_blocked_cost(self, number: int, trajectories: np.ndarray) -> np.ndarray:
         """Compute how far flights of a pass go through each of its `others`.
 
         Args:
@@ -181,9 +181,9 @@ class Court:
         Returns:
             (N, P) m/s of cost.
         """
-        return out_of_the_way(ways, np.array([place for _, place in self.others[number]]).reshape(-1, 2))
+        return compute_player_cost(trajectories, np.array([place for _, place in self.others[number]]).reshape(-1, 2))
 
-    def clear(self, ways: np.ndarray) -> np.ndarray:
+    def clears_net(self, trajectories: np.ndarray) -> np.ndarray:
         """Whether trajectories clear the net, if there is one.
 
         Args:
@@ -192,10 +192,10 @@ class Court:
             (N,) bool.
         """
         net = self.scene.net
-        return np.ones(len(ways), bool) if net is None else clears_net(ways, self.ball.radius, net)
+        return np.ones(len(trajectories), bool) if net is None else is_clear_of_net(trajectories, self.ball.radius, net)
 
-    def flown(self, number: int, start: np.ndarray, target: np.ndarray,
-              seconds: np.ndarray) -> tuple[Aimed, np.ndarray]:
+    def solve_launches(self, number: int, start: np.ndarray, target: np.ndarray,
+              seconds: np.ndarray) -> tuple[AimResult, np.ndarray]:
         """Solve the launches of a pass.
 
         Args:
@@ -207,42 +207,42 @@ class Court:
             launches: S launches.
             possible: (S,) bool, what a human can give and what clears the net.
         """
-        spin = spun(start, target, seconds, self.ball, self.sites[number].kind)
-        aimed = aim(start, target, self.ball, seconds=seconds, bounces=self.passes[number].bounces, spin=spin,
-                    fastest=self.fastest(number))
-        clear = self.clear(ways_of(start, aimed.velocity, spin, seconds, self.ball))
+        spin = compute_spin(start, target, seconds, self.ball, self.sites[number].kind)
+        aimed = solve_launches(start, target, self.ball, seconds=seconds, bounces=self.passes[number].bounces, spin=spin,
+                    fastest=self.find_fastest(number))
+        clear = self.clears_net(simulate_flights(start, aimed.velocity, spin, seconds, self.ball))
         return aimed, aimed.possible & (aimed.miss <= ON_TARGET) & clear
 
-    def ball_on(self, number: int, link: Link, normal: np.ndarray) -> np.ndarray:
+    def place_ball(self, number: int, link: Link, normal: np.ndarray) -> np.ndarray:
         """Compute the ball's centre (3,) m on the part of a strike toward `normal` (3,), world frame."""
-        own = quaternion.rotate(quaternion.about_up(np.array([-link.facing])), normal[None])
-        place = in_world(link.moment.ball(own, self.ball.radius), self.sites[number].place, np.array([link.facing]))[0]
+        own = quaternion.rotate(quaternion.from_up_angle(np.array([-link.facing])), normal[None])
+        place = convert_to_world(link.moment.place_ball(own, self.ball.radius), self.sites[number].place, np.array([link.facing]))[0]
         if number == 0 and self.scene.serve == GROUND:
             place[2] = self.ball.radius
         return place
 
-    def serving_place(self, place: np.ndarray) -> np.ndarray:
+    def find_serving_place(self, place: np.ndarray) -> np.ndarray:
         """Compute the place (3,) m from where the first ball comes to `place` (3,) m."""
         serve = self.scene.serve
         if isinstance(serve, tuple):
             return np.maximum(np.array(serve), [-np.inf, -np.inf, self.ball.radius])
-        whence = self.whence(0)
-        way = place[:2] - whence
-        return np.array([*(whence + SERVED_FROM * way / max(np.linalg.norm(way), 1e-9)), SERVED_HEIGHT])
+        origin = self.find_origin(0)
+        toward = place[:2] - origin
+        return np.array([*(origin + SERVE_DISTANCE * toward / max(np.linalg.norm(toward), 1e-9)), SERVE_HEIGHT])
 
-    def serving_seconds(self, place: np.ndarray) -> float:
+    def find_serving_seconds(self, place: np.ndarray) -> float:
         """Compute the flight time in s of the first ball to `place` (3,) m, on whole frames: a slow throw that clears
         the net.
         """
-        start, fps = self.serving_place(place), self.scene.fps
-        quiet = SERVED_SECONDS + SERVED_PER_METRE * float(np.linalg.norm(place[:2] - start[:2]))
-        tried = np.ceil(np.linspace(quiet, max(LONGEST_SERVE, quiet), 8) * fps) / fps
+        start, fps = self.find_serving_place(place), self.scene.fps
+        slowest = SERVE_SECONDS + SERVE_SECONDS_PER_METRE * float(np.linalg.norm(place[:2] - start[:2]))
+        tried = np.ceil(np.linspace(slowest, max(LONGEST_SERVE, slowest), 8) * fps) / fps
         starts = np.tile(start, (len(tried), 1))
-        aimed = aim(starts, place, self.ball, tried, 0)
-        good = (aimed.miss <= ON_TARGET) & self.clear(ways_of(starts, aimed.velocity, None, tried, self.ball))
+        aimed = solve_launches(starts, place, self.ball, tried, 0)
+        good = (aimed.miss <= ON_TARGET) & self.clears_net(simulate_flights(starts, aimed.velocity, None, tried, self.ball))
         return float(tried[np.argmax(good)])
 
-    def _standing_by(self) -> list[list[tuple[str, np.ndarray]]]:
+    def _list_others(self) -> list[list[tuple[str, np.ndarray]]]:
         """List, for each pass, the names and places of the players that have no part in it."""
         places = {player.name: np.array(player.place, float) for player in self.scene.players}
         out = []
@@ -253,12 +253,12 @@ class Court:
         return out
 
 
-def turned(vectors: np.ndarray, angle: float) -> np.ndarray:
+def rotate_about_up(vectors: np.ndarray, angle: float) -> np.ndarray:
     """Rotate vectors (N, 3) by `angle` rad about the vertical."""
-    return quaternion.rotate(quaternion.about_up(np.array([angle])), vectors)
+    return quaternion.rotate(quaternion.from_up_angle(np.array([angle])), vectors)
 
 
-def cost_of_moments(moments: StrikeMoments, facing: np.ndarray, whence: np.ndarray) -> np.ndarray:
+def compute_moment_cost(moments: StrikeMoments, facing: np.ndarray, to_origin: np.ndarray) -> np.ndarray:
     """Compute the costs of moments apart from their ball's trajectory.
 
     A ball that comes from behind the body costs, and so does a hit motion that travels.
@@ -270,12 +270,12 @@ def cost_of_moments(moments: StrikeMoments, facing: np.ndarray, whence: np.ndarr
     Returns:
         (N,) m/s.
     """
-    comes = np.arctan2(whence[1], whence[0])
+    comes = np.arctan2(to_origin[1], to_origin[0])
     aside = np.abs((comes - facing + np.pi) % (2.0 * np.pi) - np.pi)
-    return PER_RADIAN * np.maximum(aside - BEHIND, 0.0) + PER_TRAVEL * moments.travel
+    return COST_PER_RADIAN * np.maximum(aside - BEHIND, 0.0) + COST_PER_METRE * moments.travel
 
 
-def misses(ways: np.ndarray, speeds: np.ndarray, toward: np.ndarray, bounces: int) -> np.ndarray:
+def measure_misses(trajectories: np.ndarray, speeds: np.ndarray, toward: np.ndarray, bounces: int) -> np.ndarray:
     """Compute how far natural trajectories pass their target after the requested bounces.
 
     Args:
@@ -289,22 +289,22 @@ def misses(ways: np.ndarray, speeds: np.ndarray, toward: np.ndarray, bounces: in
     up = speeds[..., 2] > 0.0
     # the velocity turns upward at each bounce
     bounced = np.cumsum(up[:, 1:] & ~up[:, :-1], axis=1)
-    counted = np.concatenate([np.zeros((len(ways), 1), int), bounced], axis=1)
-    far = np.linalg.norm(ways - toward, axis=2) + np.where(counted == bounces, 0.0, 1.0)
+    counted = np.concatenate([np.zeros((len(trajectories), 1), int), bounced], axis=1)
+    far = np.linalg.norm(trajectories - toward, axis=2) + np.where(counted == bounces, 0.0, 1.0)
     return np.minimum(far.min(axis=1), MOST_MISS)
 
 
-def wished(velocities: np.ndarray, kind: str) -> np.ndarray:
+def limit_launch(velocities: np.ndarray, kind: str) -> np.ndarray:
     """Limit natural velocities (N, 3) m/s to the speeds and launch angles of a kind of pass."""
     speed = np.linalg.norm(velocities, axis=1)
     level = np.linalg.norm(velocities[:, :2], axis=1)
     rise = np.clip(velocities[:, 2] / np.maximum(speed, 1e-9), *RISES[kind])
     ahead = np.sqrt(1.0 - rise**2) / np.maximum(level, 1e-9)
-    way = np.concatenate([velocities[:, :2] * ahead[:, None], rise[:, None]], axis=1)
-    return way * np.clip(speed, *SPEEDS[kind])[:, None]
+    direction = np.concatenate([velocities[:, :2] * ahead[:, None], rise[:, None]], axis=1)
+    return direction * np.clip(speed, *SPEEDS[kind])[:, None]
 
 
-def spun(starts: np.ndarray, target: np.ndarray, seconds: np.ndarray, ball: Ball, kind: str) -> np.ndarray:
+def compute_spin(starts: np.ndarray, target: np.ndarray, seconds: np.ndarray, ball: Ball, kind: str) -> np.ndarray:
     """Compute the spin of balls of a kind.
 
     Args:
@@ -316,10 +316,10 @@ def spun(starts: np.ndarray, target: np.ndarray, seconds: np.ndarray, ball: Ball
     Returns:
         (N, 3) rad/s.
     """
-    return SPINS[kind] * rolling_spin((target - starts) / np.asarray(seconds)[:, None], ball)
+    return SPINS[kind] * compute_rolling_spin((target - starts) / np.asarray(seconds)[:, None], ball)
 
 
-def ways_of(starts: np.ndarray, velocities: np.ndarray, spin: np.ndarray | None, seconds: np.ndarray,
+def simulate_flights(starts: np.ndarray, velocities: np.ndarray, spin: np.ndarray | None, seconds: np.ndarray,
             ball: Ball) -> np.ndarray:
     """Simulate the flights of N balls, each at even steps of its own travel time.
 
@@ -332,15 +332,15 @@ def ways_of(starts: np.ndarray, velocities: np.ndarray, spin: np.ndarray | None,
     Returns:
         (N, _STEPS + 1, 3) m.
     """
-    balls = launched(starts, velocities, spin, ball)
+    balls = build_balls(starts, velocities, spin, ball)
     out = [balls.position]
     for _ in range(_STEPS):
-        balls = after(balls, ball, seconds / _STEPS)
+        balls = simulate_balls(balls, ball, seconds / _STEPS)
         out.append(balls.position)
     return np.stack(out, axis=1)
 
 
-def out_of_the_way(ways: np.ndarray, others: np.ndarray) -> np.ndarray:
+def compute_player_cost(trajectories: np.ndarray, others: np.ndarray) -> np.ndarray:
     """Compute the cost of flying through players.
 
     Args:
@@ -350,17 +350,17 @@ def out_of_the_way(ways: np.ndarray, others: np.ndarray) -> np.ndarray:
         (N, P) m/s.
     """
     if not len(others):
-        return np.zeros((len(ways), 0))
-    a, b = ways[:, :-1, None, :2], ways[:, 1:, None, :2]
+        return np.zeros((len(trajectories), 0))
+    a, b = trajectories[:, :-1, None, :2], trajectories[:, 1:, None, :2]
     # the nearest point to each player on each level segment a-b of a trajectory
     share = np.sum((others - a) * (b - a), axis=-1) / np.maximum(np.sum((b - a) ** 2, axis=-1), 1e-9)
     near = np.linalg.norm(others - a - np.clip(share, 0.0, 1.0)[..., None] * (b - a), axis=-1)
-    low = np.minimum(ways[:, :-1, 2], ways[:, 1:, 2])[..., None] < TALL
-    inside = np.where(low, np.maximum(PERSON - near, 0.0) / PERSON, 0.0)
-    return IN_THE_WAY * inside.max(axis=1)
+    low = np.minimum(trajectories[:, :-1, 2], trajectories[:, 1:, 2])[..., None] < PLAYER_HEIGHT
+    inside = np.where(low, np.maximum(PLAYER_RADIUS - near, 0.0) / PLAYER_RADIUS, 0.0)
+    return BLOCKED_COST * inside.max(axis=1)
 
 
-def through_body(ways: np.ndarray, radius: float, place: np.ndarray, tall: float) -> np.ndarray:
+def compute_trunk_cost(trajectories: np.ndarray, radius: float, place: np.ndarray, tall: float) -> np.ndarray:
     """Compute the cost of flying through the trunk of the passer or receiver.
 
     Args:
@@ -371,12 +371,12 @@ def through_body(ways: np.ndarray, radius: float, place: np.ndarray, tall: float
     Returns:
         (N,) m/s.
     """
-    near = np.linalg.norm(ways[..., :2] - place, axis=-1) - radius
-    inside = (ways[..., 2] > TRUNK_FROM) & (ways[..., 2] < tall + radius)
-    return OWN_BODY * np.where(inside, np.clip((TRUNK - near) / TRUNK, 0.0, 1.0), 0.0).max(axis=1)
+    near = np.linalg.norm(trajectories[..., :2] - place, axis=-1) - radius
+    inside = (trajectories[..., 2] > TRUNK_FROM) & (trajectories[..., 2] < tall + radius)
+    return TRUNK_COST * np.where(inside, np.clip((TRUNK_RADIUS - near) / TRUNK_RADIUS, 0.0, 1.0), 0.0).max(axis=1)
 
 
-def arrivals(starts: np.ndarray, velocities: np.ndarray, spin: np.ndarray | None, seconds: np.ndarray,
+def compute_arrivals(starts: np.ndarray, velocities: np.ndarray, spin: np.ndarray | None, seconds: np.ndarray,
              ball: Ball) -> np.ndarray:
     """Compute the velocities with which balls arrive; a ball that is met on the ground has not bounced.
 
@@ -389,10 +389,10 @@ def arrivals(starts: np.ndarray, velocities: np.ndarray, spin: np.ndarray | None
     Returns:
         (N, 3) m/s, ARRIVAL_STEP before arrival.
     """
-    return after(launched(starts, velocities, spin, ball), ball, seconds - A_MOMENT).velocity
+    return simulate_balls(build_balls(starts, velocities, spin, ball), ball, seconds - ARRIVAL_STEP).velocity
 
 
-def against_the_part(arriving: np.ndarray, leaving: np.ndarray, part: np.ndarray) -> np.ndarray:
+def compute_push_cost(arriving: np.ndarray, leaving: np.ndarray, part: np.ndarray) -> np.ndarray:
     """Compute the cost of pushing a ball in another direction than the part moves.
 
     Args:
@@ -405,20 +405,20 @@ def against_the_part(arriving: np.ndarray, leaving: np.ndarray, part: np.ndarray
     push = leaving - arriving
     # cosine of the angle between the ball's change of velocity and the part's movement
     along = push @ part / np.maximum(np.linalg.norm(push, axis=1) * np.linalg.norm(part), 1e-9)
-    return PUSHED * (1.0 - along)
+    return PUSH_COST * (1.0 - along)
 
 
-def lasting(seconds: np.ndarray, kind: str) -> np.ndarray:
+def compute_travel_cost(seconds: np.ndarray, kind: str) -> np.ndarray:
     """Compute the cost (N,) m/s of travel times (N,) s for a kind of pass."""
-    return PER_SECOND * np.maximum(seconds - LONG[kind], 0.0)
+    return COST_PER_SECOND * np.maximum(seconds - LONG_TRAVEL[kind], 0.0)
 
 
-def rising(arriving: np.ndarray) -> np.ndarray:
+def compute_rise_cost(arriving: np.ndarray) -> np.ndarray:
     """Compute the cost (N,) m/s of balls that arrive with `arriving` (N, 3) m/s straight from their bounce."""
-    return PER_RISE * np.maximum(arriving[:, 2] - RISES_STILL, 0.0)
+    return RISE_COST * np.maximum(arriving[:, 2] - STEADY_RISE, 0.0)
 
 
-def clears_net(ways: np.ndarray, radius: float, net: Net) -> np.ndarray:
+def is_clear_of_net(trajectories: np.ndarray, radius: float, net: Net) -> np.ndarray:
     """Whether balls go over the net wherever they cross it.
 
     Args:
@@ -430,11 +430,11 @@ def clears_net(ways: np.ndarray, radius: float, net: Net) -> np.ndarray:
     """
     start, end = np.array(net.start), np.array(net.end)
     along = end - start
-    aside = cross_level(along, ways[..., :2] - start) / np.linalg.norm(along)
+    aside = cross_on_ground(along, trajectories[..., :2] - start) / np.linalg.norm(along)
     # segments whose ends lie on different sides of the net's line, and the point of crossing
     crosses = (aside[:, :-1] > 0.0) != (aside[:, 1:] > 0.0)
     share = aside[:, :-1] / np.where(crosses, aside[:, :-1] - aside[:, 1:], 1.0)
-    at = ways[:, :-1] + np.clip(share, 0.0, 1.0)[..., None] * (ways[:, 1:] - ways[:, :-1])
+    at = trajectories[:, :-1] + np.clip(share, 0.0, 1.0)[..., None] * (trajectories[:, 1:] - trajectories[:, :-1])
     on = ((at[..., :2] - start) @ along) / (along @ along)
     width = radius / np.linalg.norm(along)
     # the net ends half a ball's width beyond its posts, and is a ball's radius higher

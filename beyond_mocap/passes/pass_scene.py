@@ -13,7 +13,7 @@ from typing import Any
 
 from ..ball.contact import Tool
 from ..base.errors import InputError
-from ..base.settings import defaults, setting
+from ..base.settings import collect_defaults, find_setting
 from .hits import HitMotion
 
 KINDS = ("toss", "pass", "attack")
@@ -21,11 +21,11 @@ RECEIVE = "receive"
 SIDES = ("", "left", "right")
 ERRORS = ("", "missed", "dropped")
 GROUND = "ground"
-LEAST_APART = 0.5
+LEAST_DISTANCE = 0.5
 """Least distance in metres between two players' places."""
-_DEFAULTS = defaults("passes")
-_ROWS = (*(setting("passes", name) for name in ("transition", "lead_in", "lead_out", "repeat", "net_height")),
-         *(setting("passes.pass", name) for name in ("bounces", "seconds")), setting("passes.player", "height"))
+_DEFAULTS = collect_defaults("passes")
+_ROWS = (*(find_setting("passes", name) for name in ("transition", "lead_in", "lead_out", "repeat", "net_height")),
+         *(find_setting("passes.pass", name) for name in ("bounces", "seconds")), find_setting("passes.player", "height"))
 LIMITS = {**{row.name: (row.least, row.most) for row in _ROWS}, "weight": (0.0, 1000.0), "fps": (10.0, 240.0),
           "metres": (-1000.0, 1000.0), "seed": (-(2**63), 2**63 - 1)}
 """Lowest and highest value of a scene's numbers."""
@@ -36,7 +36,7 @@ RESERVED = ("ball", "strikes", "scene")
 """Names that other files of a scene have, so that no player can have them."""
 LONGEST_TOOL, THICKEST_TOOL = 2.0, 0.5
 """Greatest length and radius in metres of a tool in the hand."""
-FAR = 100.0
+LONGEST_PASS = 100.0
 """Greatest distance in metres of a pass."""
 Place = tuple[float, ...]
 
@@ -205,7 +205,7 @@ class PassScene:
         _check_passes(self)
         _check_numbers(self)
 
-    def player(self, name: str) -> Player:
+    def find_player(self, name: str) -> Player:
         """Find a player by name."""
         return next(one for one in self.players if one.name == name)
 
@@ -219,9 +219,9 @@ class PassScene:
                 break
         return tuple(out)
 
-    def facing(self, name: str) -> float:
+    def find_facing(self, name: str) -> float:
         """Compute the heading in rad of a player before the ball concerns them."""
-        player = self.player(name)
+        player = self.find_player(name)
         if player.facing is not None:
             return player.facing
         others = [other.place for other in self.players if other.name != name]
@@ -229,7 +229,7 @@ class PassScene:
         return math.atan2(y, x)
 
 
-def number_within(value, name: str, where: str, whole: bool = False):
+def check_number(value, name: str, where: str, whole: bool = False):
     """Check that a value is a number within LIMITS[name].
 
     Args:
@@ -244,17 +244,17 @@ def number_within(value, name: str, where: str, whole: bool = False):
     """
     low, high = LIMITS[name]
     kind = "a whole number" if whole else "a number"
-    good = isinstance(value, (int, float)) and not isinstance(value, bool)
-    good = good and low <= value <= high  # false for NaN; works for whole numbers too large for a float
-    if not good or (whole and value != int(value)):
-        raise InputError(where, _said(value), f"{kind} from {low:g} to {high:g}")
+    is_valid = isinstance(value, (int, float)) and not isinstance(value, bool)
+    is_valid = is_valid and low <= value <= high  # false for NaN; works for whole numbers too large for a float
+    if not is_valid or (whole and value != int(value)):
+        raise InputError(where, _format_value(value), f"{kind} from {low:g} to {high:g}")
     return int(value) if whole else float(value)
 
 
-def _said(value) -> str:
+def _format_value(value) -> str:
     """Format a value for messages, shortened: a whole number of a file may have hundreds of digits."""
-    said = repr(value)
-    return said if len(said) <= 40 else said[:37] + "..."
+    text = repr(value)
+    return text if len(text) <= 40 else text[:37] + "..."
 
 
 def _check_players(players: tuple[Player, ...]) -> None:
@@ -272,15 +272,15 @@ def _check_players(players: tuple[Player, ...]) -> None:
             most = f"a length up to {LONGEST_TOOL:g} m, a radius up to {THICKEST_TOOL:g} m"
             raise InputError(f"{where}: tool", str(one.tool), most)
         if one.height:
-            number_within(one.height, "height", f"{where}: height")
+            check_number(one.height, "height", f"{where}: height")
         for other in players[:number]:
             _check_pair(one, other)
 
 
 def _check_name(name: str, where: str) -> None:
     """Check a player's name, which is also used for files."""
-    odd = not name.isprintable() or name != name.strip() or name.startswith(".") or set(name) & set('/\\:*?"<>|')
-    if not name or odd or len(name) > 60 or name.casefold() in RESERVED:
+    is_invalid = not name.isprintable() or name != name.strip() or name.startswith(".") or set(name) & set('/\\:*?"<>|')
+    if not name or is_invalid or len(name) > 60 or name.casefold() in RESERVED:
         expected = "up to 60 letters, digits and spaces between them"
         raise InputError(where, "a name that a file cannot have", expected, "rename the player")
 
@@ -288,9 +288,9 @@ def _check_name(name: str, where: str) -> None:
 def _check_pair(one: Player, other: Player) -> None:
     if one.name.casefold() == other.name.casefold():
         raise InputError("players", f"two with the name {one.name!r}", "a different name for each")
-    if math.dist(one.place, other.place) < LEAST_APART:
+    if math.dist(one.place, other.place) < LEAST_DISTANCE:
         found = f"{other.name} and {one.name} are {math.dist(one.place, other.place):.2f} m apart"
-        raise InputError("players", found, f"{LEAST_APART} m or more", "move one of them")
+        raise InputError("players", found, f"{LEAST_DISTANCE} m or more", "move one of them")
 
 
 def _check_place(place: Place, where: str) -> None:
@@ -309,7 +309,7 @@ def _check_passes(scene: PassScene) -> None:
     """Check the passes, and that each starts where the one before ended."""
     if not scene.passes:
         raise InputError("passes", "none", "at least one")
-    number_within(scene.repeat, "repeat", "repeat", whole=True)
+    check_number(scene.repeat, "repeat", "repeat", whole=True)
     if len(scene.passes) * scene.repeat > MOST_PASSES:
         count = len(scene.passes) * scene.repeat
         raise InputError("passes", f"{count} in total", f"{MOST_PASSES} at most", "use fewer repeats")
@@ -328,9 +328,9 @@ def _check_passes(scene: PassScene) -> None:
 
 def _check_pass(one: Pass, where: str, names: list[str], scene: PassScene) -> None:
     """Check one pass: players, kind, error, numbers, example and distance."""
-    for word, name in (("from", one.giver), ("to", one.receiver)):
+    for direction, name in (("from", one.giver), ("to", one.receiver)):
         if name not in names:
-            raise InputError(where, f"{word} {name!r}", f"one of {', '.join(names)}")
+            raise InputError(where, f"{direction} {name!r}", f"one of {', '.join(names)}")
     if one.giver == one.receiver:
         raise InputError(where, f"{one.giver} is both passer and receiver", "two players", "choose another receiver")
     if one.kind not in KINDS:
@@ -338,20 +338,20 @@ def _check_pass(one: Pass, where: str, names: list[str], scene: PassScene) -> No
     if one.error not in ERRORS:
         raise InputError(where, f"the error {one.error!r}", "missed or dropped")
     _check_part("foot" if one.part is None else one.part, one.side or "", where)
-    number_within(one.bounces, "bounces", f"{where}: bounces", whole=True)
+    check_number(one.bounces, "bounces", f"{where}: bounces", whole=True)
     if one.seconds is not None:
-        number_within(one.seconds, "seconds", f"{where}: seconds")
+        check_number(one.seconds, "seconds", f"{where}: seconds")
     if one.at is not None:
         _check_place(one.at, where)
     if one.example is not None:
         start, end = one.example.start, math.inf if one.example.end is None else one.example.end
         if not (math.isfinite(start) and 0.0 <= start < end):
             raise InputError(where, f"an example from {start:g} to {end:g} s", "a start from 0 s and a later end")
-    goal = one.at or scene.player(one.receiver).place
-    far = math.dist(scene.player(one.giver).place, goal)
-    if far > FAR:
-        found = f"{one.receiver} is {far:.0f} m away"
-        raise InputError(where, found, f"{FAR:.0f} m at most", "move one of them nearer")
+    goal = one.at or scene.find_player(one.receiver).place
+    distance = math.dist(scene.find_player(one.giver).place, goal)
+    if distance > LONGEST_PASS:
+        found = f"{one.receiver} is {distance:.0f} m away"
+        raise InputError(where, found, f"{LONGEST_PASS:.0f} m at most", "move one of them nearer")
 
 
 def _check_meetings(scene: PassScene) -> None:
@@ -360,15 +360,15 @@ def _check_meetings(scene: PassScene) -> None:
     for number, one in enumerate(scene.passes, start=1):
         places[one.receiver] = one.at or places[one.receiver]
         for other, place in places.items():
-            if other != one.receiver and math.dist(place, places[one.receiver]) < LEAST_APART:
-                raise InputError(f"pass {number}: at", f"{other} stands there", f"{LEAST_APART} m or more between them")
+            if other != one.receiver and math.dist(place, places[one.receiver]) < LEAST_DISTANCE:
+                raise InputError(f"pass {number}: at", f"{other} stands there", f"{LEAST_DISTANCE} m or more between them")
 
 
 def _check_numbers(scene: PassScene) -> None:
     """Check the numbers, weights, net and serve of a scene."""
     for name in ("fps", "transition", "lead_in", "lead_out"):
-        number_within(getattr(scene, name), name, name)
-    number_within(scene.seed, "seed", "seed", whole=True)
+        check_number(getattr(scene, name), name, name)
+    check_number(scene.seed, "seed", "seed", whole=True)
     for name in ("missed", "dropped"):
         value = getattr(scene, name)
         if not (isinstance(value, (int, float)) and 0.0 <= value <= 1.0):
@@ -383,7 +383,7 @@ def _check_numbers(scene: PassScene) -> None:
     for entry in fields(Weights):
         values = [getattr(scene.weights, entry.name)] if entry.name != "bones" else list(scene.weights.bones.values())
         for value in values:
-            number_within(value, "weight", f"weights: {entry.name}")
+            check_number(value, "weight", f"weights: {entry.name}")
     if scene.net is not None:
         _check_net(scene.net)
     _check_serve(scene)
@@ -392,7 +392,7 @@ def _check_numbers(scene: PassScene) -> None:
 def _check_net(net: Net) -> None:
     for place in (net.start, net.end):
         _check_place(place, "net")
-    number_within(net.height, "net_height", "net: height")
+    check_number(net.height, "net_height", "net: height")
     if math.dist(net.start, net.end) < 0.1:
         raise InputError("net", f"{math.dist(net.start, net.end):.2f} m wide", "0.1 m or more")
 
@@ -410,18 +410,18 @@ def _check_serve(scene: PassScene) -> None:
         return
     if len(serve) != 3 or not all(math.isfinite(v) and abs(v) <= LIMITS["metres"][1] for v in serve) or serve[2] < 0.0:
         raise InputError("serve", f"{serve}", "[x, y, z] in metres, not below the ground")
-    if math.dist(serve[:2], scene.player(first).place) < LEAST_APART:
-        raise InputError("serve", f"{serve}, where {first} stands", f"a place {LEAST_APART} m away or more")
+    if math.dist(serve[:2], scene.find_player(first).place) < LEAST_DISTANCE:
+        raise InputError("serve", f"{serve}, where {first} stands", f"a place {LEAST_DISTANCE} m away or more")
 
 
-def served_by(scene: PassScene) -> str:
+def find_server(scene: PassScene) -> str:
     """Find the player who is expected to serve to the first player.
 
     The passer of the last pass that goes to them, otherwise the last receiver, otherwise the first of the other
     players.
     """
     first = scene.passes[0].giver
-    to_him = [one.giver for one in scene.passes if one.receiver == first]
-    others = [one.receiver for one in scene.passes if one.receiver != first]
-    return to_him[-1] if to_him else others[-1]
+    passers = [one.giver for one in scene.passes if one.receiver == first]
+    other_receivers = [one.receiver for one in scene.passes if one.receiver != first]
+    return passers[-1] if passers else other_receivers[-1]
 

@@ -14,34 +14,34 @@ import numpy as np
 
 from ..ball.contact import Tool
 from ..ball.physics import BALLS, Ball
-from ..base.errors import Cancelled, InputError, NotInLibrary
-from ..base.settings import setting
+from ..base.errors import UserCancelledError, InputError, NotInLibraryError
+from ..base.settings import find_setting
 from ..library.library import Library
-from ..motion.humanoid import stature
+from ..motion.humanoid import estimate_stature
 from ..motion.quaternion import multiply
 from ..motion.track.ball_path import BallPath
-from ..synthesis.own_size import in_own_size
+from ..synthesis.own_size import to_player_size
 from ..synthesis.take import Take
-from .bodies import BodySettings, PlayerMotion, least_seconds, player_motion
+from .bodies import BodySettings, PlayerMotion, estimate_least_seconds, build_player_motion
 from .hit_library import MatchWeights
-from .hits import HitMotion, strongest
+from .hits import HitMotion, find_strongest_hit
 from .links import BoneWeights
 from .pass_court import Site
 from .pass_plan import PassPlan, plan_passes
 from .pass_scene import BONES, Pass, PassScene, Player, Weights
-from .strike_choice import Choice, StrikeMoments, strike_moments, unsaid
+from .strike_choice import PartStrikes, StrikeMoments, collect_strike_moments, is_unlabelled_strike
 from .way import HitOrder, Stance
 
 MOST_HITS = 24
 """Most hit motions that are tried for one strike; those that suit its kind best come first."""
 BALL_LIMITS: dict[str, Any] = {
-    **{name: (setting("passes", name).least, setting("passes", name).most)
+    **{name: (find_setting("passes", name).least, find_setting("passes", name).most)
        for name in ("radius", "gravity", "linear_drag", "drag", "restitution")},
     "mass": (0.001, 20.0), "lift": ((0.0, 0.5, 0.0), (1.0, 10.0, 10.0)), "friction": (0.0, 5.0),
     "rolling": (0.01, 20.0), "spin_decay": (0.0, 20.0), "inertia": (0.1, 1.0),
 }  # fmt: skip
 """Lowest and highest value of a ball's numbers."""
-PLANNED = 0.3
+PLAN_SHARE = 0.3
 """Share of the whole work after which the plan is ready."""
 _SIDED = ("foot", "hand", "tool")
 
@@ -60,11 +60,11 @@ class PlayerPasses:
     name: str
     take: Take
     gaps: np.ndarray
-    moved: np.ndarray
+    part_shifts: np.ndarray
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Passes:
+class PlayedScene:
     """A passing scene as it is played.
 
     Attributes:
@@ -83,15 +83,15 @@ class Passes:
     players: tuple[PlayerPasses, ...]
     warnings: tuple[str, ...]
 
-    def gap(self, number: int) -> float:
+    def find_gap(self, number: int) -> float:
         """Measure the distance in m between part and ball at a strike of the plan."""
         one = self.plan.strikes[number]
         own = sum(other.player == one.player for other in self.plan.strikes[:number])
         return float(next(player for player in self.players if player.name == one.player).gaps[own])
 
 
-def passes(library: Library, scene: PassScene, progress: Callable[[float, str], None] | None = None,
-           cancelled: Callable[[], bool] | None = None) -> Passes:
+def synthesize_passes(library: Library, scene: PassScene, progress: Callable[[float, str], None] | None = None,
+           cancelled: Callable[[], bool] | None = None) -> PlayedScene:
     """Play a scene with the motions of a library. The same scene and library give the same bits.
 
     Args:
@@ -107,26 +107,26 @@ def passes(library: Library, scene: PassScene, progress: Callable[[float, str], 
         Cancelled: if `cancelled` returns True.
     """
     report, stop = progress or (lambda share, text: None), cancelled or (lambda: False)
-    plan = planned(library, scene, lambda share, text: report(PLANNED * share, text), stop)
-    path = ball_path(plan)
+    plan = plan_scene(library, scene, lambda share, text: report(PLAN_SHARE * share, text), stop)
+    path = build_ball_path(plan)
     players = []
     for number, player in enumerate(scene.players):
         if stop():
-            raise Cancelled("cancelled")
-        players.append(_played(library, scene, plan, path=path, player=player,
-                               progress=_part_of(report, number, scene.players), cancelled=stop))
-    told = [f"{player.name}: {line}" for player, motion in zip(scene.players, players) for line in motion.warnings]
-    moved = tuple(PlayerPasses(who.name, one.take, one.gaps, one.moved) for who, one in zip(scene.players, players))
+            raise UserCancelledError("cancelled")
+        players.append(_build_motion(library, scene, plan, path=path, player=player,
+                               progress=_split_progress(report, number, scene.players), cancelled=stop))
+    player_warnings = [f"{player.name}: {line}" for player, motion in zip(scene.players, players) for line in motion.warnings]
+    played = tuple(PlayerPasses(who.name, one.take, one.gaps, one.part_shifts) for who, one in zip(scene.players, players))
     report(1.0, "Done")
-    return Passes(scene=scene, kind=ball_of(scene), plan=plan, ball=path, players=moved,
-                  warnings=(*plan.warnings, *list_unlabelled_strikes(library, plan), *told))
+    return PlayedScene(scene=scene, kind=build_ball(scene), plan=plan, ball=path, players=played,
+                  warnings=(*plan.warnings, *list_unlabelled_strikes(library, plan), *player_warnings))
 
 
 def list_unlabelled_strikes(library: Library, plan: PassPlan) -> list[str]:
     """List a warning for each part except the foot that strikes with motions without such labels."""
     clips: dict[str, set[str]] = {}
     for strike in plan.strikes:
-        if strike.order.part in ("head", "chest", "hand", "tool") and unsaid(library, strike.order):
+        if strike.order.part in ("head", "chest", "hand", "tool") and is_unlabelled_strike(library, strike.order):
             clips.setdefault(strike.order.part, set()).add(library.clips[strike.order.clip].path)
     return [
         f"no labels of the library name strikes with the {part}; motions that look like one are taken from "
@@ -135,16 +135,16 @@ def list_unlabelled_strikes(library: Library, plan: PassPlan) -> list[str]:
     ]
 
 
-def _part_of(report, number: int, players: tuple[Player, ...]):
+def _split_progress(report, number: int, players: tuple[Player, ...]):
     """Build the progress callback of one player's motion within the whole work."""
-    def told(share: float, text: str) -> None:
+    def report_share(share: float, text: str) -> None:
         """Report the share of this player's work."""
-        report(PLANNED + (1.0 - PLANNED) * (number + share) / len(players), f"{players[number].name}: {text}")
+        report(PLAN_SHARE + (1.0 - PLAN_SHARE) * (number + share) / len(players), f"{players[number].name}: {text}")
 
-    return told
+    return report_share
 
 
-def planned(library: Library, scene: PassScene, progress: Callable[[float, str], None] | None = None,
+def plan_scene(library: Library, scene: PassScene, progress: Callable[[float, str], None] | None = None,
             cancelled: Callable[[], bool] | None = None) -> PassPlan:
     """Plan the strikes and flights of a scene, without motions, for live editing.
 
@@ -158,14 +158,14 @@ def planned(library: Library, scene: PassScene, progress: Callable[[float, str],
     Raises:
         InputError, NotInLibrary, Cancelled: as `synthesize_passes`.
     """
-    scene = _with_chance(scene)
-    ball = ball_of(scene)
-    sizes = {player.name: size_of(player, library) for player in scene.players}
-    return plan_passes(scene, _sites(library, scene, sizes), ball, need=_needs(library, sizes), cancelled=cancelled,
+    scene = _apply_chance(scene)
+    ball = build_ball(scene)
+    sizes = {player.name: compute_size(player, library) for player in scene.players}
+    return plan_passes(scene, _build_sites(library, scene, sizes), ball, need=_build_need(library, sizes), cancelled=cancelled,
                        progress=progress)
 
 
-def ball_of(scene: PassScene) -> Ball:
+def build_ball(scene: PassScene) -> Ball:
     """Build the scene's ball.
 
     Raises:
@@ -185,12 +185,12 @@ def ball_of(scene: PassScene) -> Ball:
     return replace(BALLS[choice.kind], **choice.changes)
 
 
-def size_of(player: Player, library: Library) -> float:
+def compute_size(player: Player, library: Library) -> float:
     """Compute the size of a player over that of the library's skeleton."""
-    return player.height / stature(library.skeleton) if player.height else 1.0
+    return player.height / estimate_stature(library.skeleton) if player.height else 1.0
 
 
-def bone_weights(weights: Weights) -> BoneWeights:
+def build_bone_weights(weights: Weights) -> BoneWeights:
     """Build the weights of eq. 1 for a scene: its factors times the default weights."""
     own = BoneWeights()
     factors = [weights.bones.get(bone, 1.0) for bone in BONES]
@@ -200,24 +200,24 @@ def bone_weights(weights: Weights) -> BoneWeights:
     )
 
 
-def ball_path(plan: PassPlan) -> BallPath:
+def build_ball_path(plan: PassPlan) -> BallPath:
     """Build the ball's path: position and rotation at every frame of the scene."""
     times = np.arange(int(round(plan.seconds * plan.fps)) + 1) / plan.fps
     which = plan.flight_at(times)
-    positions, rotations, turned = np.empty((len(times), 3)), np.empty((len(times), 4)), np.array([1.0, 0.0, 0.0, 0.0])
+    positions, rotations, last_rotation = np.empty((len(times), 3)), np.empty((len(times), 4)), np.array([1.0, 0.0, 0.0, 0.0])
     for number, flight in enumerate(plan.flights):
         own = which == number
         positions[own] = flight.at(times[own])
-        way = flight.rotations(np.append(times[own], flight.end))
+        flight_rotations = flight.rotations(np.append(times[own], flight.end))
         # each flight starts with the rotation that the one before ended with
-        rotations[own], turned = multiply(way[:-1], turned), multiply(way[-1], turned)
+        rotations[own], last_rotation = multiply(flight_rotations[:-1], last_rotation), multiply(flight_rotations[-1], last_rotation)
     return BallPath(times, positions, np.ones(len(times), bool), rotations)
 
 
 # -- the motions that each strike can use
 
 
-def _with_chance(scene: PassScene) -> PassScene:
+def _apply_chance(scene: PassScene) -> PassScene:
     """Apply random errors: the first ball that is missed or dropped ends the rally."""
     order = list(scene.order)
     random = np.random.default_rng([scene.seed & (2**64 - 1), 1])
@@ -231,28 +231,28 @@ def _with_chance(scene: PassScene) -> PassScene:
     return replace(scene, passes=tuple(order[: number + 1]), repeat=1)
 
 
-def _sites(library: Library, scene: PassScene, sizes: dict[str, float]) -> list[Site]:
+def _build_sites(library: Library, scene: PassScene, sizes: dict[str, float]) -> list[Site]:
     """Build the site of each strike."""
-    reach = _Reach(library, scene, sizes)
+    means = _StrikeMeans(library, scene, sizes)
     places = {player.name: np.array(player.place, float) for player in scene.players}
     out = []
     for number, one in enumerate(scene.passes):
-        out.append(reach.site(one.giver, places[one.giver], one, number + 1))
+        out.append(means.build_site(one.giver, places[one.giver], one, number + 1))
         if one.at is not None:
             places[one.receiver] = np.array(one.at, float)
     last = scene.passes[-1].receiver
-    return [*out, reach.site(last, places[last], None, len(scene.passes))]
+    return [*out, means.build_site(last, places[last], None, len(scene.passes))]
 
 
-class _Reach:
+class _StrikeMeans:
     """The motions with which players can strike; each result is stored."""
 
     def __init__(self, library: Library, scene: PassScene, sizes: dict[str, float]):
         self.library, self.scene, self.sizes = library, scene, sizes
-        self._choices: dict[tuple[str, Tool | None], Choice] = {}
+        self._choices: dict[tuple[str, Tool | None], PartStrikes] = {}
         self._moments: dict[tuple, StrikeMoments] = {}
 
-    def site(self, name: str, place: np.ndarray, one: Pass | None, number: int) -> Site:
+    def build_site(self, name: str, place: np.ndarray, one: Pass | None, number: int) -> Site:
         """Build the site of a strike of one player.
 
         Args:
@@ -261,56 +261,56 @@ class _Reach:
             one: the pass that leaves; None for the last strike.
             number: number of the pass that an error names.
         """
-        player = self.scene.player(name)
+        player = self.scene.find_player(name)
         part = (one and one.part) or player.part
         side = player.side if one is None or one.side is None else one.side
         tool = (player.tool or Tool()) if part == "tool" else None
         kind = "receive" if one is None else one.kind
         try:
             size, example = self.sizes[name], one.example if one else None
-            moments = self._reached(part, side, tool and tool.for_body(size), size=size, kind=kind, example=example)
+            moments = self._collect_moments(part, side, tool and tool.scale_to_library(size), size=size, kind=kind, example=example)
         except InputError as error:
             raise InputError(f"pass {number}, {name}", str(error)) from None
-        return Site(player=name, place=place, facing=self.scene.facing(name), kind=kind, part=part, tool=tool,
-                    size=size, moments=moments, asked=one)
+        return Site(player=name, place=place, facing=self.scene.find_facing(name), kind=kind, part=part, tool=tool,
+                    size=size, moments=moments, requested=one)
 
-    def _reached(self, part, side, tool, size: float, kind: str, example) -> StrikeMoments:
+    def _collect_moments(self, part, side, tool, size: float, kind: str, example) -> StrikeMoments:
         """Collect the moments with which a body of some size can strike."""
         key = (part, side, tool, size, kind, example)
         if key not in self._moments:
             if (part, tool) not in self._choices:
-                self._choices[part, tool] = Choice.of(self.library, part, tool)
-            own, wanted = self._choices[part, tool], side if part in _SIDED else ""
+                self._choices[part, tool] = PartStrikes.from_library(self.library, part, tool)
+            own, side_wanted = self._choices[part, tool], side if part in _SIDED else ""
             if example is None:
-                hits = own.of_kind(kind, wanted)[:MOST_HITS]
+                hits = own.select_by_kind(kind, side_wanted)[:MOST_HITS]
             else:
-                order, _ = own.measured.match(self._example(example, part, side, tool), self._weights(), wanted or None)
+                order, _ = own.measured.sort_by_similarity(self._find_example(example, part, side, tool), self._build_weights(), side_wanted or None)
                 hits = tuple(own.hits[index] for index in order[:1])
             if not hits:
-                with_what = f"the {side} {part}" if wanted else part
-                others = self._others()
+                with_what = f"the {side} {part}" if side_wanted else part
+                others = self._list_parts()
                 other = f"choose another part ({', '.join(others)}) or " if others else ""
                 message = f"no clip of the library strikes with {with_what}; {other}add clips that do"
-                raise NotInLibrary(message, others)
-            self._moments[key] = strike_moments(self.library, hits, tool, size)
+                raise NotInLibraryError(message, others)
+            self._moments[key] = collect_strike_moments(self.library, hits, tool, size)
         return self._moments[key]
 
-    def _others(self) -> tuple[str, ...]:
+    def _list_parts(self) -> tuple[str, ...]:
         """List the parts with which clips of the library strike."""
-        return tuple(part for part in ("foot", "head", "chest", "hand") if Choice.of(self.library, part).hits)
+        return tuple(part for part in ("foot", "head", "chest", "hand") if PartStrikes.from_library(self.library, part).hits)
 
-    def _weights(self) -> MatchWeights:
+    def _build_weights(self) -> MatchWeights:
         """Build the weights of eq. 2."""
-        own, asked = MatchWeights(), self.scene.weights
-        return MatchWeights(own.speed * asked.speed, own.vector * asked.vectors, own.time * asked.times)
+        own, requested = MatchWeights(), self.scene.weights
+        return MatchWeights(own.speed * requested.speed, own.vector * requested.vectors, own.time * requested.times)
 
-    def _example(self, example, part: str, side: str, tool: Tool | None) -> HitMotion:
+    def _find_example(self, example, part: str, side: str, tool: Tool | None) -> HitMotion:
         """Find the strongest hit motion in a stretch of a recording, or return the given one."""
         if example.hit is not None:
             return example.hit
         clip = next((clip for clip in self.library.clips if clip.path == example.clip and not clip.mirrored), None)
         if clip is None:
-            names = ", ".join(sorted({clip.path for clip in self.library.clips if not clip.made})[:5])
+            names = ", ".join(sorted({clip.path for clip in self.library.clips if not clip.is_synthetic})[:5])
             raise InputError("example", f"no recording {example.clip!r} in the library", f"one such as {names}")
         motion = clip.recording
         first = int(np.floor(example.start * motion.fps))
@@ -318,52 +318,52 @@ class _Reach:
         if first > len(motion) - 3:
             found = f"{example.clip} from {example.start:g} s"
             raise InputError("example", found, f"a time up to {motion.duration:.2f} s")
-        found = strongest(motion.frames(first, min(last, len(motion))), part, side, tool)
+        found = find_strongest_hit(motion.frames(first, min(last, len(motion))), part, side, tool)
         if found is None:
             raise InputError("example", f"no strike by {part} there in {example.clip}", "a stretch with a whole strike")
         return found
 
 
-def _needs(library: Library, sizes: dict[str, float]):
+def _build_need(library: Library, sizes: dict[str, float]):
     """Build the function that gives the seconds a player needs; a larger body moves as the library does, scaled."""
-    def need(player: str, before: Stance | HitOrder, after: HitOrder) -> float:
+    def estimate_need(player: str, before: Stance | HitOrder, after: HitOrder) -> float:
         """Seconds that a player needs from one strike, or from standing, to the next."""
-        return least_seconds(library, _sized(before, sizes[player]), _sized(after, sizes[player]))
+        return estimate_least_seconds(library, _to_library_size(before, sizes[player]), _to_library_size(after, sizes[player]))
 
-    return need
+    return estimate_need
 
 
 # -- the players' motions
 
 
-def _played(library: Library, scene: PassScene, plan: PassPlan, path: BallPath, player: Player, progress,
+def _build_motion(library: Library, scene: PassScene, plan: PassPlan, path: BallPath, player: Player, progress,
             cancelled) -> PlayerMotion:
     """Build one player's motion in their own size; the work is done in the library's size."""
-    size = size_of(player, library)
-    orders = [_sized(order, size) for order in plan.orders(player.name)]
-    stance = _sized(Stance(player.place, scene.facing(player.name)), size)
+    size = compute_size(player, library)
+    orders = [_to_library_size(order, size) for order in plan.list_orders(player.name)]
+    stance = _to_library_size(Stance(player.place, scene.find_facing(player.name)), size)
     ball = path if size == 1.0 else replace(path, positions=path.positions / size)
-    settings = BodySettings(scene.transition, scene.watch, scene.seed, bone_weights(scene.weights))
-    moved = player_motion(library, stance, orders, ball=ball, ball_radius=ball_of(scene).radius / size,
+    settings = BodySettings(scene.transition, scene.watch, scene.seed, build_bone_weights(scene.weights))
+    player_motion = build_player_motion(library, stance, orders, ball=ball, ball_radius=build_ball(scene).radius / size,
                           fps=scene.fps, settings=settings, progress=progress,
                           cancelled=cancelled)  # fmt: skip
     if size == 1.0:
-        return moved
-    grown = in_own_size(moved.take, size, _grown_plan(moved.take.plan, size, player.height))
-    return replace(moved, take=replace(grown, ball=path), gaps=moved.gaps * size, moved=moved.moved * size)
+        return player_motion
+    scaled_take = to_player_size(player_motion.take, size, _scale_plan(player_motion.take.plan, size, player.height))
+    return replace(player_motion, take=replace(scaled_take, ball=path), gaps=player_motion.gaps * size, part_shifts=player_motion.part_shifts * size)
 
 
-def _sized(order, size: float):
+def _to_library_size(order, size: float):
     """Convert an order or stance of a player `size` times as large as the library to the library's size."""
     if size == 1.0:
         return order
     if isinstance(order, Stance):
         return replace(order, place=tuple(np.array(order.place) / size))
     place, ball = (tuple(np.array(values) / size) for values in (order.place, order.ball))
-    return replace(order, place=place, ball=ball, tool=order.tool and order.tool.for_body(size))
+    return replace(order, place=place, ball=ball, tool=order.tool and order.tool.scale_to_library(size))
 
 
-def _grown_plan(plan, size: float, height: float):
+def _scale_plan(plan, size: float, height: float):
     """Scale the track of a take's plan to the player's size."""
     track = plan.track
     ball = None if track.ball is None else track.ball * size

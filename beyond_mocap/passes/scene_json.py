@@ -13,14 +13,14 @@ from typing import Any
 
 from ..ball.contact import Tool
 from ..base.errors import InputError
-from ..files.content import utf8
-from ..files.json_values import check_names, check_object, number, numbers, object_of, shown, text, truth, whole_number
+from ..files.content import read_utf8
+from ..files.json_values import check_names, check_object, check_number, check_numbers, parse_json, describe_value, check_text, check_bool, check_whole_number
 from ..files.whole import atomic_write
 from .pass_scene import BallChoice, Example, Net, Pass, PassScene, Player, Weights
 
 LARGEST = 10_000_000
 """Bytes above which a file is not read as a scene."""
-_OF_PASS = ("kind", "bounces", "part", "side", "seconds", "at", "example", "error")
+_PASS_FIELDS = ("kind", "bounces", "part", "side", "seconds", "at", "example", "error")
 
 SAMPLES: dict[str, dict] = {
     "three": {
@@ -82,10 +82,10 @@ def read_scene(path: str | os.PathLike) -> PassScene:
     Raises:
         InputError: names the file and the place in it that is wrong.
     """
-    return parse_scene(utf8(path, "a SCENE.json", LARGEST), str(path))
+    return parse_scene(read_utf8(path, "a SCENE.json", LARGEST), str(path))
 
 
-def parse_scene(said: str | dict, name: str = "scene") -> PassScene:
+def parse_scene(content: str | dict, name: str = "scene") -> PassScene:
     """Parse a scene from a text, or from the JSON object of one.
 
     Args:
@@ -96,26 +96,26 @@ def parse_scene(said: str | dict, name: str = "scene") -> PassScene:
     Raises:
         InputError: names the place that is wrong.
     """
-    whole = object_of(said, name, "docs/passes/passes.md") if isinstance(said, str) else said
+    json_object = parse_json(content, name, "docs/passes/passes.md") if isinstance(content, str) else content
     try:
-        return _scene(whole)
+        return _parse_scene_object(json_object)
     except InputError as error:
         raise InputError(name, str(error)) from None
 
 
-def scene_text(scene: PassScene) -> str:
+def format_scene(scene: PassScene) -> str:
     """Format a scene as the text of a SCENE.json."""
-    return json.dumps(scene_dict(scene), indent=1, ensure_ascii=False) + "\n"
+    return json.dumps(to_json(scene), indent=1, ensure_ascii=False) + "\n"
 
 
-def scene_dict(scene: PassScene) -> dict:
+def to_json(scene: PassScene) -> dict:
     """Build the JSON object of a scene, without default values."""
-    usual = PassScene(scene.players, scene.passes)
-    out: dict = {"players": list(map(_player_out, scene.players)), "passes": list(map(_pass_out, scene.passes))}
+    defaults = PassScene(scene.players, scene.passes)
+    out: dict = {"players": list(map(_player_to_json, scene.players)), "passes": list(map(_pass_to_json, scene.passes))}
     for name in ("repeat", "fps", "seed", "transition", "lead_in", "lead_out", "directions", "watch"):
-        if getattr(scene, name) != getattr(usual, name):
+        if getattr(scene, name) != getattr(defaults, name):
             out[name] = getattr(scene, name)
-    if scene.ball != usual.ball:
+    if scene.ball != defaults.ball:
         out["ball"] = {"kind": scene.ball.kind, **scene.ball.changes} if scene.ball.changes else scene.ball.kind
     if scene.net is not None:
         out["net"] = {"from": list(scene.net.start), "to": list(scene.net.end), "height": scene.net.height}
@@ -123,17 +123,17 @@ def scene_dict(scene: PassScene) -> dict:
         out["serve"] = scene.serve if isinstance(scene.serve, str) else list(scene.serve)
     if scene.missed or scene.dropped:
         out["errors"] = {"missed": scene.missed, "dropped": scene.dropped}
-    if scene.weights != usual.weights:
-        told = {entry.name: getattr(scene.weights, entry.name) for entry in fields(Weights)}
-        out["weights"] = {**told, "bones": dict(scene.weights.bones)}
+    if scene.weights != defaults.weights:
+        weights = {entry.name: getattr(scene.weights, entry.name) for entry in fields(Weights)}
+        out["weights"] = {**weights, "bones": dict(scene.weights.bones)}
     return out
 
 
-def _player_out(one: Player) -> dict:
+def _player_to_json(one: Player) -> dict:
     """Build the JSON object of a player, without default values."""
     out: dict = {"name": one.name, "place": list(one.place)}
     if one.facing is not None:
-        out["facing"] = _in_degrees(one.facing)
+        out["facing"] = _to_degrees(one.facing)
     for name in ("part", "side", "height"):
         if getattr(one, name) != getattr(Player, name):
             out[name] = getattr(one, name)
@@ -142,68 +142,68 @@ def _player_out(one: Player) -> dict:
     return out
 
 
-def _pass_out(one: Pass) -> dict:
+def _pass_to_json(one: Pass) -> dict:
     """Build the JSON object of a pass, without default values."""
     out: dict = {"from": one.giver, "to": one.receiver}
-    for name in _OF_PASS:
+    for name in _PASS_FIELDS:
         value = getattr(one, name)
         if value != getattr(Pass, name):
             out[name] = list(value) if name == "at" else value
     out.pop("example", None)
     if one.example is not None and one.example.hit is None:  # other hit motions have no recording
-        told = {"clip": one.example.clip, "from": one.example.start, "to": one.example.end}
-        out["example"] = {name: value for name, value in told.items() if value is not None}
+        example = {"clip": one.example.clip, "from": one.example.start, "to": one.example.end}
+        out["example"] = {name: value for name, value in example.items() if value is not None}
     return out
 
 
 # -- reading
 
 
-def _scene(whole) -> PassScene:
+def _parse_scene_object(whole) -> PassScene:
     """Build a scene from its JSON object."""
-    read: dict[str, Callable] = {"players": _list_of(_player), "repeat": whole_number, "fps": number,
-                                 "seed": whole_number, "ball": _ball, "net": _net, "serve": _serve,
-                                 "transition": number, "lead_in": number, "lead_out": number,
-                                 "directions": whole_number, "watch": truth, "weights": _weights}
+    read: dict[str, Callable] = {"players": _list_reader(_parse_player), "repeat": check_whole_number, "fps": check_number,
+                                 "seed": check_whole_number, "ball": _parse_ball, "net": _parse_net, "serve": _parse_serve,
+                                 "transition": check_number, "lead_in": check_number, "lead_out": check_number,
+                                 "directions": check_whole_number, "watch": check_bool, "weights": _parse_weights}
     known = {*read, "passes", "defaults", "errors"}
     check_names(whole, "the scene", known, ("players", "passes"))
     found = {name: of(whole[name], name) for name, of in read.items() if name in whole}
-    usual = _settings(whole.get("defaults", {}), "defaults")
-    passes = _list_of(lambda value, where: _pass(value, where, usual))(whole["passes"], "passes")
-    return PassScene(passes=passes, **found, **_errors(whole.get("errors", {}), "errors"))
+    defaults = _parse_settings(whole.get("defaults", {}), "defaults")
+    passes = _list_reader(lambda value, where: _parse_pass(value, where, defaults))(whole["passes"], "passes")
+    return PassScene(passes=passes, **found, **_parse_errors(whole.get("errors", {}), "errors"))
 
 
-def _player(value, where: str) -> Player:
-    read: dict[str, Callable] = {"name": text, "place": _place, "facing": _angle, "part": text, "side": text,
-                                 "tool": _tool, "height": number}
+def _parse_player(value, where: str) -> Player:
+    read: dict[str, Callable] = {"name": check_text, "place": _parse_place, "facing": _parse_angle, "part": check_text, "side": check_text,
+                                 "tool": _parse_tool, "height": check_number}
     check_names(value, where, read, ("name", "place"))
     return Player(**{name: of(value[name], f"{where}: {name}") for name, of in read.items() if name in value})
 
 
-def _pass(value, where: str, usual: Mapping) -> Pass:
-    check_names(value, where, ("from", "to", *_OF_PASS), ("from", "to"))
-    settings = _settings({name: value[name] for name in value if name in _OF_PASS}, where)
-    giver, receiver = (text(value[name], f"{where}: {name}") for name in ("from", "to"))
-    return Pass(giver, receiver, **{**usual, **settings})
+def _parse_pass(value, where: str, defaults: Mapping) -> Pass:
+    check_names(value, where, ("from", "to", *_PASS_FIELDS), ("from", "to"))
+    settings = _parse_settings({name: value[name] for name in value if name in _PASS_FIELDS}, where)
+    giver, receiver = (check_text(value[name], f"{where}: {name}") for name in ("from", "to"))
+    return Pass(giver, receiver, **{**defaults, **settings})
 
 
-def _settings(value, where: str) -> dict:
+def _parse_settings(value, where: str) -> dict:
     """Parse the settings of a pass, without its players."""
-    read = {"kind": text, "bounces": whole_number, "part": text, "side": text, "seconds": number, "at": _place,
-            "example": _example, "error": text}
+    read = {"kind": check_text, "bounces": check_whole_number, "part": check_text, "side": check_text, "seconds": check_number, "at": _parse_place,
+            "example": _parse_example, "error": check_text}
     check_names(value, where, read, ())
     return {name: of(value[name], f"{where}: {name}") for name, of in read.items() if name in value}
 
 
-def _example(value, where: str) -> Example:
+def _parse_example(value, where: str) -> Example:
     check_names(value, where, ("clip", "from", "to"), ("clip",))
     names = {"from": "start", "to": "end"}
-    found: dict[str, Any] = {names[old]: number(value[old], f"{where}: {old}") for old in names if old in value}
-    return Example(text(value["clip"], f"{where}: clip").replace("\\", "/"), **found)
+    found: dict[str, Any] = {names[old]: check_number(value[old], f"{where}: {old}") for old in names if old in value}
+    return Example(check_text(value["clip"], f"{where}: clip").replace("\\", "/"), **found)
 
 
-def _tool(value, where: str) -> Tool:
-    read: dict[str, Callable] = {"name": text, "length": number, "radius": number, "reach": number}
+def _parse_tool(value, where: str) -> Tool:
+    read: dict[str, Callable] = {"name": check_text, "length": check_number, "radius": check_number, "reach": check_number}
     check_names(value, where, read, ())
     found = {name: of(value[name], f"{where}: {name}") for name, of in read.items() if name in value}
     try:
@@ -212,76 +212,76 @@ def _tool(value, where: str) -> Tool:
         raise InputError(where, str(error)) from None
 
 
-def _ball(value, where: str) -> BallChoice:
+def _parse_ball(value, where: str) -> BallChoice:
     """Parse the ball: a kind, or an object with a kind and values that differ from it."""
     if isinstance(value, str):
         return BallChoice(value)
     check_object(value, where)
-    changes = {name: _ball_number(one, f"{where}: {name}") for name, one in value.items() if name != "kind"}
-    return BallChoice(text(value.get("kind", BallChoice.kind), f"{where}: kind"), changes)
+    changes = {name: _parse_ball_number(one, f"{where}: {name}") for name, one in value.items() if name != "kind"}
+    return BallChoice(check_text(value.get("kind", BallChoice.kind), f"{where}: kind"), changes)
 
 
-def _ball_number(value, where: str):
-    return tuple(number(one, where) for one in value) if isinstance(value, (list, tuple)) else number(value, where)
+def _parse_ball_number(value, where: str):
+    return tuple(check_number(one, where) for one in value) if isinstance(value, (list, tuple)) else check_number(value, where)
 
 
-def _net(value, where: str) -> Net:
+def _parse_net(value, where: str) -> Net:
     check_names(value, where, ("from", "to", "height"), ("from", "to", "height"))
-    start, end = (_place(value[name], f"{where}: {name}") for name in ("from", "to"))
-    return Net(start, end, number(value["height"], f"{where}: height"))
+    start, end = (_parse_place(value[name], f"{where}: {name}") for name in ("from", "to"))
+    return Net(start, end, check_number(value["height"], f"{where}: height"))
 
 
-def _serve(value, where: str):
+def _parse_serve(value, where: str):
     """Parse the serve: a position, or a name or "ground"."""
-    return _triple(value, where) if isinstance(value, (list, tuple)) else text(value, where)
+    return _parse_triple(value, where) if isinstance(value, (list, tuple)) else check_text(value, where)
 
 
-def _errors(value, where: str) -> dict[str, Any]:
+def _parse_errors(value, where: str) -> dict[str, Any]:
     """Parse the probabilities of errors."""
     check_names(value, where, ("missed", "dropped"), ())
-    return {name: number(one, f"{where}: {name}") for name, one in value.items()}
+    return {name: check_number(one, f"{where}: {name}") for name, one in value.items()}
 
 
-def _weights(value, where: str) -> Weights:
+def _parse_weights(value, where: str) -> Weights:
     """Parse the weights of eq. 1 and eq. 2."""
     names = [entry.name for entry in fields(Weights)]
     check_names(value, where, names, ())
     bones = value.get("bones", {})
     check_object(bones, f"{where}: bones")
-    said: dict[str, Any] = {name: number(one, f"{where}: {name}") for name, one in value.items() if name != "bones"}
-    return replace(Weights(**said), bones={name: number(one, f"{where}: {name}") for name, one in bones.items()})
+    factors: dict[str, Any] = {name: check_number(one, f"{where}: {name}") for name, one in value.items() if name != "bones"}
+    return replace(Weights(**factors), bones={name: check_number(one, f"{where}: {name}") for name, one in bones.items()})
 
 
-def _list_of(read: Callable) -> Callable:
+def _list_reader(read: Callable) -> Callable:
     """Build a reader for a list whose entries `read` parses."""
-    def lines(value, where: str) -> tuple:
+    def read_list(value, where: str) -> tuple:
         if not isinstance(value, (list, tuple)):
-            raise InputError(where, shown(value), "a list [...]")
+            raise InputError(where, describe_value(value), "a list [...]")
         one = {"players": "player", "passes": "pass"}[where]
         return tuple(read(entry, f"{one} {number}") for number, entry in enumerate(value, start=1))
 
-    return lines
+    return read_list
 
 
-def _angle(value, where: str) -> float:
+def _parse_angle(value, where: str) -> float:
     """Parse an angle in degrees to rad; larger angles are reduced to half a turn."""
-    degrees = number(value, where)
+    degrees = check_number(value, where)
     return math.radians(degrees if abs(degrees) <= 360.0 else math.remainder(degrees, 360.0))
 
 
-def _in_degrees(angle: float) -> float:
+def _to_degrees(angle: float) -> float:
     """Find the degrees from which reading gives exactly this angle (rad) again, if there are any."""
-    near = math.degrees(angle)
-    tried = (near + ulps * math.ulp(near) for ulps in (0, 1, -1, 2, -2, 3, -3))
-    return next((degrees for degrees in tried if math.radians(degrees) == angle), near)
+    degrees_near = math.degrees(angle)
+    tried = (degrees_near + ulps * math.ulp(degrees_near) for ulps in (0, 1, -1, 2, -2, 3, -3))
+    return next((degrees for degrees in tried if math.radians(degrees) == angle), degrees_near)
 
 
-def _place(value, where: str) -> tuple[float, float]:
-    return numbers(value, where, 2, "[x, y] in metres")
+def _parse_place(value, where: str) -> tuple[float, float]:
+    return check_numbers(value, where, 2, "[x, y] in metres")
 
 
-def _triple(value, where: str) -> tuple[float, float, float]:
-    return numbers(value, where, 3, "[x, y, z]")
+def _parse_triple(value, where: str) -> tuple[float, float, float]:
+    return check_numbers(value, where, 3, "[x, y, z]")
 
 
 def write_strikes(path: str | os.PathLike, strikes: Iterable[Mapping]) -> None:
@@ -295,11 +295,11 @@ def write_strikes(path: str | os.PathLike, strikes: Iterable[Mapping]) -> None:
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow(COLUMNS)
     for one in strikes:
-        writer.writerow([_cell(one[name]) for name in COLUMNS])
+        writer.writerow([_format_cell(one[name]) for name in COLUMNS])
     atomic_write(path, out.getvalue())
 
 
-def _cell(value) -> str:
+def _format_cell(value) -> str:
     """Format a value as a CSV cell: 0/1 for bools, six digits for numbers, empty for None and NaN."""
     if isinstance(value, bool):
         return str(int(value))

@@ -13,10 +13,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..annotation.ball_contact import striking_part
+from ..annotation.ball_contact import find_striking_part
 from ..annotation.labels import list_labels
-from ..ball.contact import StruckFrom, Tool, ball_centre, in_world, striking_surface, struck_from
-from ..ball.physics import FASTEST
+from ..ball.contact import StrikeSurface, Tool, compute_ball_centre, convert_to_world, find_striking_surface, sample_strike_surface
+from ..ball.physics import HUMAN_BALL_SPEEDS
 from ..base.vectors import unit_vectors
 from ..library.library import Library
 from ..motion import quaternion
@@ -24,20 +24,20 @@ from .hit_library import HitLibrary, LibraryHit
 from .pass_scene import RECEIVE
 from .way import HitOrder
 
-TOOL_WORDS = frozenset(list_labels(part="tool"))
-RECEIVE_WORDS = frozenset(list_labels(ball="takes"))
+TOOL_LABELS = frozenset(list_labels(part="tool"))
+RECEIVE_LABELS = frozenset(list_labels(ball="takes"))
 OTHER_ACTS = frozenset(list_labels(ball="never"))
-_SAID, _SILENT, _OTHER = range(3)  # labels name this part, no part, or another part or act
+_NAMED, _UNNAMED, _OTHER = range(3)  # labels name this part, no part, or another part or act
 _HAND_VOLLEY = {"hand", "volley"}  # a volleyball player's volley, not a footballer's
 _SIDED = ("foot", "hand", "tool")
 
 MOST_FRAMES = 7
 """Most moments that are tried in one ball stretch, spread evenly."""
-_BACK_ON_LIMB = 0.2  # of a unit normal: most that may point back along the limb, to the shin or the forearm
+_LIMB_SHARE = 0.2  # of a unit normal: most that may point back along the limb, to the shin or the forearm
 
 
 @dataclass(frozen=True, eq=False)
-class Choice:
+class PartStrikes:
     """All strikes of a library with one part.
 
     Attributes:
@@ -48,10 +48,10 @@ class Choice:
 
     part: str
     measured: HitLibrary
-    words: tuple[frozenset[str], ...]
+    labels: tuple[frozenset[str], ...]
 
     @classmethod
-    def of(cls, library: Library, part: str, tool: Tool | None = None) -> Choice:
+    def from_library(cls, library: Library, part: str, tool: Tool | None = None) -> PartStrikes:
         """Build the strikes of a library with a part.
 
         Args:
@@ -63,16 +63,16 @@ class Choice:
         Raises:
             InputError: if the skeleton lacks the part.
         """
-        striking_surface(library.skeleton, part, "right" if part in _SIDED else "", tool)
-        measured = HitLibrary.of(library, part, tool)
-        return cls(part, measured, tuple(_words_at(library, one.clip, one.hit.key) for one in measured.hits))
+        find_striking_surface(library.skeleton, part, "right" if part in _SIDED else "", tool)
+        measured = HitLibrary.from_library(library, part, tool)
+        return cls(part, measured, tuple(_collect_labels(library, one.clip, one.hit.key) for one in measured.hits))
 
     @property
     def hits(self) -> tuple[LibraryHit, ...]:
         """The hit motions."""
         return self.measured.hits
 
-    def of_kind(self, kind: str, side: str = "") -> tuple[LibraryHit, ...]:
+    def select_by_kind(self, kind: str, side: str = "") -> tuple[LibraryHit, ...]:
         """Choose the strikes that serve a kind of pass.
 
         Args:
@@ -82,54 +82,54 @@ class Choice:
             The hit motions, best first.
         """
         # labels first: other parts' strikes and other acts are out
-        found = self._called([i for i, one in enumerate(self.hits) if not side or one.hit.side in ("", side)])
-        stops = [i for i in found if self.words[i] & RECEIVE_WORDS]
+        suitable = self._select_labelled([i for i, one in enumerate(self.hits) if not side or one.hit.side in ("", side)])
+        stops = [i for i in suitable if self.labels[i] & RECEIVE_LABELS]
         if kind == RECEIVE:
-            found = stops or found
+            suitable = stops or suitable
         else:
-            found = [i for i in found if i not in stops] or found
-        named = [i for i in found if kind in self.words[i]]
+            suitable = [i for i in suitable if i not in stops] or suitable
+        named = [i for i in suitable if kind in self.labels[i]]
         if named or kind == RECEIVE:
-            return tuple(self.hits[i] for i in (named or sorted(found, key=lambda i: self.hits[i].hit.max_speed)))
-        return self._by_speed(kind, found)
+            return tuple(self.hits[i] for i in (named or sorted(suitable, key=lambda i: self.hits[i].hit.max_speed)))
+        return self._sort_by_speed(kind, suitable)
 
-    def _called(self, among: list[int]) -> list[int]:
+    def _select_labelled(self, among: list[int]) -> list[int]:
         """Choose those that labels call strikes of the part; if there are none, those without such labels."""
-        ranks = [_rank(self.part, self.words[i]) for i in among]
+        ranks = [_rank_labels(self.part, self.labels[i]) for i in among]
         best = min(ranks, default=_OTHER)
         return [i for i, rank in zip(among, ranks) if rank == best < _OTHER]
 
-    def _by_speed(self, kind: str, among: list[int]) -> tuple[LibraryHit, ...]:
+    def _sort_by_speed(self, kind: str, among: list[int]) -> tuple[LibraryHit, ...]:
         """Sort strikes by how well their speed suits a kind; strikes of other kinds only if there are no others."""
-        order = [int(i) for i in self.measured.of_kind(kind) if int(i) in set(among)]
+        order = [int(i) for i in self.measured.sort_by_kind(kind) if int(i) in set(among)]
         same = [i for i in order if self.measured.kinds[i] == kind]
         return tuple(self.hits[i] for i in (same or order))
 
 
-def unsaid(library: Library, order: HitOrder) -> bool:
+def is_unlabelled_strike(library: Library, order: HitOrder) -> bool:
     """Whether no labels call an ordered motion a strike of its part, so that it counts as one by its speed alone."""
-    return _rank(order.part, _words_at(library, order.clip, order.strike_frame)) != _SAID
+    return _rank_labels(order.part, _collect_labels(library, order.clip, order.strike_frame)) != _NAMED
 
 
-def _rank(part: str, words: frozenset[str]) -> int:
+def _rank_labels(part: str, labels: frozenset[str]) -> int:
     """Rank labels for a part: _NAMED, _UNNAMED or _OTHER."""
-    said = _said_part(words)
-    if words & OTHER_ACTS or (said not in (None, part) and part in FASTEST):
+    named_part = _find_labelled_part(labels)
+    if labels & OTHER_ACTS or (named_part not in (None, part) and part in HUMAN_BALL_SPEEDS):
         return _OTHER
-    return _SAID if said == part else _SILENT
+    return _NAMED if named_part == part else _UNNAMED
 
 
-def _said_part(words: frozenset[str]) -> str | None:
+def _find_labelled_part(labels: frozenset[str]) -> str | None:
     """Find the part that strikes by the labels; None if they name none."""
-    if words & TOOL_WORDS:
+    if labels & TOOL_LABELS:
         return "tool"
-    return "hand" if _HAND_VOLLEY <= words else striking_part(words)
+    return "hand" if _HAND_VOLLEY <= labels else find_striking_part(labels)
 
 
-def _words_at(library: Library, clip: int, frame: float) -> frozenset[str]:
+def _collect_labels(library: Library, clip: int, frame: float) -> frozenset[str]:
     """Collect the labels of a clip at a frame."""
     rows = [row for row in library.clips[clip].annotations if row.start <= frame <= row.end]
-    return frozenset(word for row in rows for word in row.words)
+    return frozenset(label for row in rows for label in row.words)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -149,7 +149,7 @@ class StrikeMoments:
     hits: tuple[LibraryHit, ...]
     which: np.ndarray
     frame: np.ndarray
-    struck: StruckFrom
+    part_states: StrikeSurface
     lead: np.ndarray
     trail: np.ndarray
     travel: np.ndarray
@@ -159,12 +159,12 @@ class StrikeMoments:
 
     def only(self, which: Sequence[int] | np.ndarray) -> StrikeMoments:
         """Those of a mask or of indices (M,)."""
-        struck = self.struck
+        part_states = self.part_states
         return replace(self, which=self.which[which], frame=self.frame[which], lead=self.lead[which],
                        trail=self.trail[which], travel=self.travel[which],
-                       struck=StruckFrom(struck.start[which], struck.end[which], struck.radius, struck.velocity[which]))
+                       part_states=StrikeSurface(part_states.start[which], part_states.end[which], part_states.radius, part_states.velocity[which]))
 
-    def ball(self, normal: np.ndarray, radius: float) -> np.ndarray:
+    def place_ball(self, normal: np.ndarray, radius: float) -> np.ndarray:
         """Compute the centre of a ball that touches the part.
 
         Args:
@@ -173,23 +173,23 @@ class StrikeMoments:
         Returns:
             (N, 3) m, own frame.
         """
-        return ball_centre(self.struck, self.off_the_limb(normal), radius)
+        return compute_ball_centre(self.part_states, self.limit_normals(normal), radius)
 
-    def off_the_limb(self, normal: np.ndarray) -> np.ndarray:
+    def limit_normals(self, normal: np.ndarray) -> np.ndarray:
         """Limit normals (N, 3) so that they do not point up the shin or the tool's handle, where there is no room for a
         ball.
         """
-        along = self.struck.end - self.struck.start
-        long = np.linalg.norm(along, axis=-1, keepdims=True)
-        along = along / np.maximum(long, 1e-9)
+        along = self.part_states.end - self.part_states.start
+        length = np.linalg.norm(along, axis=-1, keepdims=True)
+        along = along / np.maximum(length, 1e-9)
         # cosine with the limb's direction: negative where the normal points back along the limb
-        back = np.sum(normal * along, axis=-1, keepdims=True)
-        spare = np.where(long > 1e-6, np.minimum(back + _BACK_ON_LIMB, 0.0), 0.0)
-        out = normal - spare * along
+        along_share = np.sum(normal * along, axis=-1, keepdims=True)
+        excess = np.where(length > 1e-6, np.minimum(along_share + _LIMB_SHARE, 0.0), 0.0)
+        out = normal - excess * along
         return unit_vectors(out)
 
 
-def strike_moments(library: Library, hits: Sequence[LibraryHit], tool: Tool | None = None,
+def collect_strike_moments(library: Library, hits: Sequence[LibraryHit], tool: Tool | None = None,
                    size: float = 1.0) -> StrikeMoments:
     """Collect the moments of hit motions, in their order.
 
@@ -201,33 +201,33 @@ def strike_moments(library: Library, hits: Sequence[LibraryHit], tool: Tool | No
     Returns:
         The moments, MOST_FRAMES at most for each hit motion.
     """
-    which, frames, struck, lead, trail, travel = [], [], [], [], [], []
+    which, frames, part_states, lead, trail, travel = [], [], [], [], [], []
     for number, one in enumerate(hits):
         motion, hit = library.clips[one.clip].recording, one.hit
-        surface = striking_surface(motion.skeleton, hit.part, hit.side, tool)
+        surface = find_striking_surface(motion.skeleton, hit.part, hit.side, tool)
         first, last = hit.ball_stretch
         # whole frames spread over the ball stretch
-        own = np.unique(np.round(np.linspace(first, last, MOST_FRAMES)))
-        gone = motion.root_positions[[hit.first, hit.last], :2]
-        which.append(np.full(len(own), number))
-        frames.append(own)
-        struck.append(struck_from(motion, own, surface))
-        lead.append((own - hit.first) / hit.fps)
-        trail.append((hit.last - own) / hit.fps)
-        travel.append(np.full(len(own), size * np.linalg.norm(gone[1] - gone[0])))
+        frames_tried = np.unique(np.round(np.linspace(first, last, MOST_FRAMES)))
+        ends = motion.root_positions[[hit.first, hit.last], :2]
+        which.append(np.full(len(frames_tried), number))
+        frames.append(frames_tried)
+        part_states.append(sample_strike_surface(motion, frames_tried, surface))
+        lead.append((frames_tried - hit.first) / hit.fps)
+        trail.append((hit.last - frames_tried) / hit.fps)
+        travel.append(np.full(len(frames_tried), size * np.linalg.norm(ends[1] - ends[0])))
     if not hits:
         nothing = np.zeros(0)
-        empty = StruckFrom(np.zeros((0, 3)), np.zeros((0, 3)), 0.0, np.zeros((0, 3)))
-        return StrikeMoments(hits=(), which=nothing.astype(int), frame=nothing, struck=empty, lead=nothing,
+        empty = StrikeSurface(np.zeros((0, 3)), np.zeros((0, 3)), 0.0, np.zeros((0, 3)))
+        return StrikeMoments(hits=(), which=nothing.astype(int), frame=nothing, part_states=empty, lead=nothing,
                              trail=nothing, travel=nothing)
-    joined = (np.concatenate([getattr(one, name) for one in struck]) * size for name in ("start", "end", "velocity"))
-    start, end, velocity = joined
+    scaled = (np.concatenate([getattr(one, name) for one in part_states]) * size for name in ("start", "end", "velocity"))
+    start, end, velocity = scaled
     return StrikeMoments(hits=tuple(hits), which=np.concatenate(which), frame=np.concatenate(frames),
-                         struck=StruckFrom(start, end, struck[0].radius * size, velocity), lead=np.concatenate(lead),
+                         part_states=StrikeSurface(start, end, part_states[0].radius * size, velocity), lead=np.concatenate(lead),
                          trail=np.concatenate(trail), travel=np.concatenate(travel))
 
 
-def launched_from(moments: StrikeMoments, place: np.ndarray, facing: np.ndarray, radius: float):
+def compute_natural_launch(moments: StrikeMoments, place: np.ndarray, facing: np.ndarray, radius: float):
     """Compute how a ball naturally leaves a part: off its surface where it moves to, as fast as the part.
 
     Args:
@@ -239,6 +239,6 @@ def launched_from(moments: StrikeMoments, place: np.ndarray, facing: np.ndarray,
         places: (N, 3) m, world frame.
         velocities: (N, 3) m/s, world frame.
     """
-    velocity = moments.struck.velocity
-    own = moments.ball(unit_vectors(velocity), radius)
-    return in_world(own, place, facing), quaternion.rotate(quaternion.about_up(facing), velocity)
+    velocity = moments.part_states.velocity
+    own = moments.place_ball(unit_vectors(velocity), radius)
+    return convert_to_world(own, place, facing), quaternion.rotate(quaternion.from_up_angle(facing), velocity)

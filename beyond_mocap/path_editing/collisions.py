@@ -42,7 +42,7 @@ class Collision:
     place: tuple[float, float, float]
 
 
-def collisions(times: np.ndarray, places: np.ndarray, distance: float = DISTANCE, height: float = HEIGHT) -> list:
+def find_collisions(times: np.ndarray, places: np.ndarray, distance: float = DISTANCE, height: float = HEIGHT) -> list:
     """Find all collisions, by time.
 
     Args:
@@ -55,12 +55,12 @@ def collisions(times: np.ndarray, places: np.ndarray, distance: float = DISTANCE
     """
     found = []
     for first in range(len(places) - 1):
-        found += collisions_of(first, range(first + 1, len(places)), times, places=places, distance=distance,
+        found += find_collisions_of(first, range(first + 1, len(places)), times, places=places, distance=distance,
                                height=height)
     return sorted(found, key=lambda collision: (collision.start, collision.first, collision.second))
 
 
-def collisions_of(one: int, others, times, places, distance: float = DISTANCE, height: float = HEIGHT) -> list:
+def find_collisions_of(body: int, others, times, places, distance: float = DISTANCE, height: float = HEIGHT) -> list:
     """Find the collisions of one body with others.
 
     Args:
@@ -73,14 +73,14 @@ def collisions_of(one: int, others, times, places, distance: float = DISTANCE, h
     Returns:
         List of `Collision`.
     """
-    others = np.asarray([other for other in others if other != one], dtype=int)
+    others = np.asarray([other for other in others if other != body], dtype=int)
     if len(times) < 2 or not len(others):
         return []
     rows, steps = np.indices((len(others), len(times) - 1)).reshape(2, -1)
-    return collisions_at(one, others[rows], steps, times=times, places=places, distance=distance, height=height)
+    return find_collisions_at(body, others[rows], steps, times=times, places=places, distance=distance, height=height)
 
 
-def collisions_at(one: int, others, steps, times, places, distance: float = DISTANCE, height: float = HEIGHT) -> list:
+def find_collisions_at(body: int, others, steps, times, places, distance: float = DISTANCE, height: float = HEIGHT) -> list:
     """Find the collisions of one body with others within given steps.
 
     Args:
@@ -94,31 +94,31 @@ def collisions_at(one: int, others, steps, times, places, distance: float = DIST
     Returns:
         List of `Collision`.
     """
-    off = places[others, steps] - places[one, steps]
-    move = places[others, steps + 1] - places[one, steps + 1] - off
+    off = places[others, steps] - places[body, steps]
+    move = places[others, steps + 1] - places[body, steps + 1] - off
     reach = distance + np.sqrt(move[:, 0] ** 2 + move[:, 1] ** 2)
     # A quick test first: only pairs that their relative movement within the step can bring together.
     near = np.flatnonzero(off[:, 0] ** 2 + off[:, 1] ** 2 <= reach**2)
     others, steps, off, move = others[near], steps[near], off[near], move[near]
-    goes = ~(_jumps(one, steps, times, places) | _jumps(others, steps, times, places))
-    enter, leave, nearest, gap = gaps(off, move, distance, max(height - distance, 0.0))
+    goes = ~(_find_jumps(body, steps, times, places) | _find_jumps(others, steps, times, places))
+    enter, leave, nearest, gap = compute_gaps(off, move, distance, max(height - distance, 0.0))
     hit = goes & (gap < distance)
     found = []
     for other in np.unique(others[hit]):
         of = hit & (others == other)
-        pair = [min(one, other), max(one, other)]
-        found += _joined(pair, steps[of], enter[of], leave=leave[of], nearest=nearest[of], gap=gap[of], times=times,
+        pair = [min(body, other), max(body, other)]
+        found += _join_steps(pair, steps[of], enter[of], leave=leave[of], nearest=nearest[of], gap=gap[of], times=times,
                          places=places)
     return found
 
 
-def _jumps(bodies, steps, times, places):
+def _find_jumps(bodies, steps, times, places):
     """Return which steps (M,) of these bodies are jumps, not movement."""
     step = places[bodies, steps + 1] - places[bodies, steps]
     return np.einsum("mk,mk->m", step, step) > (_JUMP * (times[steps + 1] - times[steps])) ** 2
 
 
-def _joined(pair, steps, enter, leave, nearest, gap, times, places):
+def _join_steps(pair, steps, enter, leave, nearest, gap, times, places):
     """Join the steps of one pair to collisions, where one continues in the next step."""
     found = []
     breaks = np.flatnonzero((np.diff(steps) > 1) | (leave[:-1] < 1.0) | (enter[1:] > 0.0)) + 1
@@ -134,7 +134,7 @@ def _joined(pair, steps, enter, leave, nearest, gap, times, places):
     return found
 
 
-def gaps(off: np.ndarray, move: np.ndarray, distance: float, span: float):
+def compute_gaps(off: np.ndarray, move: np.ndarray, distance: float, span: float):
     """Compute when two bodies are nearest within a step, and when they come and leave.
 
     Args:
@@ -149,23 +149,23 @@ def gaps(off: np.ndarray, move: np.ndarray, distance: float, span: float):
     """
     if not len(off) or max(np.abs(off[:, 2]).max(), np.abs(off[:, 2] + move[:, 2]).max()) <= span:  # all on one level
         level, always = np.array([1.0, 1.0, 0.0]), np.zeros(len(off))
-        nearest, gap, enter, leave = _quadratic(off * level, move * level, always, always + 1.0, distance)
+        nearest, gap, enter, leave = _minimize_gap(off * level, move * level, always, always + 1.0, distance)
         return enter, leave, nearest, gap
     enter, leave = np.full(len(off), np.inf), np.full(len(off), -np.inf)
     nearest, gap = np.zeros(len(off)), np.full(len(off), np.inf)
     # Three pieces: segments overlap in height (no vertical gap), the other body above, the other body below.
     for low, high, shift in ((-span, span, None), (span, np.inf, span), (-np.inf, -span, -span)):
-        begin, end = _while_between(off[:, 2], move[:, 2], low, high)
+        begin, end = _find_interval(off[:, 2], move[:, 2], low, high)
         level = np.array([1.0, 1.0, 0.0 if shift is None else 1.0])
         start, change = (off - np.array([0.0, 0.0, shift or 0.0])) * level, move * level
-        at, least, into, out = _quadratic(start, change, begin, end, distance)
+        at, least, into, out = _minimize_gap(start, change, begin, end, distance)
         better = least < gap
         nearest, gap = np.where(better, at, nearest), np.where(better, least, gap)
         enter, leave = np.minimum(enter, into), np.maximum(leave, out)
     return enter, leave, nearest, gap
 
 
-def least_gaps(first, second, distance: float = DISTANCE, height: float = HEIGHT) -> np.ndarray:
+def compute_least_gaps(first, second, distance: float = DISTANCE, height: float = HEIGHT) -> np.ndarray:
     """Compute the smallest gap between pairs of bodies.
 
     Args:
@@ -178,25 +178,25 @@ def least_gaps(first, second, distance: float = DISTANCE, height: float = HEIGHT
     """
     off = second - first
     move = np.diff(off, axis=1).reshape(-1, 3)
-    gap = gaps(off[:, :-1].reshape(-1, 3), move, distance, max(height - distance, 0.0))[3]
+    gap = compute_gaps(off[:, :-1].reshape(-1, 3), move, distance, max(height - distance, 0.0))[3]
     return gap.reshape(len(off), -1).min(axis=1, initial=np.inf)
 
 
-def _while_between(value, change, low, high):
+def _find_interval(value, change, low, high):
     """Find the shares (M,), (M,) of a step between which value + share * change lies in [low, high]; empty: first >
     last.
     """
     with np.errstate(divide="ignore", invalid="ignore"):
         first, last = (low - value) / change, (high - value) / change
-    still = change == 0.0
+    is_constant = change == 0.0
     inside = (value >= low) & (value <= high)
     first, last = np.minimum(first, last), np.maximum(first, last)
-    first = np.where(still, np.where(inside, 0.0, 2.0), np.maximum(first, 0.0))
-    last = np.where(still, np.where(inside, 1.0, -1.0), np.minimum(last, 1.0))
+    first = np.where(is_constant, np.where(inside, 0.0, 2.0), np.maximum(first, 0.0))
+    last = np.where(is_constant, np.where(inside, 1.0, -1.0), np.minimum(last, 1.0))
     return first, last
 
 
-def _quadratic(start, change, begin, end, distance):
+def _minimize_gap(start, change, begin, end, distance):
     """Minimize |start + share * change| for shares in [begin, end], and find where it is below `distance`."""
     a, b = np.einsum("mk,mk->m", change, change), np.einsum("mk,mk->m", start, change)
     empty = begin > end
@@ -208,5 +208,5 @@ def _quadratic(start, change, begin, end, distance):
     root = np.sqrt(np.maximum(room, 0.0))
     into, out = (np.divide(-b + sign * root, a, out=np.full_like(a, sign * np.inf), where=a > 0) for sign in (-1, 1))
     into, out = (np.minimum(np.maximum(share, begin), end) for share in (into, out))
-    apart = empty | (least >= distance)
-    return at, np.where(empty, np.inf, least), np.where(apart, np.inf, into), np.where(apart, -np.inf, out)
+    separated = empty | (least >= distance)
+    return at, np.where(empty, np.inf, least), np.where(separated, np.inf, into), np.where(separated, -np.inf, out)

@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from ..base.errors import InputError
-from ..base.time_series import interpolate
+from ..base.time_series import interpolate_columns
 from ..base.vectors import arctan2
 from ..motion.path.arc_length import ArcLength
 from ..motion.path.path import Path, SplinePath
@@ -21,13 +21,13 @@ from ..motion.path.path import Path, SplinePath
 RISE = 0.4
 """Share of a detour's width in which it leaves the path, and in which it returns to it."""
 _STEP = 0.1  # metres between samples when a path is rebuilt with its detours
-_STEADY = 0.3  # metres over which the lateral direction is smoothed, so that the offset of a corner has no loop
+_HEADING_METRES = 0.3  # metres over which the lateral direction is smoothed, so that the offset of a corner has no loop
 
 _SPACING = 0.1  # metres between the samples of a `SampledPath`
 _PIECES = 24  # pieces into which a detour is divided to measure its length
 
 
-def offsets(arc: np.ndarray, detours) -> np.ndarray:
+def compute_offsets(arc: np.ndarray, detours) -> np.ndarray:
     """Compute the lateral offset of a path with detours.
 
     Args:
@@ -43,7 +43,7 @@ def offsets(arc: np.ndarray, detours) -> np.ndarray:
     return total
 
 
-def round_offsets(arc: np.ndarray, detours, length: float) -> np.ndarray:
+def compute_closed_offsets(arc: np.ndarray, detours, length: float) -> np.ndarray:
     """Compute the lateral offset on a closed path, where a detour continues across the place at which the path closes.
 
     Args:
@@ -53,10 +53,10 @@ def round_offsets(arc: np.ndarray, detours, length: float) -> np.ndarray:
     Returns:
         (N,) metres to the left.
     """
-    return sum((offsets(arc + shift * length, detours) for shift in (-1.0, 0.0, 1.0)), np.zeros(()))
+    return sum((compute_offsets(arc + shift * length, detours) for shift in (-1.0, 0.0, 1.0)), np.zeros(()))
 
 
-def gentle_width(offset, speed: float):
+def compute_detour_width(offset, speed: float):
     """Compute how much of the path a comfortable detour covers.
 
     Its curvature stays below that of a radius of 4 m, and its lateral acceleration below 1.5 m/s^2.
@@ -72,7 +72,7 @@ def gentle_width(offset, speed: float):
     return np.maximum(1.5, np.sqrt(most * np.abs(offset) / bend) / RISE)
 
 
-def headings(places: np.ndarray, spacing: float, closed: bool = False) -> np.ndarray:
+def compute_headings(places: np.ndarray, spacing: float, closed: bool = False) -> np.ndarray:
     """Compute the smoothed heading along a line of evenly spaced places.
 
     Where the line goes straight up or down, the heading is interpolated from before and after.
@@ -87,10 +87,10 @@ def headings(places: np.ndarray, spacing: float, closed: bool = False) -> np.nda
     along = np.gradient(places, axis=0)
     if closed:
         along[0] = along[-1] = 0.5 * (places[1] - places[-2])
-    return _steady(_heading(along, spacing), _STEADY / spacing, closed)
+    return _smooth_headings(_compute_raw_headings(along, spacing), _HEADING_METRES / spacing, closed)
 
 
-def left_of(heading: np.ndarray) -> np.ndarray:
+def compute_left(heading: np.ndarray) -> np.ndarray:
     """Compute the horizontal unit vectors to the left of a heading.
 
     Args:
@@ -101,7 +101,7 @@ def left_of(heading: np.ndarray) -> np.ndarray:
     return np.stack([-np.sin(heading), np.cos(heading), np.zeros_like(heading)], axis=-1)
 
 
-def _heading(along, spacing):
+def _compute_raw_headings(along, spacing):
     """Compute the unwrapped yaw (N,) of tangents (N, 3), interpolated where they have no horizontal part."""
     level = np.hypot(along[:, 0], along[:, 1]) > 1e-3 * spacing
     if not level.any():
@@ -110,7 +110,7 @@ def _heading(along, spacing):
     return np.interp(np.arange(len(along)), np.flatnonzero(level), yaw)
 
 
-def _steady(heading, sigma, closed):
+def _smooth_headings(heading, sigma, closed):
     """Smooth a yaw (N,) by a Gaussian of `sigma` samples; closed: the last sample is the first one again."""
     reach = int(np.ceil(3.0 * sigma))
     kernel = np.exp(-0.5 * (np.arange(-reach, reach + 1) / sigma) ** 2)
@@ -125,7 +125,7 @@ def _steady(heading, sigma, closed):
     return np.convolve(padded, kernel / kernel.sum(), mode="valid")
 
 
-def with_detours(path: Path, detours) -> Path:
+def add_detours(path: Path, detours) -> Path:
     """Build the path with its detours, C2 as before and under the same parameters.
 
     The ends move where a detour includes them. Without detours the result is `path` itself.
@@ -146,23 +146,23 @@ def with_detours(path: Path, detours) -> Path:
     if not detours or not length.length:
         return path
     grid = np.linspace(0.0, length.length, max(int(np.ceil(length.length / _STEP)), 8) + 1)
-    heading = headings(path.at(length.parameter(grid)), grid[1], path.closed)
-    parameters = _parameters(path, length)
-    arc = length.at(parameters)
-    aside = round_offsets(arc, detours, length.length) if path.closed else offsets(arc, detours)
-    left = left_of(_smooth(grid, heading, arc))
-    return _through(parameters, path.at(parameters) + aside[:, None] * left, path.closed)
+    heading = compute_headings(path.at(length.parameter_at(grid)), grid[1], path.closed)
+    parameters = _sample_parameters(path, length)
+    arc = length.distance_at(parameters)
+    aside = compute_closed_offsets(arc, detours, length.length) if path.closed else compute_offsets(arc, detours)
+    left = compute_left(_interpolate_smoothly(grid, heading, arc))
+    return _fit_through(parameters, path.at(parameters) + aside[:, None] * left, path.closed)
 
 
-def _parameters(path, length):
+def _sample_parameters(path, length):
     """Sample the path's parameters, its breaks among them, so that no two are more than _STEP apart."""
     breaks = np.asarray(path.breaks, dtype=float)
-    counts = np.maximum(np.ceil(np.diff(length.at(breaks)) / _STEP).astype(int), 1)
+    counts = np.maximum(np.ceil(np.diff(length.distance_at(breaks)) / _STEP).astype(int), 1)
     first, share = np.repeat(np.arange(len(counts)), counts), np.concatenate([np.arange(n) / n for n in counts])
     return np.append(breaks[first] + share * np.diff(breaks)[first], breaks[-1])
 
 
-def _smooth(grid, values, at):
+def _interpolate_smoothly(grid, values, at):
     """Interpolate values (N,) on a grid by a cubic spline, since kinks of the heading would become kinks of the
     path.
     """
@@ -171,7 +171,7 @@ def _smooth(grid, values, at):
     return CubicSpline(grid, values)(at)
 
 
-def _through(parameters, places, closed):
+def _fit_through(parameters, places, closed):
     """Interpolate places (N, 3) by a cubic spline with the given parameters."""
     from scipy.interpolate import make_interp_spline
 
@@ -182,7 +182,7 @@ def _through(parameters, places, closed):
 
 
 @dataclass(frozen=True)
-class Change:
+class PathChange:
     """What a follower changes to avoid others.
 
     Attributes:
@@ -215,14 +215,14 @@ class Follower:
     by_arc: bool = True
 
     @cached_property
-    def way(self) -> "Way":
+    def sampled_path(self) -> "SampledPath":
         """The path, sampled and seen from above."""
-        return Way(self.path)
+        return SampledPath(self.path)
 
     @cached_property
-    def beside(self) -> np.ndarray:
+    def path_offset(self) -> np.ndarray:
         """(T, 3) metres from the path to the body."""
-        return self.places - self.way.places_at(self.arc)
+        return self.places - self.sampled_path.places_at(self.arc)
 
     @cached_property
     def speed(self) -> float:
@@ -232,7 +232,7 @@ class Follower:
         moving = speeds[speeds > 0.2]
         return float(np.percentile(moving, 80)) if len(moving) else 0.0
 
-    def at(self, times: np.ndarray, change: Change = Change()) -> np.ndarray:
+    def at(self, times: np.ndarray, change: PathChange = PathChange()) -> np.ndarray:
         """Compute the places of the body at given times; before its first and after its last time it stays there.
 
         Args:
@@ -243,12 +243,12 @@ class Follower:
         """
         times = times - change.delay
         if self.path is None or not change.detours:
-            return interpolate(times, self.times, self.places)
+            return interpolate_columns(times, self.times, self.places)
         arc = np.interp(times, self.times, self.arc)
-        beside = interpolate(times, self.times, self.beside)
-        return beside + self.way.with_detours_at(arc, change.detours, self.by_arc)
+        beside = interpolate_columns(times, self.times, self.path_offset)
+        return beside + self.sampled_path.with_detours_at(arc, change.detours, self.by_arc)
 
-    def with_more(self, times: np.ndarray, change: Change, train) -> np.ndarray:
+    def places_with_train(self, times: np.ndarray, change: PathChange, train) -> np.ndarray:
         """Compute the places of the body for many variants of additional detours at once.
 
         Fast, and exact to a few millimetres.
@@ -260,19 +260,19 @@ class Follower:
         Returns:
             (A, N, 3) metres, world frame.
         """
-        times, way = times - change.delay, self.way
+        times, sampled_path = times - change.delay, self.sampled_path
         # The arc length with the old detours is exact; the length that the new ones add is subtracted to first order.
-        arc = way.on_it(np.interp(times, self.times, self.arc), change.detours, self.by_arc)[None]
-        old = way.aside(arc, change.detours)
-        aside = old + way.aside(arc, train)
+        arc = sampled_path.to_original_arc(np.interp(times, self.times, self.arc), change.detours, self.by_arc)[None]
+        old = sampled_path.compute_offset(arc, change.detours)
+        aside = old + sampled_path.compute_offset(arc, train)
         if self.by_arc:
-            arc = arc - way.extra(arc[0], aside) + way.extra(arc[0], old)
-            aside = way.aside(arc, (*change.detours, *train))
+            arc = arc - sampled_path.compute_extra_length(arc[0], aside) + sampled_path.compute_extra_length(arc[0], old)
+            aside = sampled_path.compute_offset(arc, (*change.detours, *train))
         arc, shape = np.broadcast_to(arc, aside.shape).ravel(), (*aside.shape, 3)
-        places = interpolate(arc, way.arc, way.places) + aside.reshape(-1, 1) * interpolate(arc, way.arc, way.left)
-        return places.reshape(shape) + interpolate(times, self.times, self.beside)
+        places = interpolate_columns(arc, sampled_path.arc, sampled_path.places) + aside.reshape(-1, 1) * interpolate_columns(arc, sampled_path.arc, sampled_path.left)
+        return places.reshape(shape) + interpolate_columns(times, self.times, self.path_offset)
 
-    def arc_at(self, time: float, change: Change = Change()) -> float:
+    def arc_at(self, time: float, change: PathChange = PathChange()) -> float:
         """Compute the metres along the original path at a time.
 
         Args:
@@ -282,10 +282,10 @@ class Follower:
             Metres along the original path.
         """
         arc = np.interp([time - change.delay], self.times, self.arc)
-        return float(self.way.on_it(arc, change.detours, self.by_arc)[0])
+        return float(self.sampled_path.to_original_arc(arc, change.detours, self.by_arc)[0])
 
 
-class Way:
+class SampledPath:
     """A path sampled at even arc lengths, with the directions to its left.
 
     Attributes:
@@ -303,14 +303,14 @@ class Way:
         self.length, self.closed, self.tables = length.length, path.closed, {}
         count = max(int(np.ceil(self.length / _SPACING)), 8)
         self.arc = np.linspace(0.0, self.length, count + 1) if self.length else np.zeros(1)
-        self.places = path.at(length.parameter(self.arc))
-        heading = headings(self.places, self.arc[1], self.closed) if self.length else np.zeros(1)
-        self.left = left_of(heading)
-        self.bend = np.gradient(heading, self.arc) if self.length else np.zeros(1)
+        self.places = path.at(length.parameter_at(self.arc))
+        heading = compute_headings(self.places, self.arc[1], self.closed) if self.length else np.zeros(1)
+        self.left = compute_left(heading)
+        self.curvature = np.gradient(heading, self.arc) if self.length else np.zeros(1)
 
     def places_at(self, arc: np.ndarray) -> np.ndarray:
         """Interpolate the places (N, 3) on the path at arc lengths (N,)."""
-        return interpolate(self._within(arc, self.length), self.arc, self.places)
+        return interpolate_columns(self._wrap_arc(arc, self.length), self.arc, self.places)
 
     def with_detours_at(self, arc: np.ndarray, detours, by_arc: bool) -> np.ndarray:
         """Compute the places on the path with detours.
@@ -322,11 +322,11 @@ class Way:
         Returns:
             (N, 3) metres, world frame.
         """
-        arc = self.on_it(arc, detours, by_arc)
-        aside = interpolate(arc, self.arc, self.left) * self.aside(arc, detours)[:, None]
-        return interpolate(arc, self.arc, self.places) + aside
+        arc = self.to_original_arc(arc, detours, by_arc)
+        aside = interpolate_columns(arc, self.arc, self.left) * self.compute_offset(arc, detours)[:, None]
+        return interpolate_columns(arc, self.arc, self.places) + aside
 
-    def on_it(self, arc: np.ndarray, detours, by_arc: bool) -> np.ndarray:
+    def to_original_arc(self, arc: np.ndarray, detours, by_arc: bool) -> np.ndarray:
         """Convert arc lengths on the path with detours to arc lengths on the original path.
 
         Args:
@@ -337,25 +337,25 @@ class Way:
             (N,) metres along the original path.
         """
         if not by_arc or not detours:
-            return self._within(arc, self.length)
+            return self._wrap_arc(arc, self.length)
         if detours not in self.tables:
-            self.tables[detours] = self._gone(detours)
-        at, gone = self.tables[detours]
-        return np.interp(self._within(arc, gone[-1]), gone, at)
+            self.tables[detours] = self._build_arc_table(detours)
+        at, detour_arc = self.tables[detours]
+        return np.interp(self._wrap_arc(arc, detour_arc[-1]), detour_arc, at)
 
-    def _gone(self, detours):
+    def _build_arc_table(self, detours):
         """Build a table: (K,) metres along the original path and (K,) metres along the path with detours."""
         low = np.array([[middle - 0.5 * width] for middle, width, _ in detours])
         wide = np.array([[width] for _, width, _ in detours])
         at = (low + wide * np.linspace(0.0, 1.0, _PIECES + 1)).ravel()
-        at = np.unique(np.concatenate([[0.0, self.length], self._within(at, self.length)]))
-        aside = self.aside(at, detours)
+        at = np.unique(np.concatenate([[0.0, self.length], self._wrap_arc(at, self.length)]))
+        aside = self.compute_offset(at, detours)
         # An offset to the inside of a bend shortens the path by offset * curvature, to the outside it lengthens it.
-        along = 1.0 - 0.5 * (aside[1:] + aside[:-1]) * np.interp(0.5 * (at[1:] + at[:-1]), self.arc, self.bend)
+        along = 1.0 - 0.5 * (aside[1:] + aside[:-1]) * np.interp(0.5 * (at[1:] + at[:-1]), self.arc, self.curvature)
         step = np.hypot(np.diff(at) * along, np.diff(aside))
         return at, np.concatenate([[0.0], np.cumsum(step)])
 
-    def extra(self, arc: np.ndarray, aside: np.ndarray) -> np.ndarray:
+    def compute_extra_length(self, arc: np.ndarray, aside: np.ndarray) -> np.ndarray:
         """Compute the length that an offset adds to the path, counted from the first arc length.
 
         Args:
@@ -365,14 +365,14 @@ class Way:
             (A, N) metres.
         """
         step = np.diff(arc)
-        bend = np.interp(0.5 * (arc[1:] + arc[:-1]), self.arc, self.bend)
+        bend = np.interp(0.5 * (arc[1:] + arc[:-1]), self.arc, self.curvature)
         along = step * (1.0 - 0.5 * (aside[:, 1:] + aside[:, :-1]) * bend)
         more = np.where(step > 0.0, np.hypot(along, np.diff(aside, axis=1)) - step, 0.0)
         return np.concatenate([np.zeros((len(aside), 1)), np.cumsum(more, axis=1)], axis=1)
 
-    def aside(self, arc: np.ndarray, detours) -> np.ndarray:
+    def compute_offset(self, arc: np.ndarray, detours) -> np.ndarray:
         """Compute the lateral offset (N,) m at arc lengths (N,) m."""
-        return round_offsets(arc, detours, self.length) if self.closed else offsets(arc, detours)
+        return compute_closed_offsets(arc, detours, self.length) if self.closed else compute_offsets(arc, detours)
 
-    def _within(self, arc, length):
+    def _wrap_arc(self, arc, length):
         return arc % length if self.closed and length else np.clip(arc, 0.0, length)

@@ -16,13 +16,13 @@ import numpy as np
 
 from ..base.vectors import unit_vector
 from ..motion import foot_plant, quaternion
-from ..motion.foot_plant import Foot, Planted, settled
-from ..motion.humanoid import Limb, identify
-from ..motion.limb import CLEAR_BEND, bent_limb
-from ..motion.motion import pose_kinematics
+from ..motion.foot_plant import Foot, PlantResult, fit_smooth_curve
+from ..motion.humanoid import Limb, identify_joints
+from ..motion.limb import MIN_BEND, solve_posed_limb
+from ..motion.motion import compute_pose
 from ..motion.skeleton import Skeleton
-from ..motion.track import zero_phase_hann
-from .ground_contact import Surface, footing
+from ..motion.track import smooth_zero_phase_hann
+from .ground_contact import Surface, compute_footing
 
 MOST_SHIFT = 0.45
 """Metres that a foot in contact is moved over the ground at most, before it is held less firmly: bodies that turn on
@@ -37,7 +37,7 @@ SPARE = 0.008
 """Metres below full length within which a leg that was bent more eases towards it."""
 LONGEST = (0.3, 1.3)
 """Lower and upper limit of a step's length over that recorded."""
-BENT_ALOFT, STRAIGHT_ALOFT, STIFF = 0.2, 0.01, 0.05
+BENT_WEIGHT, STRAIGHT_WEIGHT, STIFF = 0.2, 0.01, 0.05
 """Weights, against 1 on the ground, of the goals of a leg in the air that is bent more, or straighter, than recorded;
 and of the smoothness of the correction."""
 LEAST_BEND = 0.05
@@ -47,9 +47,9 @@ _PELVIS_SECONDS, _STRIDE = 0.5, 0.5  # seconds; metres between the feet on stair
 _UP = np.array([0.0, 0.0, 1.0])
 _ROUNDS, _SLIDES_FROM = 2, 0.004  # rounds of holding stances less firmly; m of sliding that need none
 _FLOOR, _EVEN = 200.0, 0.003  # smoothness of a recorded floor: half of a half-second wave passes; metres
-_NEAR, _FIRMER = 0.004, 8  # metres off its goal beyond which a foot in contact is held more firmly; rounds of that
+_GOAL_TOLERANCE, _FIRMER_ROUNDS = 0.004, 8  # metres off its goal beyond which a foot in contact is held more firmly; rounds of that
 _MORE_BENT = 0.5  # share of its new bend from which on a leg's own direction counts fully
-_BEHIND = 0.1  # seconds by which a rise or drop is spread
+_SPREAD_SECONDS = 0.1  # seconds by which a rise or drop is spread
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +68,7 @@ class Ground:
 
 
 @dataclass(frozen=True, eq=False)
-class Steps:
+class StepScale:
     """By how much steps are longer than in the constructed motion.
 
     Attributes:
@@ -77,11 +77,11 @@ class Steps:
     """
 
     direction: np.ndarray
-    times: np.ndarray
+    scale: np.ndarray
 
 
-def follow(skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray, standing: np.ndarray, fps: float,
-           ground: Ground, sole: float, steps: Steps | None = None) -> Planted:
+def plant_feet_on_ground(skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray, standing: np.ndarray, fps: float,
+           ground: Ground, sole: float, steps: StepScale | None = None) -> PlantResult:
     """Plant the feet of a motion on the ground wherever they are in contact.
 
     Args:
@@ -96,60 +96,60 @@ def follow(skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray, standing
     Returns:
         Root, rotations, correction and miss of each foot.
     """
-    legs, kept, limbs = _legs(skeleton)
-    places, world = pose_kinematics(legs, root, rotations[:, kept])
-    scale, spread = 30.0 / fps, _frames(_BEHIND, fps)
-    feet = [_steady(foot_plant.laid_foot(places, world, limb, standing[:, side])) for side, limb in enumerate(limbs)]
+    legs, kept, limbs = _extract_legs(skeleton)
+    places, world = compute_pose(legs, root, rotations[:, kept])
+    scale, spread = 30.0 / fps, _count_frames(_SPREAD_SECONDS, fps)
+    feet = [_smooth_left_axis(foot_plant.build_foot(places, world, limb, standing[:, side])) for side, limb in enumerate(limbs)]
     if steps is not None:
-        feet = [_stretched(foot, root, steps) for foot in feet]
-    feet = [foot_plant.turned_flat(foot, scale) for foot in feet]
-    feet, lifted = _on_own_ground(feet, ground.own, sole, scale)
+        feet = [_scale_step(foot, root, steps) for foot in feet]
+    feet = [foot_plant.align_flat_foot(foot, scale) for foot in feet]
+    feet, lifted = _place_on_own_ground(feet, ground.own, sole, scale)
     # Rounds: hold the stances, place the feet on the ground, drop the pelvis; where legs still lack length, hold less
     # firmly.
     firm = [foot.weight for foot in feet]
-    for turn in range(_ROUNDS + 1):
-        shifts = [foot_plant.held_shift(foot.moves, weight, scale, MOST_SHIFT)[0] for foot, weight in zip(feet, firm)]
-        put = [foot.moved(np.pad(by, ((0, 0), (0, 1)))) for foot, by in zip(feet, shifts)]
-        put, up, most = _on_ground(put, standing, fps, ground, lifted)
-        first = foot_plant.pelvis_drop(put, [foot.heel for foot in put], spread, FIRST_DROP)
-        put = [replace(foot, hip=foot.hip - first[:, None] * _UP) for foot in put]
-        goals = [_goal(foot, spread) for foot in put]
-        drop = foot_plant.pelvis_drop(put, [goal for goal, _ in goals], spread, most - FIRST_DROP)
-        short = [foot_plant.lacking(foot, goal, drop) for foot, (goal, _) in zip(put, goals)]
-        if turn == _ROUNDS or max(s.max(initial=0.0) for s in short) <= _SLIDES_FROM:
+    for round_number in range(_ROUNDS + 1):
+        shifts = [foot_plant.solve_limited_shift(foot.displacements, weight, scale, MOST_SHIFT)[0] for foot, weight in zip(feet, firm)]
+        placed_feet = [foot.move(np.pad(by, ((0, 0), (0, 1)))) for foot, by in zip(feet, shifts)]
+        placed_feet, up, most = _place_on_ground(placed_feet, standing, fps, ground, lifted)
+        first = foot_plant.compute_pelvis_drop(placed_feet, [foot.heel for foot in placed_feet], spread, FIRST_DROP)
+        placed_feet = [replace(foot, hip=foot.hip - first[:, None] * _UP) for foot in placed_feet]
+        goals = [_compute_ankle_goal(foot, spread) for foot in placed_feet]
+        drop = foot_plant.compute_pelvis_drop(placed_feet, [goal for goal, _ in goals], spread, most - FIRST_DROP)
+        lacking = [foot_plant.measure_shortfall(foot, goal, drop) for foot, (goal, _) in zip(placed_feet, goals)]
+        if round_number == _ROUNDS or max(s.max(initial=0.0) for s in lacking) <= _SLIDES_FROM:
             break
-        firm = [foot_plant.held_less(weight, s) for weight, s in zip(firm, short)]
+        firm = [foot_plant.relax_contact_weights(weight, s) for weight, s in zip(firm, lacking)]
     # `down` is how far the whole body goes down: both drops, less the rise of the ground.
     down = (first + drop - up)[:, None] * _UP
     places = places - down[:, None]
     out, correction, miss = np.array(rotations, dtype=float), np.zeros((len(root), 2)), np.zeros((len(root), 2))
-    for side, (foot, (goal, turned)) in enumerate(zip(put, goals)):
+    for side, (foot, (goal, end_rotation)) in enumerate(zip(placed_feet, goals)):
         hip = foot.hip - drop[:, None] * _UP
-        target = _eased(foot, goal, hip, scale)
+        target = _limit_goals(foot, goal, hip, scale)
         joints = (foot.limb.upper_leg, foot.limb.lower_leg, foot.limb.foot)
-        clear = _clear_bend(foot, np.linalg.norm(target - hip, axis=1))
-        found, _ = bent_limb(legs, places, world, joints, target, end_rotation=turned, soft=1e-4, clear=clear)
+        clear = _compute_clear_bend(foot, np.linalg.norm(target - hip, axis=1))
+        found, _ = solve_posed_limb(legs, places, world, joints, target, end_rotation=end_rotation, soft=1e-4, min_bend=clear)
         for joint, local in found.items():
             out[:, kept[joint]] = local
-        miss[:, side] = np.where(foot.carries > 0.0, np.linalg.norm(target - goal, axis=1), 0.0)
+        miss[:, side] = np.where(foot.contact_weight > 0.0, np.linalg.norm(target - goal, axis=1), 0.0)
         correction[:, side] = np.linalg.norm((target - places[:, foot.limb.foot])[:, :2], axis=1)
-    return Planted(root - down, out, correction, miss)
+    return PlantResult(root - down, out, correction, miss)
 
 
 @lru_cache(maxsize=32)
-def _legs(skeleton: Skeleton) -> tuple[Skeleton, list[int], tuple[Limb, ...]]:
+def _extract_legs(skeleton: Skeleton) -> tuple[Skeleton, list[int], tuple[Limb, ...]]:
     """Extract the legs of a skeleton: the partial skeleton, its joints in the whole one, and its limbs."""
-    body = identify(skeleton)
+    body = identify_joints(skeleton)
     named = [[limb.upper_leg, limb.lower_leg, limb.foot, limb.toe_or_foot] for limb in (body.left, body.right)]
-    legs, kept = skeleton.part([joint for side in named for joint in side])
-    found = []
+    legs, kept = skeleton.select_joints([joint for side in named for joint in side])
+    limbs = []
     for limb, joints in zip((body.left, body.right), named):
         upper, lower, foot, toe = (kept.index(joint) for joint in joints)
-        found.append(replace(limb, upper_leg=upper, lower_leg=lower, foot=foot, toe=None if limb.toe is None else toe))
-    return legs, kept, tuple(found)
+        limbs.append(replace(limb, upper_leg=upper, lower_leg=lower, foot=foot, toe=None if limb.toe is None else toe))
+    return legs, kept, tuple(limbs)
 
 
-def _steady(foot: Foot) -> Foot:
+def _smooth_left_axis(foot: Foot) -> Foot:
     """Replace a foot's left axis by its mean over level frames: from above, a foot on its toes has no direction."""
     level = np.linalg.norm((foot.toe - foot.heel)[:, :2], axis=1, keepdims=True)
     own = np.sum(quaternion.rotate(quaternion.inverse(foot.rotation), foot.left) * level**2, axis=0)
@@ -158,35 +158,35 @@ def _steady(foot: Foot) -> Foot:
     return replace(foot, left=np.where(size > 0.1, left / np.maximum(size, 1e-9), foot.left))
 
 
-def _stretched(foot: Foot, root: np.ndarray, steps: Steps) -> Foot:
+def _scale_step(foot: Foot, root: np.ndarray, steps: StepScale) -> Foot:
     """Move the foot further before or behind the body, within the limits of LONGEST."""
     along = np.stack([np.cos(steps.direction), np.sin(steps.direction)], axis=1)
     ahead = np.sum((0.5 * (foot.heel + foot.toe) - root)[:, :2] * along, axis=1)
-    much = np.clip(steps.times, *LONGEST) - 1.0
-    return foot.moved(np.pad((much * ahead)[:, None] * along, ((0, 0), (0, 1))))
+    much = np.clip(steps.scale, *LONGEST) - 1.0
+    return foot.move(np.pad((much * ahead)[:, None] * along, ((0, 0), (0, 1))))
 
 
-def _on_own_ground(feet: list[Foot], own: np.ndarray, sole: float, scale: float) -> tuple[list[Foot], np.ndarray]:
+def _place_on_own_ground(feet: list[Foot], own: np.ndarray, sole: float, scale: float) -> tuple[list[Foot], np.ndarray]:
     """Place the feet on their own ground, since recorded floors are uneven and drift.
 
     own: (T, 2) metres. Returns the feet and the metres (T,) by which the body is off its ground: known where feet are
     in contact, interpolated smoothly in the air.
     """
-    above = [foot.moved(-height[:, None] * _UP) for foot, height in zip(feet, own.T)]
+    above = [foot.move(-height[:, None] * _UP) for foot, height in zip(feet, own.T)]
     lifts = [foot_plant.lift_to_ground(foot, sole, scale) for foot in above]
-    weights = [foot.carries for foot in feet]
+    weights = [foot.contact_weight for foot in feet]
     lifted = sum((w * lift for w, lift in zip(weights, lifts)), np.zeros(()))
-    off = settled(lifted, sum(weights, np.zeros(())), scale, _FLOOR)
+    off = fit_smooth_curve(lifted, sum(weights, np.zeros(())), scale, _FLOOR)
     if np.abs(off).max(initial=0.0) > _EVEN:
-        lifts = [off + foot_plant.lift_to_ground(foot.moved(off[:, None] * _UP), sole, scale) for foot in above]
-    return [foot.moved(by[:, None] * _UP) for foot, by in zip(feet, lifts)], off
+        lifts = [off + foot_plant.lift_to_ground(foot.move(off[:, None] * _UP), sole, scale) for foot in above]
+    return [foot.move(by[:, None] * _UP) for foot, by in zip(feet, lifts)], off
 
 
-def _frames(seconds: float, fps: float) -> int:
+def _count_frames(seconds: float, fps: float) -> int:
     return int(round(seconds * fps))
 
 
-def _on_ground(feet: list[Foot], standing: np.ndarray, fps: float, ground: Ground,
+def _place_on_ground(feet: list[Foot], standing: np.ndarray, fps: float, ground: Ground,
                lifted: np.ndarray) -> tuple[list[Foot], np.ndarray, float]:
     """Place the feet on the target ground.
 
@@ -195,32 +195,32 @@ def _on_ground(feet: list[Foot], standing: np.ndarray, fps: float, ground: Groun
     """
     if ground.surface is None:
         up = lifted
-        return [replace(foot, hip=foot.hip + up[:, None] * _UP) for foot in feet], up, foot_plant.MOST_DROP
+        return [replace(foot, hip=foot.hip + up[:, None] * _UP) for foot in feet], up, foot_plant.MAX_DROP
     over = np.stack([np.stack([foot.heel, foot.toe], axis=1) for foot in feet], axis=1)
     clear = over[..., 2].min(axis=2) - ground.own
-    under = footing(over[..., :2], standing, clear, fps, ground.surface)
+    under = compute_footing(over[..., :2], standing, clear, fps, ground.surface)
     rise = under.height - ground.own
-    steep = _steepness(under.height, under.normal, fps)
-    steeper = np.maximum(steep - _steepness(ground.own, ground.up, fps), 0.0)
-    up = lifted + _followed(rise.mean(axis=1) - SINK_BY_SLOPE * steeper, fps)
-    tip = quaternion.between(ground.up, under.normal)
-    put = [_tipped(foot, tip[:, side], rise[:, side] + under.lift[:, side], up) for side, foot in enumerate(feet)]
-    return put, up, foot_plant.MOST_DROP + DROP_BY_SLOPE * float(steep.max(initial=0.0))
+    steep = _measure_steepness(under.height, under.normal, fps)
+    steeper = np.maximum(steep - _measure_steepness(ground.own, ground.up, fps), 0.0)
+    up = lifted + _smooth_pelvis_height(rise.mean(axis=1) - SINK_BY_SLOPE * steeper, fps)
+    tip = quaternion.rotation_between(ground.up, under.normal)
+    placed_feet = [_tilt_foot(foot, tip[:, side], rise[:, side] + under.lift[:, side], up) for side, foot in enumerate(feet)]
+    return placed_feet, up, foot_plant.MAX_DROP + DROP_BY_SLOPE * float(steep.max(initial=0.0))
 
 
-def _steepness(height: np.ndarray, normal: np.ndarray, fps: float) -> np.ndarray:
+def _measure_steepness(height: np.ndarray, normal: np.ndarray, fps: float) -> np.ndarray:
     """Measure how steep the ground under both feet is (T,), from its heights (T, 2) m and normals (T, 2, 3)."""
     slope = np.linalg.norm(normal[..., :2], axis=2) / np.maximum(normal[..., 2], 0.1)
     apart = np.abs(np.diff(height, axis=1)) / _STRIDE
-    return np.maximum(slope.mean(axis=1), zero_phase_hann(apart, fps, 1.0)[:, 0])
+    return np.maximum(slope.mean(axis=1), smooth_zero_phase_hann(apart, fps, 1.0)[:, 0])
 
 
-def _followed(height: np.ndarray, fps: float) -> np.ndarray:
+def _smooth_pelvis_height(height: np.ndarray, fps: float) -> np.ndarray:
     """Smooth the height (T,) m under the feet to that which the pelvis follows."""
-    return zero_phase_hann(height[:, None], fps, _PELVIS_SECONDS)[:, 0]
+    return smooth_zero_phase_hann(height[:, None], fps, _PELVIS_SECONDS)[:, 0]
 
 
-def _tipped(foot: Foot, tip: np.ndarray, rise: np.ndarray, up: np.ndarray) -> Foot:
+def _tilt_foot(foot: Foot, tip: np.ndarray, rise: np.ndarray, up: np.ndarray) -> Foot:
     """Rotate the foot by `tip` (T, 4) about its toe and raise it by `rise` (T,) m; its hip rises by `up` (T,) m."""
     toe = foot.toe + rise[:, None] * _UP
     return replace(foot, hip=foot.hip + up[:, None] * _UP, toe=toe,
@@ -228,24 +228,24 @@ def _tipped(foot: Foot, tip: np.ndarray, rise: np.ndarray, up: np.ndarray) -> Fo
                    rotation=quaternion.multiply(tip, foot.rotation), left=quaternion.rotate(tip, foot.left))
 
 
-def _goal(foot: Foot, spread: int) -> tuple[np.ndarray, np.ndarray]:
+def _compute_ankle_goal(foot: Foot, spread: int) -> tuple[np.ndarray, np.ndarray]:
     """Compute the ankle's goal (T, 3) and the foot's world rotation (T, 4): on its toe where the leg does not reach."""
-    rise = foot_plant.spread_over(foot_plant.heel_rise(foot, np.zeros((1, 3))) * foot.weight[:, 1], spread)
-    roll = quaternion.about_axis(foot.left, rise)
+    rise = foot_plant.spread_peaks(foot_plant.solve_heel_rise(foot, np.zeros((1, 3))) * foot.weight[:, 1], spread)
+    roll = quaternion.from_axis_angle(foot.left, rise)
     return foot.toe + quaternion.rotate(roll, foot.heel - foot.toe), quaternion.multiply(roll, foot.rotation)
 
 
-def _clear_bend(foot: Foot, far: np.ndarray) -> np.ndarray:
+def _compute_clear_bend(foot: Foot, far: np.ndarray) -> np.ndarray:
     """Compute the least offset of a knee from the line hip-ankle, as a share of the leg (T,), for its direction to
     count.
 
     far: (T,) metres, new length of the leg. In a leg that bends much more than recorded, the noise of the direction
         grows.
     """
-    return np.maximum(CLEAR_BEND, 0.5 * _MORE_BENT * np.sqrt(np.maximum(1.0 - (far / foot.length) ** 2, 0.0)))
+    return np.maximum(MIN_BEND, 0.5 * _MORE_BENT * np.sqrt(np.maximum(1.0 - (far / foot.length) ** 2, 0.0)))
 
 
-def _eased(foot: Foot, goal: np.ndarray, hip: np.ndarray, scale: float) -> np.ndarray:
+def _limit_goals(foot: Foot, goal: np.ndarray, hip: np.ndarray, scale: float) -> np.ndarray:
     """Limit the goals (T, 3) to what a leg can follow, nearer to the hip or further away.
 
     A knee bends with the root of what its leg lacks to full length. In these roots the correction of a leg is one
@@ -254,18 +254,18 @@ def _eased(foot: Foot, goal: np.ndarray, hip: np.ndarray, scale: float) -> np.nd
     """
     line = goal - hip
     far = np.linalg.norm(line, axis=1)
-    own = np.maximum(foot.own, 1e-5)
+    own = np.maximum(foot.recorded_slack, 1e-5)
     room = SPARE * (1.0 - np.exp(-own / SPARE))
     # `left`: metres to full length after a soft limit at zero; `more`: the change of its root against the recording.
     left = room / _FIRM * np.logaddexp(0.0, _FIRM * (foot.length - far) / room)
     more = np.sqrt(left) - np.sqrt(own)
-    stands = foot.carries > 0.0
-    weight = np.where(stands, 1.0, np.where(more > 0.0, BENT_ALOFT, STRAIGHT_ALOFT))
-    for _ in range(_FIRMER + 1):
-        bend = np.sqrt(own) + settled(weight * more, weight, scale, STIFF)
+    stands = foot.contact_weight > 0.0
+    weight = np.where(stands, 1.0, np.where(more > 0.0, BENT_WEIGHT, STRAIGHT_WEIGHT))
+    for _ in range(_FIRMER_ROUNDS + 1):
+        bend = np.sqrt(own) + fit_smooth_curve(weight * more, weight, scale, STIFF)
         bend = 0.5 * (bend + np.sqrt(bend**2 + LEAST_BEND**2))
         # Feet in contact that miss their goal get more weight, until all are within _GOAL_TOLERANCE.
-        off = np.where(stands, np.abs(foot.length - bend**2 - far), 0.0) / _NEAR
+        off = np.where(stands, np.abs(foot.length - bend**2 - far), 0.0) / _GOAL_TOLERANCE
         if off.max(initial=0.0) <= 1.0:
             break
         weight = weight * np.maximum(off, 1.0) ** 2

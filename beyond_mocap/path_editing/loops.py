@@ -14,23 +14,23 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from ..base.errors import InputError
-from ..motion.humanoid import identify
-from ..motion.motion import pose_kinematics
+from ..motion.humanoid import identify_joints
+from ..motion.motion import compute_pose
 from ..motion.skeleton import Skeleton
 from .path_frame import Residuals
 
 WINDOW_SECONDS = 0.12
 """Pairs are compared over this time before and after."""
 _VELOCITY_SECONDS = 0.1  # metres per second count as metres moved in this time
-_ROUGH_FPS, _PAIRS, _COLUMNS, _TRIED = 30.0, 2_500_000, 9000, 24  # coarse rate; limits of pairs, rows, candidates
+_COARSE_FPS, _PAIRS, _COLUMNS, _MOST_CANDIDATES = 30.0, 2_500_000, 9000, 24  # coarse rate; limits of pairs, rows, candidates
 _STRIDE_SHARE = 0.85  # shortest loop, as a share of the stride's time: strides differ
 _SLOWEST, _SLOW_SHARE = 0.2, 0.5  # m/s, and share of the usual speed, below which no loop starts: a stop is no gait
-_LABEL = 0.06  # cost in metres of a sole whose contact differs
-_FEET = 0.5  # cost of each metre between the places of feet in contact at both ends: the fade would move them
-_CROWDED = 0.05  # cost in metres of having no frames to fade over
-_VARIETY = 0.3  # by how much a second stride improves a loop of one stride
-_MOST = 0.6  # largest relative distance of a loop's ends
-_EACH_FOOT = 0.08  # least share of a loop with each foot alone in contact: jumps with both feet are no strides
+_CONTACT_COST = 0.06  # cost in metres of a sole whose contact differs
+_FOOT_COST = 0.5  # cost of each metre between the places of feet in contact at both ends: the fade would move them
+_NO_FADE_COST = 0.05  # cost in metres of having no frames to fade over
+_LENGTH_BONUS = 0.3  # by how much a second stride improves a loop of one stride
+_MOST_DISTANCE = 0.6  # largest relative distance of a loop's ends
+_LEAST_SINGLE_CONTACT = 0.08  # least share of a loop with each foot alone in contact: jumps with both feet are no strides
 _JOINTS = 16  # compared at most, for a body without known joints
 _SHORTEST_STRIDE, _LONGEST_STRIDE = 0.35, 2.5  # seconds
 
@@ -52,12 +52,12 @@ class Loop:
 
     start: int
     end: int
-    apart: float
-    unlike: float
+    distance: float
+    relative_distance: float
     cost: float
     metres: float
     strides: float
-    ending: float
+    end_distance: float
 
     def __len__(self) -> int:
         return self.end - self.start
@@ -75,18 +75,18 @@ def find_loops(residuals: Residuals) -> tuple[Loop, ...]:
     moving = pace > _SLOWEST
     if not moving.any():
         return ()
-    features = _features(residuals)
-    stride = stride_frames(residuals, features)
+    features = _compute_features(residuals)
+    stride = measure_stride(residuals, features)
     least = int(np.ceil(_STRIDE_SHARE * stride)) if stride else 0
     if not 0 < least < len(features) - 1:
         return ()
     free = pace >= max(_SLOWEST, _SLOW_SHARE * float(np.median(pace[moving])))
-    tried = _rough(features, residuals, free, least, stride)
+    tried = _search_coarse(features, residuals, free, least, stride)
     usual = float(np.sqrt(2.0 * features[moving].var(axis=0).sum()))
-    feet = _feet(residuals.skeleton, features)
-    found = [_exact(features, residuals, pair, free=free, least=least, stride=stride, usual=usual,
+    feet = _locate_feet(residuals.skeleton, features)
+    found = [_refine_loop(features, residuals, pair, free=free, least=least, stride=stride, usual=usual,
                     feet=feet) for pair in tried]
-    found = [loop for loop in found if loop and loop.unlike <= _MOST and _strides(residuals.standing, loop)]
+    found = [loop for loop in found if loop and loop.relative_distance <= _MOST_DISTANCE and _has_strides(residuals.standing, loop)]
     best: dict[int, Loop] = {}
     for loop in sorted(found, key=lambda loop: (loop.cost, loop.start, loop.end)):
         best.setdefault(max(int(round(loop.strides)), 1), loop)
@@ -107,7 +107,7 @@ def smooth_speed(residuals: Residuals) -> np.ndarray:
     return uniform_filter1d(speed, 2 * int(0.25 * residuals.fps) + 1, mode="nearest")
 
 
-def stride_frames(residuals: Residuals, features: np.ndarray | None = None) -> float | None:
+def measure_stride(residuals: Residuals, features: np.ndarray | None = None) -> float | None:
     """Measure the duration of a stride, from one landing of a foot to its next: the median while the motion moves.
 
     From the contacts; without contacts from the lag after which poses repeat; for a single stride from its two steps.
@@ -121,22 +121,22 @@ def stride_frames(residuals: Residuals, features: np.ndarray | None = None) -> f
     moving = smooth_speed(residuals) > _SLOWEST
     edges = np.diff(residuals.standing.any(axis=2).astype(np.int8), axis=0)
     at = [[np.flatnonzero((edges[:, side] == kind) & moving[1:]) for side in (0, 1)] for kind in (1, -1)]
-    whole = _usual(np.concatenate([np.diff(sides) for pair in at for sides in pair]), residuals.fps)
+    whole = _compute_typical_stride(np.concatenate([np.diff(sides) for pair in at for sides in pair]), residuals.fps)
     if whole is not None:
         return whole
-    again = _period(_features(residuals) if features is None else features, moving, residuals.fps)
+    again = _find_period(_compute_features(residuals) if features is None else features, moving, residuals.fps)
     if again is not None:
         return again
-    return _usual(np.concatenate([2.0 * np.abs(pair[0][:, None] - pair[1]).ravel() for pair in at]), residuals.fps)
+    return _compute_typical_stride(np.concatenate([2.0 * np.abs(pair[0][:, None] - pair[1]).ravel() for pair in at]), residuals.fps)
 
 
-def _usual(frames: np.ndarray, fps: float) -> float | None:
+def _compute_typical_stride(frames: np.ndarray, fps: float) -> float | None:
     """Compute the median of those durations that can be a stride's; None without any."""
-    kept = frames[(frames > _SHORTEST_STRIDE * fps) & (frames < _LONGEST_STRIDE * fps)]
-    return float(np.median(kept)) if len(kept) else None
+    possible = frames[(frames > _SHORTEST_STRIDE * fps) & (frames < _LONGEST_STRIDE * fps)]
+    return float(np.median(possible)) if len(possible) else None
 
 
-def _period(features: np.ndarray, moving: np.ndarray, fps: float) -> float | None:
+def _find_period(features: np.ndarray, moving: np.ndarray, fps: float) -> float | None:
     """Find the first lag, in frames, after which poses repeat at half their usual distance or less; None without
     one.
     """
@@ -150,67 +150,67 @@ def _period(features: np.ndarray, moving: np.ndarray, fps: float) -> float | Non
     return float(lags[1:-1][lowest][0]) if lowest.any() else None
 
 
-def _features(residuals: Residuals) -> np.ndarray:
+def _compute_features(residuals: Residuals) -> np.ndarray:
     """Compute the features (T, D) metres that loops compare.
 
     Places of the main joints across and above the path, along it from the pelvis, and their movement over the ground in
     _VELOCITY_SECONDS; scaled so that a distance is the root mean square over joints.
     """
-    joints = _main_joints(residuals.skeleton)
+    joints = _choose_joints(residuals.skeleton)
     root = residuals.place * [0.0, 1.0, 1.0]
-    places = pose_kinematics(residuals.skeleton, root, residuals.rotations)[0][:, joints]
+    places = compute_pose(residuals.skeleton, root, residuals.rotations)[0][:, joints]
     along = np.cumsum(residuals.step) + residuals.place[:, 0]
     ground = places + along[:, None, None] * [1.0, 0.0, 0.0]
-    velocity = _slope(ground, max(1, int(round(residuals.fps / 60.0)))) * residuals.fps
+    velocity = _compute_velocity(ground, max(1, int(round(residuals.fps / 60.0)))) * residuals.fps
     both = np.concatenate([places, _VELOCITY_SECONDS * velocity], axis=1)
     return both.reshape(len(both), -1) / np.sqrt(len(joints))
 
 
-def _feet(skeleton: Skeleton, features: np.ndarray) -> np.ndarray | None:
+def _locate_feet(skeleton: Skeleton, features: np.ndarray) -> np.ndarray | None:
     """Locate the left and right foot relative to the pelvis: (T, 2, 2) metres along and across the path; None
     without feet.
     """
     try:
-        body = identify(skeleton)
+        body = identify_joints(skeleton)
     except InputError:
         return None
-    joints = _main_joints(skeleton)
+    joints = _choose_joints(skeleton)
     at = [3 * joints.index(limb.toe_or_foot) for limb in (body.left, body.right)]
     return np.sqrt(len(joints)) * np.stack([features[:, k : k + 2] for k in at], axis=1)
 
 
-def _slope(values: np.ndarray, reach: int) -> np.ndarray:
+def _compute_velocity(values: np.ndarray, reach: int) -> np.ndarray:
     """Compute the change per frame (T, ...) of values (T, ...), by differences over `reach` frames to either side."""
     at = np.arange(len(values))
     after, before = np.minimum(at + reach, len(values) - 1), np.maximum(at - reach, 0)
     return (values[after] - values[before]) / np.maximum(after - before, 1).reshape(-1, *[1] * (values.ndim - 1))
 
 
-def _main_joints(skeleton: Skeleton) -> list[int]:
+def _choose_joints(skeleton: Skeleton) -> list[int]:
     """Choose the joints that define a pose: hips, chest, head, knees, feet, hands; of an unknown body, a spread over
     it.
     """
     try:
-        body = identify(skeleton)
+        body = identify_joints(skeleton)
     except InputError:
         return np.unique(np.linspace(0, len(skeleton) - 1, min(_JOINTS, len(skeleton))).round().astype(int)).tolist()
     limbs = [(limb.lower_leg, limb.foot, limb.toe, limb.lower_arm, limb.hand) for limb in (body.left, body.right)]
-    named = (body.hips, body.chest, body.head, *limbs[0], *limbs[1])
-    return sorted({joint for joint in named if joint is not None})
+    joints = (body.hips, body.chest, body.head, *limbs[0], *limbs[1])
+    return sorted({joint for joint in joints if joint is not None})
 
 
-def _strides(standing: np.ndarray, loop: Loop) -> bool:
+def _has_strides(standing: np.ndarray, loop: Loop) -> bool:
     """Return whether the feet carry the body alternately in a loop, or no contacts are known."""
     left, right = np.moveaxis(standing[loop.start : loop.end].any(axis=2), 1, 0)
     alone = min(np.mean(left & ~right), np.mean(right & ~left))
-    return bool(alone >= _EACH_FOOT or not standing.any())
+    return bool(alone >= _LEAST_SINGLE_CONTACT or not standing.any())
 
 
-def _rough(features: np.ndarray, residuals: Residuals, free: np.ndarray, least: int,
+def _search_coarse(features: np.ndarray, residuals: Residuals, free: np.ndarray, least: int,
            stride: float) -> list[tuple[int, int]]:
     """Search pairs (start, end) of similar frames at a low rate: up to _MOST_CANDIDATES, all well separated."""
     count, fps = len(features), residuals.fps
-    every = max(int(round(fps / _ROUGH_FPS)), -(-count // _COLUMNS), 1)
+    every = max(int(round(fps / _COARSE_FPS)), -(-count // _COLUMNS), 1)
     ends = np.arange(0, count, every)
     starts = ends[:: max(-(-(len(ends) ** 2) // _PAIRS), 1)]
     starts, ends = starts[free[starts]], ends[free[ends]]
@@ -221,32 +221,32 @@ def _rough(features: np.ndarray, residuals: Residuals, free: np.ndarray, least: 
     square = (a * a).sum(1)[:, None] + (b * b).sum(1)[None] - 2.0 * (a @ b.T)
     score = np.sqrt(np.maximum(square, 0.0))
     length = (ends[None] - starts[:, None]).astype(np.float32)
-    still = np.cumsum(~free, dtype=np.float32)
-    score *= _liking(length, still[ends][None] - still[starts][:, None], stride)
+    paused = np.cumsum(~free, dtype=np.float32)
+    score *= _compute_length_factor(length, paused[ends][None] - paused[starts][:, None], stride)
     score[length < least] = np.inf
     order = np.argpartition(score, min(2000, score.size - 1), axis=None)[:2000]
     order = order[np.argsort(score.flat[order], kind="stable")]
     row, column = np.unravel_index(order[np.isfinite(score.flat[order])], score.shape)
-    return _apart(np.stack([starts[row], ends[column]], axis=1), 0.25 * stride)
+    return _select_separated(np.stack([starts[row], ends[column]], axis=1), 0.25 * stride)
 
 
-def _liking(length: np.ndarray, still: np.ndarray, stride: float) -> np.ndarray:
+def _compute_length_factor(length: np.ndarray, paused: np.ndarray, stride: float) -> np.ndarray:
     """Compute the factor on distances: lower for long loops, higher for loops that pause in between."""
-    return (1.0 + _VARIETY * stride / np.maximum(length, 1.0)) * (1.0 + 2.0 * still / np.maximum(length, 1.0))
+    return (1.0 + _LENGTH_BONUS * stride / np.maximum(length, 1.0)) * (1.0 + 2.0 * paused / np.maximum(length, 1.0))
 
 
-def _apart(pairs: np.ndarray, reach: float) -> list[tuple[int, int]]:
+def _select_separated(pairs: np.ndarray, reach: float) -> list[tuple[int, int]]:
     """Select the first _MOST_CANDIDATES pairs (K, 2), best first, of which no two are within `reach` frames in both
     start and end.
     """
-    kept: list[tuple[int, int]] = []
-    while len(pairs) and len(kept) < _TRIED:
-        kept.append((int(pairs[0, 0]), int(pairs[0, 1])))
+    selected: list[tuple[int, int]] = []
+    while len(pairs) and len(selected) < _MOST_CANDIDATES:
+        selected.append((int(pairs[0, 0]), int(pairs[0, 1])))
         pairs = pairs[np.abs(pairs - pairs[0]).max(axis=1) > reach]
-    return kept
+    return selected
 
 
-def _exact(features: np.ndarray, residuals: Residuals, pair: tuple[int, int], free: np.ndarray, least: int,
+def _refine_loop(features: np.ndarray, residuals: Residuals, pair: tuple[int, int], free: np.ndarray, least: int,
            stride: float, usual: float, feet: np.ndarray | None) -> Loop | None:
     """Refine a coarse pair to the best loop around it, compared over windows at the full rate.
 
@@ -262,19 +262,19 @@ def _exact(features: np.ndarray, residuals: Residuals, pair: tuple[int, int], fr
     start, end = (np.clip(at, 0, count - 1) for at in (start, end))
     a, b = features[start], features[end]
     square = np.maximum((a * a).sum(1)[:, None] + (b * b).sum(1)[None] - 2.0 * (a @ b.T), 0.0)
-    wrong, moved = _soles_apart(residuals, feet, start, end)
+    wrong, moved = _compare_contacts(residuals, feet, start, end)
     total, wrong, moved, seen = (
-        _along_diagonals(np.where(known, v, 0.0), window) for v in (square, wrong, moved, 1.0 * known)
+        _sum_diagonals(np.where(known, v, 0.0), window) for v in (square, wrong, moved, 1.0 * known)
     )
     # A sum along a diagonal compares the windows around start + k and end + k; `seen` counts the known ones.
     seen = np.maximum(seen, 1e-9)
     middle = slice(window, len(a) - window)
     start, end = start[middle][:, None], end[middle][None]
     length = end - start
-    still = np.cumsum(~free)
+    paused = np.cumsum(~free)
     apart = np.sqrt(total / seen)
-    cost = apart + (_LABEL * wrong + _FEET * moved) / seen + _CROWDED * (1.0 - seen / (2 * window + 1))
-    cost = cost * _liking(length, still[end] - still[start], stride)
+    cost = apart + (_CONTACT_COST * wrong + _FOOT_COST * moved) / seen + _NO_FADE_COST * (1.0 - seen / (2 * window + 1))
+    cost = cost * _compute_length_factor(length, paused[end] - paused[start], stride)
     cost[~(known[middle, middle] & (length >= least) & free[start] & free[end])] = np.inf
     at = np.unravel_index(np.argmin(cost), cost.shape)
     if not np.isfinite(cost[at]):
@@ -284,11 +284,11 @@ def _exact(features: np.ndarray, residuals: Residuals, pair: tuple[int, int], fr
     off = float(apart[at])
     ending = float(np.linalg.norm(features[first:last] - features[-1], axis=1).min())
     usual = max(usual, 1e-9)
-    return Loop(start=first, end=last, apart=off, unlike=off / usual, cost=float(cost[at]), metres=metres,
-                strides=(last - first) / stride, ending=ending / usual)
+    return Loop(start=first, end=last, distance=off, relative_distance=off / usual, cost=float(cost[at]), metres=metres,
+                strides=(last - first) / stride, end_distance=ending / usual)
 
 
-def _soles_apart(residuals: Residuals, feet: np.ndarray | None, start: np.ndarray,
+def _compare_contacts(residuals: Residuals, feet: np.ndarray | None, start: np.ndarray,
                  end: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Compare contacts of frames `start` (N,) and `end` (M,).
 
@@ -304,7 +304,7 @@ def _soles_apart(residuals: Residuals, feet: np.ndarray | None, start: np.ndarra
     return wrong, np.max(np.where(stands[start][:, None] & stands[end][None], off, 0.0), axis=2)
 
 
-def _along_diagonals(values: np.ndarray, window: int) -> np.ndarray:
+def _sum_diagonals(values: np.ndarray, window: int) -> np.ndarray:
     """Sum a square array over 2 * window + 1 places along its diagonals, where they lie inside."""
     size = len(values) - 2 * window
     return sum((values[k : k + size, k : k + size] for k in range(2 * window + 1)), np.zeros(()))

@@ -18,25 +18,25 @@ from ..base.banded_least_squares import BandedLeastSquares
 from ..base.errors import InputError
 from ..base.vectors import arctan2
 from ..motion import quaternion
-from ..motion.contacts import recorded_floor
-from ..motion.humanoid import identify
+from ..motion.contacts import estimate_recorded_floor
+from ..motion.humanoid import identify_joints
 from ..motion.motion import Motion, forward_kinematics
 from ..motion.path.path import Path, PolynomialPath, SplinePath
-from ..motion.path.smooth_spline import smoothing_spline, spline_pieces
+from ..motion.path.smooth_spline import fit_smoothing_spline, count_spline_pieces
 from ..motion.skeleton import Skeleton
-from ..motion.track import zero_phase_hann
+from ..motion.track import smooth_zero_phase_hann
 
 FRAMES = ("path", "tangent", "absolute")
 
-CLEAR = 0.25
+CLEAR_SPEED = 0.25
 """Metres per second over the ground from which on a direction of travel is used; below, the heading is interpolated."""
 _FULL, _POWER, _MOST = 0.5, 8, 1e6  # weight of a direction: (speed / _FULL) ** _POWER, at most _MOST
 _STIFF, _TIGHT = 0.1, 0.03  # seconds: smoothness of the heading; longest gap that is not interpolated linearly
-_STILL = 0.01  # m/s: a path passed more slowly has no heading
-_COMES, _SURELY = 1.0, 0.6  # seconds over which progress is averaged; m/s above which speed alone counts
+_STILL_SPEED = 0.01  # m/s: a path passed more slowly has no heading
+_PROGRESS_SECONDS, _SURE_SPEED = 1.0, 0.6  # seconds over which progress is averaged; m/s above which speed alone counts
 
 KINDS = ("spline", "polynomial")
-SECONDS = 0.3
+SWAY_SECONDS = 0.3
 """Sway faster than a period of about 0.7 s is left out of the path; slower movement belongs to it."""
 _ORDER, _PASSES = 3, 4
 _ENDS, _ENDS_SECONDS = 5.0, 0.15  # additional weight of the first and last frame, and how soon it decays
@@ -80,11 +80,11 @@ class Residuals:
         values = {field.name: getattr(self, field.name) for field in fields(self)}
         return {name: value for name, value in values.items() if isinstance(value, np.ndarray)}
 
-    def changed(self, **changes) -> Residuals:
+    def replace_fields(self, **changes) -> Residuals:
         """Return a copy with some fields replaced."""
         return replace(self, **changes)
 
-    def rows(self, which) -> Residuals:
+    def select_rows(self, which) -> Residuals:
         """Select frames.
 
         Args:
@@ -109,7 +109,7 @@ class MovingFrame:
     heading: np.ndarray
     slope: np.ndarray
 
-    def turns(self, frame: str) -> tuple[np.ndarray, np.ndarray]:
+    def compute_rotations(self, frame: str) -> tuple[np.ndarray, np.ndarray]:
         """Compute the rotations from the moving frame into the world.
 
         Args:
@@ -117,11 +117,11 @@ class MovingFrame:
         Returns:
             (T, 4) rotations of offsets from the path, and (T, 4) of the body.
         """
-        level = quaternion.about_up(self.heading)
+        level = quaternion.from_up_angle(self.heading)
         if frame == "absolute":
             return quaternion.identity(len(level)), level
         if frame == "tangent":
-            tipped = quaternion.multiply(level, quaternion.about_axis(np.array([0.0, 1.0, 0.0]), -self.slope))
+            tipped = quaternion.multiply(level, quaternion.from_axis_angle(np.array([0.0, 1.0, 0.0]), -self.slope))
             return tipped, tipped
         return level, level
 
@@ -132,7 +132,7 @@ def check_frame(frame: str) -> None:
         raise InputError("frame", str(frame), f"one of {', '.join(FRAMES)}")
 
 
-def relative(frame: str, moving: MovingFrame, root: np.ndarray, turned: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def to_moving_frame(frame: str, moving: MovingFrame, root: np.ndarray, rotations: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Convert the root from the world to the moving frame.
 
     Args:
@@ -143,12 +143,12 @@ def relative(frame: str, moving: MovingFrame, root: np.ndarray, turned: np.ndarr
     Returns:
         (T, 3) metres and (T, 4) rotations in the moving frame.
     """
-    off, body = moving.turns(frame)
+    off, body = moving.compute_rotations(frame)
     place = quaternion.rotate(quaternion.inverse(off), root - moving.origin)
-    return place, quaternion.multiply(quaternion.inverse(body), turned)
+    return place, quaternion.multiply(quaternion.inverse(body), rotations)
 
 
-def placed(frame: str, moving: MovingFrame, place: np.ndarray, rotations: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def from_moving_frame(frame: str, moving: MovingFrame, place: np.ndarray, rotations: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Convert a motion from the moving frame to the world, the inverse of `to_moving_frame`.
 
     Args:
@@ -160,14 +160,14 @@ def placed(frame: str, moving: MovingFrame, place: np.ndarray, rotations: np.nda
         (T, 3) metres of the root and (T, J, 4) local rotations, world frame.
     Source: Path editing §4.2.2, §4.2.3.
     """
-    off, body = moving.turns(frame)
+    off, body = moving.compute_rotations(frame)
     out = np.array(rotations, dtype=float)
     out[:, 0] = quaternion.multiply(body, out[:, 0])
     return moving.origin + quaternion.rotate(off, place), out
 
 
-def moving_frame(origin: np.ndarray, tangent: np.ndarray, arc: np.ndarray, fps: float,
-                 otherwise: float | None = None) -> MovingFrame:
+def build_moving_frame(origin: np.ndarray, tangent: np.ndarray, arc: np.ndarray, fps: float,
+                 default_heading: float | None = None) -> MovingFrame:
     """Build the moving frame along a path.
 
     Args:
@@ -183,11 +183,11 @@ def moving_frame(origin: np.ndarray, tangent: np.ndarray, arc: np.ndarray, fps: 
     along = tangent / np.maximum(length, 1e-12)[:, None]
     pace = np.abs(np.gradient(arc)) * fps if len(arc) > 1 else np.zeros(1)
     level = np.linalg.norm(along[:, :2], axis=1)
-    return MovingFrame(origin, heading(along, pace * level, fps, otherwise),
+    return MovingFrame(origin, compute_heading(along, pace * level, fps, default_heading),
                        arctan2(along[:, 2], np.maximum(level, 1e-12)))
 
 
-def heading(along: np.ndarray, speed: np.ndarray, fps: float, otherwise: float | None = None) -> np.ndarray:
+def compute_heading(along: np.ndarray, speed: np.ndarray, fps: float, default_heading: float | None = None) -> np.ndarray:
     """Compute the heading of travel along a path.
 
     Where the horizontal tangent vanishes (standing still, vertical stretches, cusps) it has no meaning, and a body in
@@ -204,16 +204,16 @@ def heading(along: np.ndarray, speed: np.ndarray, fps: float, otherwise: float |
     Returns:
         (T,) radians, unwrapped.
     """
-    mean = zero_phase_hann(along[:, :2] * speed[:, None], fps, _COMES) if len(along) > 2 else along[:, :2]
-    speed = np.maximum(np.minimum(np.linalg.norm(mean, axis=1), speed), speed - _SURELY)
+    mean = smooth_zero_phase_hann(along[:, :2] * speed[:, None], fps, _PROGRESS_SECONDS) if len(along) > 2 else along[:, :2]
+    speed = np.maximum(np.minimum(np.linalg.norm(mean, axis=1), speed), speed - _SURE_SPEED)
     raw = arctan2(along[:, 1], along[:, 0])
-    clear = speed >= min(CLEAR, 0.5 * speed.max(initial=0.0))
-    if len(raw) < 3 or speed.max(initial=0.0) < _STILL:
-        return np.full(len(raw), raw[0] if otherwise is None else otherwise)
+    clear = speed >= min(CLEAR_SPEED, 0.5 * speed.max(initial=0.0))
+    if len(raw) < 3 or speed.max(initial=0.0) < _STILL_SPEED:
+        return np.full(len(raw), raw[0] if default_heading is None else default_heading)
     at = np.arange(len(raw))
     near = np.interp(at, at[clear], np.unwrap(raw[clear]))
     # Unwrap all directions about those of the clear frames, so that noise at low speed adds no full turns.
-    goal = near + quaternion.wrapped(raw - near)
+    goal = near + quaternion.wrap_angle(raw - near)
     weight = np.minimum((speed / _FULL) ** _POWER, _MOST) + 1e-9
     stiff = (_STIFF * fps) ** 4
     squares = BandedLeastSquares(len(raw), reach=2)
@@ -239,7 +239,7 @@ def fit_path(motion: Motion, standing: np.ndarray, kind: str = "spline", degree:
     """
     if kind not in KINDS:
         raise InputError("path fit", kind, " or ".join(KINDS))
-    places, times = places_on_ground(motion, standing), np.arange(len(motion)) / motion.fps
+    places, times = project_to_ground(motion, standing), np.arange(len(motion)) / motion.fps
     return fit_spline(places, times) if kind == "spline" else fit_polynomial(places, times, degree)
 
 
@@ -259,10 +259,10 @@ def fit_polynomial(places: np.ndarray, times: np.ndarray, degree: int) -> Polyno
     Raises:
         InputError: if the degree is below 1, or too high for the number of frames.
     """
-    places, times = _checked(places, times)
+    places, times = _check_samples(places, times)
     if not 1 <= degree <= len(times) - 1:
         raise InputError("path fit", f"degree {degree}", f"1 to {len(times) - 1}, fewer than the frames")
-    places, times = _dense(places, times, degree)
+    places, times = _densify_samples(places, times, degree)
     scaled = (2.0 * times - times[0] - times[-1]) / (times[-1] - times[0])
     basis = np.polynomial.legendre.legvander(scaled, degree)
     orthogonal, triangle = np.linalg.qr(basis)
@@ -272,7 +272,7 @@ def fit_polynomial(places: np.ndarray, times: np.ndarray, degree: int) -> Polyno
     return PolynomialPath(coefficients, (float(times[0]), float(times[-1])))
 
 
-def _dense(places: np.ndarray, times: np.ndarray, degree: int) -> tuple[np.ndarray, np.ndarray]:
+def _densify_samples(places: np.ndarray, times: np.ndarray, degree: int) -> tuple[np.ndarray, np.ndarray]:
     """Resample places (M, 3) and times (M,) so densely that the polynomial does not oscillate between them.
 
     Least squares at even times do not while twice the root of their number is at least the degree (Dahlquist and Björck
@@ -287,7 +287,7 @@ def _dense(places: np.ndarray, times: np.ndarray, degree: int) -> tuple[np.ndarr
     return CubicSpline(times, places)(fine), fine
 
 
-def fit_spline(places: np.ndarray, times: np.ndarray, seconds: float = SECONDS) -> SplinePath:
+def fit_spline(places: np.ndarray, times: np.ndarray, seconds: float = SWAY_SECONDS) -> SplinePath:
     """Fit a smoothing spline: least squares with a cost on the change of acceleration.
 
     The remainder is smoothed again and added, which makes the limit between path and sway sharper (Tukey's twicing).
@@ -308,12 +308,12 @@ def fit_spline(places: np.ndarray, times: np.ndarray, seconds: float = SECONDS) 
     Raises:
         InputError: for fewer than two frames or places that are not finite.
     """
-    places, times = _checked(places, times)
+    places, times = _check_samples(places, times)
     after, left = times - times[0], times[-1] - times
     weights = 1.0 + _ENDS * (np.exp(-after / _ENDS_SECONDS) + np.exp(-left / _ENDS_SECONDS))
-    pieces, rest, coefficients = spline_pieces(times[-1] - times[0], seconds), places, 0.0
+    pieces, rest, coefficients = count_spline_pieces(times[-1] - times[0], seconds), places, 0.0
     for _ in range(_PASSES):
-        knots, more = smoothing_spline(rest, times, pieces, stiff=seconds, order=min(_ORDER, len(places)),
+        knots, more = fit_smoothing_spline(rest, times, pieces, stiff=seconds, order=min(_ORDER, len(places)),
                                        weights=weights)
         coefficients = coefficients + more
         path = SplinePath(knots, coefficients)
@@ -321,7 +321,7 @@ def fit_spline(places: np.ndarray, times: np.ndarray, seconds: float = SECONDS) 
     return path
 
 
-def places_on_ground(motion: Motion, standing: np.ndarray) -> np.ndarray:
+def project_to_ground(motion: Motion, standing: np.ndarray) -> np.ndarray:
     """Project a motion on the ground: the pelvis's x and y, and the height of the ground under it.
 
     Level ground is as high as `contacts.recorded_floor`. If all soles in contact are within 10 cm of height, the ground
@@ -333,13 +333,13 @@ def places_on_ground(motion: Motion, standing: np.ndarray) -> np.ndarray:
     Returns:
         (T, 3) metres, world frame.
     """
-    body = identify(motion.skeleton)
+    body = identify_joints(motion.skeleton)
     positions, _ = forward_kinematics(motion)
     places = positions[:, body.hips].copy()
-    floor, sole = recorded_floor(motion)
+    floor, sole = estimate_recorded_floor(motion)
     places[:, 2] = floor
     feet = [(body.left.foot, body.left.toe_or_foot), (body.right.foot, body.right.toe_or_foot)]
-    heights = _soles(positions[..., 2][:, feet] - sole, standing, floor)
+    heights = _measure_ground_height(positions[..., 2][:, feet] - sole, standing, floor)
     known = np.flatnonzero(np.isfinite(heights))
     if len(known) < 2 or np.ptp(np.percentile(heights[known], [5, 95])) <= _FLAT:
         return places
@@ -347,7 +347,7 @@ def places_on_ground(motion: Motion, standing: np.ndarray) -> np.ndarray:
     return places
 
 
-def _soles(heights: np.ndarray, standing: np.ndarray, floor: float) -> np.ndarray:
+def _measure_ground_height(heights: np.ndarray, standing: np.ndarray, floor: float) -> np.ndarray:
     """Measure the height (T,) of the ground under the feet in contact, NaN without any, from joints' heights (T, 2, 2).
 
     An ankle is above the ground by its usual height above the toe where both are in contact; without toes, above the
@@ -363,7 +363,7 @@ def _soles(heights: np.ndarray, standing: np.ndarray, floor: float) -> np.ndarra
     return np.where(count > 0, np.nansum(soles, axis=1) / np.maximum(count, 1), np.nan)
 
 
-def _checked(places: np.ndarray, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _check_samples(places: np.ndarray, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Check places (T, 3) and times (T,); return them as float arrays, or raise InputError."""
     places, times = np.asarray(places, dtype=float), np.asarray(times, dtype=float)
     if places.ndim != 2 or places.shape[1] != 3 or times.shape != (len(places),):

@@ -9,12 +9,12 @@ import os
 import numpy as np
 
 from ..base.errors import InputError
-from ..base.time_series import interpolate, runs
-from ..base.vectors import distance_along, unit_vectors
-from ..files.tables import number, read_rows
+from ..base.time_series import interpolate_columns, find_runs
+from ..base.vectors import distances_along, unit_vectors
+from ..files.tables import parse_number, read_rows
 from ..motion.path.arc_length import ArcLength
 from ..motion.path.path import Path, SplinePath
-from ..motion.path.smooth_spline import smoothing_spline
+from ..motion.path.smooth_spline import fit_smoothing_spline
 
 ROUNDING = 0.15
 """Metres over which corners are rounded, about."""
@@ -32,7 +32,7 @@ _SHORT = {name[0]: name for name in COLUMNS}
 _LEAST_METRES, _MOST_METRES = 1e-6, 1e5  # of a table
 
 
-def through(line: np.ndarray, name: str, rounding: float = ROUNDING, closed: bool = False) -> SplinePath:
+def fit_line(line: np.ndarray, name: str, rounding: float = ROUNDING, closed: bool = False) -> SplinePath:
     """Fit a smooth path along a polyline; its parameter is about metres along it.
 
     Repeated points are dropped. Corners are rounded over some `rounding` metres; smooth lines of radius 1 m or more are
@@ -48,22 +48,22 @@ def through(line: np.ndarray, name: str, rounding: float = ROUNDING, closed: boo
     Raises:
         InputError: for fewer than two different points, values that are not finite, or lines shorter than SHORTEST.
     """
-    line = _checked(line, name, closed)
-    length = distance_along(line)[-1]
+    line = _check_line(line, name, closed)
+    length = distances_along(line)[-1]
     rounding = max(min(rounding, length / 12), length / _LONGEST)
-    sampled, along = _resampled(_thinned(line, rounding * _SAMPLE), rounding * _SAMPLE)
-    sampled = _with_hairpins(sampled, along, rounding, closed)
+    sampled, along = _resample_line(_thin_line(line, rounding * _SAMPLE), rounding * _SAMPLE)
+    sampled = _widen_hairpins(sampled, along, rounding, closed)
     pieces = max(int(np.ceil(along[-1] / (rounding * _PIECE))), 8)
     if closed:
-        spline = smoothing_spline(sampled[:-1], along[:-1], pieces, rounding, _ORDER, closed=True,
+        spline = fit_smoothing_spline(sampled[:-1], along[:-1], pieces, rounding, _ORDER, closed=True,
                                   domain=(0.0, along[-1]))
     else:
         weights = np.ones(len(along))
-        spline = smoothing_spline(sampled, along, pieces, stiff=rounding, order=_ORDER, weights=weights, ends_met=True)
+        spline = fit_smoothing_spline(sampled, along, pieces, stiff=rounding, order=_ORDER, weights=weights, keep_ends=True)
     return SplinePath(*spline, closed=closed)
 
 
-def b_spline(points: np.ndarray, degree: int) -> SplinePath:
+def build_b_spline(points: np.ndarray, degree: int) -> SplinePath:
     """Build the B-spline of control points; it starts at the first and ends at the last, its parameter is 0 to 1.
 
     Knots: those of each end repeated degree + 1 times, the others even: P + degree + 1 of them (§4.6.6 says minus one,
@@ -78,12 +78,12 @@ def b_spline(points: np.ndarray, degree: int) -> SplinePath:
         InputError: for another degree, or for points that `fit_line` rejects.
     """
     points = np.asarray(points, dtype=float)
-    _checked(points, "control points", closed=False)
+    _check_line(points, "control points", closed=False)
     _check_degree(len(points), degree)
-    return SplinePath(_even_knots(len(points), degree), points, degree)
+    return SplinePath(_build_knots(len(points), degree), points, degree)
 
 
-def control_points(path: Path, count: int, degree: int) -> np.ndarray:
+def fit_control_points(path: Path, count: int, degree: int) -> np.ndarray:
     """Fit the control points of the B-spline nearest to a path, with the same ends.
 
     Least squares over even steps of arc length, so that control points are even too.
@@ -100,16 +100,16 @@ def control_points(path: Path, count: int, degree: int) -> np.ndarray:
     from scipy.interpolate import BSpline
 
     _check_degree(count, degree)
-    places, share = _even_places(path, max(8 * count, 200))
+    places, share = _sample_evenly(path, max(8 * count, 200))
     origin = places.mean(axis=0)
     places = places - origin
-    design = BSpline.design_matrix(share, _even_knots(count, degree), degree).toarray()
+    design = BSpline.design_matrix(share, _build_knots(count, degree), degree).toarray()
     ends = places[[0, -1]]
     inner = np.linalg.lstsq(design[:, 1:-1], places - design[:, [0, -1]] @ ends, rcond=None)[0]
     return np.concatenate([ends[:1], inner, ends[1:]]) + origin
 
 
-def straight(path: Path, count: int) -> np.ndarray:
+def build_straight_points(path: Path, count: int) -> np.ndarray:
     """Build even control points on a straight line from the start of a path to its end: a neutral start (§4.6.6).
 
     If the path ends where it starts, the line leads to its farthest place.
@@ -123,7 +123,7 @@ def straight(path: Path, count: int) -> np.ndarray:
         InputError: for fewer than two points.
     """
     _check_degree(count, 1)
-    places, _ = _even_places(path, 200)
+    places, _ = _sample_evenly(path, 200)
     first, last = places[0], places[-1]
     if np.linalg.norm(last - first) < SHORTEST:
         last = places[np.argmax(np.linalg.norm(places - first, axis=1))]
@@ -137,20 +137,20 @@ def _check_degree(count: int, degree: int) -> None:
                          "use more points or a lower degree")
 
 
-def _even_knots(count: int, degree: int) -> np.ndarray:
+def _build_knots(count: int, degree: int) -> np.ndarray:
     """Build (count + degree + 1,) knots from 0 to 1."""
     return np.concatenate([np.zeros(degree), np.linspace(0.0, 1.0, count - degree + 1), np.ones(degree)])
 
 
-def _even_places(path: Path, count: int) -> tuple[np.ndarray, np.ndarray]:
+def _sample_evenly(path: Path, count: int) -> tuple[np.ndarray, np.ndarray]:
     """Sample places (count, 3) at even steps of arc length, with their share (count,) of the path."""
     share, arc = np.linspace(0.0, 1.0, count), ArcLength(path)
-    u = arc.parameter(share * arc.length)
+    u = arc.parameter_at(share * arc.length)
     u[-1] = path.domain[1] - (1e-12 * (path.domain[1] - path.domain[0]) if path.closed else 0.0)
     return path.at(u), share
 
 
-def _checked(line: np.ndarray, name: str, closed: bool) -> np.ndarray:
+def _check_line(line: np.ndarray, name: str, closed: bool) -> np.ndarray:
     """Check a line; return it without repeated points, closed if requested, or raise InputError."""
     line = np.asarray(line, dtype=float)
     if line.ndim != 2 or line.shape[1] != 3:
@@ -164,14 +164,14 @@ def _checked(line: np.ndarray, name: str, closed: bool) -> np.ndarray:
         line = line[np.append(True, np.linalg.norm(np.diff(line, axis=0), axis=1) > 1e-9)]
     if len(line) < 2:
         raise InputError(name, "all points are equal", "at least two different points", "draw a longer line")
-    if (length := distance_along(line)[-1]) < SHORTEST:
+    if (length := distances_along(line)[-1]) < SHORTEST:
         raise InputError(name, f"is {length:.3g} m long", f"{SHORTEST} m or more", "draw a longer line")
     return line
 
 
-def _thinned(line: np.ndarray, step: float) -> np.ndarray:
+def _thin_line(line: np.ndarray, step: float) -> np.ndarray:
     """Average points denser than `step` metres, so that their noise does not lengthen the line."""
-    along = distance_along(line)
+    along = distances_along(line)
     cell = np.floor(along / step).astype(int)
     first = np.flatnonzero(np.diff(cell, prepend=-1))
     count = np.diff(np.append(first, len(line)))
@@ -182,7 +182,7 @@ def _thinned(line: np.ndarray, step: float) -> np.ndarray:
     return means
 
 
-def _with_hairpins(line: np.ndarray, along: np.ndarray, rounding: float, closed: bool) -> np.ndarray:
+def _widen_hairpins(line: np.ndarray, along: np.ndarray, rounding: float, closed: bool) -> np.ndarray:
     """Add room to turn (M, 3) where the line, `along` (M,) metres, turns by more than a right angle.
 
     Before the tip the line swings to the outer side, after it to the inner one, by up to `rounding` metres: a body on a
@@ -191,39 +191,39 @@ def _with_hairpins(line: np.ndarray, along: np.ndarray, rounding: float, closed:
     step, count = along[1], len(line) - closed
     reach = max(int(round(rounding / step)), 1)
     inner = np.arange(count) if closed else np.arange(reach, count - reach)
-    came, goes = _directions(line, inner, reach, count)
+    came, goes = _compute_directions(line, inner, reach, count)
     excess = np.zeros(count)
     excess[inner] = np.arccos(np.clip(np.einsum("mi,mi->m", came, goes), -1.0, 1.0)) / (np.pi / 2) - 1.0
     # `excess`: angle beyond a right one, in right angles. Closed lines are rolled so that no turn spans the array's
     # end.
     first = int(np.argmin(excess)) if closed else 0  # no turn there
-    turns = [np.arange(*turn) + first for turn in runs(np.roll(excess, -first) > 0.0)]
+    turns = [np.arange(*turn) + first for turn in find_runs(np.roll(excess, -first) > 0.0)]
     if not turns:
         return line
     places = step * np.array([np.average(turn, weights=excess[turn % count]) for turn in turns])
     out = line.copy()
-    for turn, place, room in zip(turns, places, _room(places, along[-1], closed)):
+    for turn, place, room in zip(turns, places, _measure_room(places, along[-1], closed)):
         peak, wide = turn[np.argmax(excess[turn % count])] % count, min(_HAIRPIN * rounding, room)
         off = along - place
         if closed:
             off = (off + along[-1] / 2) % along[-1] - along[-1] / 2
         off = np.clip(off / wide, -1.0, 1.0)
         swing = excess[peak] * wide / _HAIRPIN * off * (1.0 - off**2) ** 3 / _LARGEST
-        out += swing[:, None] * _aside(came[peak - inner[0]], goes[peak - inner[0]])
+        out += swing[:, None] * _compute_outer_side(came[peak - inner[0]], goes[peak - inner[0]])
     return out
 
 
-def _directions(line: np.ndarray, at: np.ndarray, reach: int, period: int) -> tuple[np.ndarray, ...]:
+def _compute_directions(line: np.ndarray, at: np.ndarray, reach: int, period: int) -> tuple[np.ndarray, ...]:
     """Compute unit directions (M, 3) from `reach` samples before to samples `at` (M,), and from there to `reach` after.
 
     period: samples of a lap, for closed lines.
     """
     before, after = (at - reach) % period, (at + reach) % period
     chords = line[at] - line[before], line[after] - line[at]
-    return tuple(unit_vectors(chord, least=1e-12) for chord in chords)
+    return tuple(unit_vectors(chord, min_length=1e-12) for chord in chords)
 
 
-def _room(places: np.ndarray, length: float, closed: bool) -> np.ndarray:
+def _measure_room(places: np.ndarray, length: float, closed: bool) -> np.ndarray:
     """Measure the metres (P,) from each turn to the next one or to the line's end; places (P,) metres along it,
     rising.
     """
@@ -232,7 +232,7 @@ def _room(places: np.ndarray, length: float, closed: bool) -> np.ndarray:
     return np.minimum(np.diff(places, prepend=before), np.diff(places, append=after))
 
 
-def _aside(came: np.ndarray, goes: np.ndarray) -> np.ndarray:
+def _compute_outer_side(came: np.ndarray, goes: np.ndarray) -> np.ndarray:
     """Compute the horizontal unit vector (3,) to the side to which a line turns, from its directions before and
     after.
     """
@@ -242,11 +242,11 @@ def _aside(came: np.ndarray, goes: np.ndarray) -> np.ndarray:
     return -side if came[0] * goes[1] - came[1] * goes[0] < -1e-9 else side
 
 
-def _resampled(line: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray]:
+def _resample_line(line: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray]:
     """Resample a polyline evenly: samples (M, 3) about `step` metres apart, and metres (M,) along it."""
-    along = distance_along(line)
+    along = distances_along(line)
     even = np.linspace(0.0, along[-1], max(int(np.ceil(along[-1] / step)) + 1, 16))
-    return interpolate(even, along, line), even
+    return interpolate_columns(even, along, line), even
 
 
 def read_curve(path: str | os.PathLike) -> np.ndarray:
@@ -267,7 +267,7 @@ def read_curve(path: str | os.PathLike) -> np.ndarray:
     for place, row in read_rows(path, names, _SHORT, ",;\t"):
         if not points:
             names = COLUMNS if "z_m" in row else names
-        points.append([number(row[name], name, place) for name in names])
+        points.append([parse_number(row[name], name, place) for name in names])
     line = np.zeros((len(points), 3))
     if points:
         line[:, : len(names)] = points

@@ -22,35 +22,35 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from ..base.errors import InputError, TimedLine
-from ..base.vectors import cross_level
+from ..base.errors import InputError, TimedMessage
+from ..base.vectors import cross_on_ground
 from ..motion import quaternion
 from ..motion.path.arc_length import ArcLength
 from ..motion.path.path import Path
-from ..motion.track import zero_phase_hann
+from ..motion.track import smooth_zero_phase_hann
 from .path_frame import Residuals
 
-SHORTER = 0.4
+SLOPE_SHORTENING = 0.4
 """Share by which steps are shorter on slopes: this times the slope."""
-BEND = 2.0
+SLOW_RADIUS = 2.0
 """Metres of radius below which bends slow the body down."""
 LEAST_STEP, LEAST_SPEED = 0.8, 0.35
 """Lower limits: of a step's length, as a share of that on level ground, and of the speed."""
 _GRID = 0.05  # metres
 _SMOOTH = 0.7  # metres of path over which slopes and bends are averaged
-_STRIDE_SECONDS, _CREEPS = 0.5, 0.05  # s over which strides are averaged; m/s added so that creeping has no ratio
-_MOVES = 0.4  # m/s; below it a motion's own bends are ignored
+_STRIDE_SECONDS, _SPEED_OFFSET = 0.5, 0.05  # s over which strides are averaged; m/s added so that creeping has no ratio
+_BEND_SPEED = 0.4  # m/s; below it a motion's own bends are ignored
 
-REACHED = 1e-3
+LENGTH_TOLERANCE = 1e-3
 """Metres by which a motion may overshoot the path and still count as of its length."""
 SHORTEST = 1e-6
 """Metres below which a path has no length."""
 _STEP = 0.5  # metres; a shorter path gets a warning
-_SHORTEST_LAP, _UNSEEN = 0.5, 0.1  # seconds: shortest lap that is repeated; longest cut end without a warning
+_SHORTEST_LAP, _UNNOTICED_SECONDS = 0.5, 0.1  # seconds: shortest lap that is repeated; longest cut end without a warning
 
 
 @dataclass(frozen=True)
-class Wishes:
+class StepOptions:
     """Options of how the new path changes the steps.
 
     Attributes:
@@ -64,13 +64,13 @@ class Wishes:
     bends: bool = False
 
     @property
-    def none(self) -> bool:
+    def is_empty(self) -> bool:
         """Whether no option is on."""
         return not (self.slopes or self.climbs or self.bends)
 
 
 @dataclass(frozen=True, eq=False)
-class Way:
+class PathProfile:
     """Slope and curvature along a path.
 
     Attributes:
@@ -83,9 +83,9 @@ class Way:
     slope: np.ndarray
     bend: np.ndarray
 
-    def plain(self, wishes: Wishes) -> bool:
+    def leaves_steps_unchanged(self, options: StepOptions) -> bool:
         """Return whether these options leave all steps on the path unchanged."""
-        length, tempo = _steps(self, wishes)
+        length, tempo = _compute_step_shares(self, options)
         return bool(max(np.abs(length - 1.0).max(), np.abs(tempo - 1.0).max()) < 1e-4)
 
 
@@ -106,7 +106,7 @@ class Timing:
         return Timing(self.at[:count], self.arc[:count])
 
 
-def by_arc_length(residuals: Residuals, speed: float, delay: float) -> Timing:
+def build_timing_by_arc_length(residuals: Residuals, speed: float, delay: float) -> Timing:
     """Build the timing of a motion that keeps its speed on the new path.
 
     Args:
@@ -116,11 +116,11 @@ def by_arc_length(residuals: Residuals, speed: float, delay: float) -> Timing:
     Returns:
         Row and arc length of each output frame.
     """
-    at = _played(len(residuals), speed, delay, residuals.fps)
+    at = _build_rows(len(residuals), speed, delay, residuals.fps)
     return Timing(at, np.interp(at, np.arange(len(residuals)), np.cumsum(residuals.step)))
 
 
-def by_way(residuals: Residuals, own: Way, new: Way, wishes: Wishes, speed: float, delay: float,
+def build_timing_by_profile(residuals: Residuals, own: PathProfile, new: PathProfile, options: StepOptions, speed: float, delay: float,
            closed: bool) -> Timing:
     """Build the timing by arc length with the steps that the slopes and bends of the new path require.
 
@@ -138,18 +138,18 @@ def by_way(residuals: Residuals, own: Way, new: Way, wishes: Wishes, speed: floa
     Returns:
         Row and arc length of each output frame.
     """
-    k_own, r_own = _steps(own, wishes)
-    k, r = _steps(new, wishes)
+    k_own, r_own = _compute_step_shares(own, options)
+    k, r = _compute_step_shares(new, options)
     # Metres in steps of unit length, on the motion's side; the path's side is `run`, over as many laps as can be
     # needed.
-    asked = np.cumsum(residuals.step / k_own)
-    laps = int(np.ceil(asked[-1] / max((new.arc[-1] - new.arc[0]) * LEAST_SPEED, 1e-9))) + 1 if closed else 1
+    unit_steps = np.cumsum(residuals.step / k_own)
+    laps = int(np.ceil(unit_steps[-1] / max((new.arc[-1] - new.arc[0]) * LEAST_SPEED, 1e-9))) + 1 if closed else 1
     arc = np.concatenate([new.arc + lap * new.arc[-1] for lap in range(laps)])
     k, r = np.tile(k, laps), np.tile(r, laps)
     run = np.concatenate([[0.0], np.cumsum(np.diff(arc) * 0.5 * (1.0 / k[1:] + 1.0 / k[:-1]))])
     # Beyond the end of an open path the last step length holds.
-    beyond = np.maximum(asked - run[-1], 0.0) * k[-1]
-    s = np.interp(asked, run, arc) + beyond
+    beyond = np.maximum(unit_steps - run[-1], 0.0) * k[-1]
+    s = np.interp(unit_steps, run, arc) + beyond
     # `clock` is the output frame at which each row is reached; inverted it gives the row of each output frame.
     pace = speed * np.interp(s, arc, r) / r_own
     clock = np.concatenate([[0.0], np.cumsum(2.0 / (pace[1:] + pace[:-1]))])
@@ -159,7 +159,7 @@ def by_way(residuals: Residuals, own: Way, new: Way, wishes: Wishes, speed: floa
     return Timing(at, np.interp(at, np.arange(len(s)), s))
 
 
-def asked_length(residuals: Residuals, own: Way, new: Way, wishes: Wishes) -> float:
+def compute_required_length(residuals: Residuals, own: PathProfile, new: PathProfile, options: StepOptions) -> float:
     """Compute how far a motion moves, in its own steps, while it passes the whole new path.
 
     Args:
@@ -170,13 +170,13 @@ def asked_length(residuals: Residuals, own: Way, new: Way, wishes: Wishes) -> fl
     Returns:
         Metres.
     """
-    k, _ = _steps(new, wishes)
-    level = np.sum(residuals.step / _steps(own, wishes)[0])
+    k, _ = _compute_step_shares(new, options)
+    level = np.sum(residuals.step / _compute_step_shares(own, options)[0])
     recorded = residuals.step.sum() / level if level > 0.0 else 1.0
     return float(recorded * np.sum(np.diff(new.arc) * 0.5 * (1.0 / k[1:] + 1.0 / k[:-1])))
 
 
-def way_of(path: Path, arc: ArcLength) -> Way:
+def build_profile(path: Path, arc: ArcLength) -> PathProfile:
     """Build the profile of a path every few centimetres, smoothed over the length of a step.
 
     Args:
@@ -187,18 +187,18 @@ def way_of(path: Path, arc: ArcLength) -> Way:
     """
     count = int(np.clip(arc.length / _GRID, 8, 8000)) + 1
     s = np.linspace(0.0, arc.length, count)
-    u = arc.parameter(s)
+    u = arc.parameter_at(s)
     first, second = path.at(u, 1), path.at(u, 2)
     level = np.linalg.norm(first[:, :2], axis=1)
-    turn = np.abs(cross_level(first, second))
+    turn = np.abs(cross_on_ground(first, second))
     slope = np.clip(first[:, 2] / np.maximum(level, 1e-9), -3.0, 3.0)
     bend = np.minimum(turn / np.maximum(level, 1e-9) ** 3, 20.0)
     width = int(np.clip(_SMOOTH / max(s[1], 1e-9), 1, count))
     mode = "wrap" if path.closed else "nearest"
-    return Way(s, *(uniform_filter1d(uniform_filter1d(v, width, mode=mode), width, mode=mode) for v in (slope, bend)))
+    return PathProfile(s, *(uniform_filter1d(uniform_filter1d(v, width, mode=mode), width, mode=mode) for v in (slope, bend)))
 
 
-def way_at(way: Way, arc: np.ndarray, pace: np.ndarray) -> Way:
+def sample_profile(profile: PathProfile, arc: np.ndarray, pace: np.ndarray) -> PathProfile:
     """Sample a profile where a motion is; a body slower than _BEND_SPEED has no curvature.
 
     Args:
@@ -208,23 +208,23 @@ def way_at(way: Way, arc: np.ndarray, pace: np.ndarray) -> Way:
     Returns:
         The profile at each of the T frames.
     """
-    bend = np.where(pace > _MOVES, np.interp(arc, way.arc, way.bend), 0.0)
-    return Way(arc, np.interp(arc, way.arc, way.slope), bend)
+    bend = np.where(pace > _BEND_SPEED, np.interp(arc, profile.arc, profile.bend), 0.0)
+    return PathProfile(arc, np.interp(arc, profile.arc, profile.slope), bend)
 
 
-def _steps(way: Way, wishes: Wishes) -> tuple[np.ndarray, np.ndarray]:
+def _compute_step_shares(profile: PathProfile, options: StepOptions) -> tuple[np.ndarray, np.ndarray]:
     """Compute length and tempo of steps (N,) as shares of those on a level straight path."""
-    shorter = np.maximum(1.0 - SHORTER * np.abs(way.slope), LEAST_STEP) if wishes.slopes else np.ones(len(way.slope))
-    slower = np.ones(len(way.slope))
-    if wishes.climbs:  # Tobler: 6 exp(-3.5 |m + 0.05|) km/h, over its value on level ground
-        slower = slower * np.exp(-3.5 * (np.abs(way.slope + 0.05) - 0.05))
-    if wishes.bends:
-        slower = slower * np.maximum(way.bend * BEND, 1.0) ** (-1.0 / 3.0)
+    shorter = np.maximum(1.0 - SLOPE_SHORTENING * np.abs(profile.slope), LEAST_STEP) if options.slopes else np.ones(len(profile.slope))
+    slower = np.ones(len(profile.slope))
+    if options.climbs:  # Tobler: 6 exp(-3.5 |m + 0.05|) km/h, over its value on level ground
+        slower = slower * np.exp(-3.5 * (np.abs(profile.slope + 0.05) - 0.05))
+    if options.bends:
+        slower = slower * np.maximum(profile.bend * SLOW_RADIUS, 1.0) ** (-1.0 / 3.0)
     half = np.sqrt(np.maximum(slower, LEAST_SPEED))
     return half * shorter, half / shorter
 
 
-def by_time(residuals: Residuals, path: Path, arc: ArcLength, speed: float, delay: float) -> Timing:
+def build_timing_by_time(residuals: Residuals, path: Path, arc: ArcLength, speed: float, delay: float) -> Timing:
     """Build the timing of a motion that passes the whole path within its own duration.
 
     Args:
@@ -236,8 +236,8 @@ def by_time(residuals: Residuals, path: Path, arc: ArcLength, speed: float, dela
     Returns:
         Row and arc length of each output frame.
     """
-    at = _played(len(residuals), speed, delay, residuals.fps)
-    return Timing(at, arc.at(parameter_at(path, at / max(len(residuals) - 1, 1))))
+    at = _build_rows(len(residuals), speed, delay, residuals.fps)
+    return Timing(at, arc.distance_at(parameter_at(path, at / max(len(residuals) - 1, 1))))
 
 
 def parameter_at(path: Path, share: np.ndarray) -> np.ndarray:
@@ -246,7 +246,7 @@ def parameter_at(path: Path, share: np.ndarray) -> np.ndarray:
     return low + (high - low) * share
 
 
-def stretched(new: np.ndarray, own: np.ndarray, fps: float) -> np.ndarray | None:
+def compute_step_scale(new: np.ndarray, own: np.ndarray, fps: float) -> np.ndarray | None:
     """Compute how many times as long as recorded the steps of a motion are.
 
     Args:
@@ -258,11 +258,11 @@ def stretched(new: np.ndarray, own: np.ndarray, fps: float) -> np.ndarray | None
     """
     if np.abs(new - own).max(initial=0.0) < 1e-4 / fps:
         return None
-    both = zero_phase_hann(np.stack([new, own], axis=1), fps, _STRIDE_SECONDS) + _CREEPS / fps
+    both = smooth_zero_phase_hann(np.stack([new, own], axis=1), fps, _STRIDE_SECONDS) + _SPEED_OFFSET / fps
     return both[:, 0] / both[:, 1]
 
 
-def take_rows(residuals: Residuals, at: np.ndarray) -> Residuals:
+def resample_residuals(residuals: Residuals, at: np.ndarray) -> Residuals:
     """Resample the residuals at fractional rows.
 
     Values are cubics through the four rows around (Catmull and Rom 1974), since linear interpolation shakes what moves
@@ -279,8 +279,8 @@ def take_rows(residuals: Residuals, at: np.ndarray) -> Residuals:
     share = np.clip(at - low, 0.0, 1.0)
     share[share < 1e-9] = 0.0
     if not share.any():
-        whole = residuals.rows(low)
-        return whole if np.all(np.diff(low) == 1) else _stepped(residuals, whole, at)
+        whole = residuals.select_rows(low)
+        return whole if np.all(np.diff(low) == 1) else _update_steps(residuals, whole, at)
     # Rows low - 1 to low + 2, and their Catmull-Rom weights at x between low and low + 1.
     around = np.clip(low + np.arange(-1, 3)[:, None], 0, count - 1)
     x = share
@@ -288,27 +288,27 @@ def take_rows(residuals: Residuals, at: np.ndarray) -> Residuals:
         [x * (-1.0 + x * (2.0 - x)), 2.0 + x * x * (3.0 * x - 5.0), x * (1.0 + x * (4.0 - 3.0 * x)), x * x * (x - 1.0)]
     )
 
-    def mixed(values: np.ndarray) -> np.ndarray:
+    def blend_rows(values: np.ndarray) -> np.ndarray:
         return sum(w.reshape(-1, *[1] * (values.ndim - 1)) * values[row] for w, row in zip(weights, around))
 
-    near = residuals.rows(np.where(share < 0.5, low, np.minimum(low + 1, count - 1)))
-    out = {name: mixed(getattr(residuals, name)) for name in ("place", "under", "up")}
-    rotations = quaternion.normalized(mixed(residuals.rotations))
+    near = residuals.select_rows(np.where(share < 0.5, low, np.minimum(low + 1, count - 1)))
+    out = {name: blend_rows(getattr(residuals, name)) for name in ("place", "under", "up")}
+    rotations = quaternion.normalize(blend_rows(residuals.rotations))
     frames = residuals.frames[low] + share * (residuals.frames[np.minimum(low + 1, count - 1)] - residuals.frames[low])
-    return _stepped(residuals, near.changed(rotations=rotations, frames=frames, **out), at)
+    return _update_steps(residuals, near.replace_fields(rotations=rotations, frames=frames, **out), at)
 
 
-def _stepped(residuals: Residuals, rows: Residuals, at: np.ndarray) -> Residuals:
+def _update_steps(residuals: Residuals, rows: Residuals, at: np.ndarray) -> Residuals:
     """Compute steps and turns of rows `at` as differences of the accumulated ones."""
     index = np.arange(len(residuals))
 
-    def since(values: np.ndarray) -> np.ndarray:
+    def difference_rows(values: np.ndarray) -> np.ndarray:
         return np.diff(np.interp(at, index, np.cumsum(values)), prepend=0.0)
 
-    return rows.changed(step=since(residuals.step), turn=since(residuals.turn))
+    return rows.replace_fields(step=difference_rows(residuals.step), turn=difference_rows(residuals.turn))
 
 
-def _played(count: int, speed: float, delay: float, fps: float) -> np.ndarray:
+def _build_rows(count: int, speed: float, delay: float, fps: float) -> np.ndarray:
     """Build the fractional row of each output frame, with the wait at the start."""
     last = int(np.floor((count - 1) / speed + 1e-6))
     waits = int(round(delay * fps))
@@ -327,9 +327,9 @@ class Ending:
     """
 
     count: int
-    shown: np.ndarray
-    again: np.ndarray
-    told: tuple[str, ...] = ()
+    displayed: np.ndarray
+    restarts: np.ndarray
+    messages: tuple[str, ...] = ()
 
 
 def find_ending(arc: np.ndarray, length: float, fps: float, end: str = "stop", closed: bool = False) -> Ending:
@@ -354,28 +354,28 @@ def find_ending(arc: np.ndarray, length: float, fps: float, end: str = "stop", c
     short = (f"the path is only {length:.2f} m long, less than a step",) if length < _STEP else ()
     if closed:
         return Ending(total, whole, none, short)
-    count = max(int(np.searchsorted(arc, length + REACHED, side="right")), 1)
+    count = max(int(np.searchsorted(arc, length + LENGTH_TOLERANCE, side="right")), 1)
     if count == total:
         return Ending(total, whole, none, short)
-    first = _begins(arc[:count])
+    first = _find_start(arc[:count])
     if end == "repeat" and count - first >= _SHORTEST_LAP * fps:
-        return _again(first, count, total, fps, short)
+        return _repeat_laps(first, count, total, fps, short)
     when, left = count / fps, (total - count) / fps
-    line = TimedLine(f"the path ends after {when:.1f} s, {left:.1f} s before the motion", (when, when))
-    stops = (line,) if left > _UNSEEN else ()
+    line = TimedMessage(f"the path ends after {when:.1f} s, {left:.1f} s before the motion", (when, when))
+    stops = (line,) if left > _UNNOTICED_SECONDS else ()
     brief = ("the path is too short to restart: a lap takes less than half a second",) if end == "repeat" else ()
     return Ending(count, whole[:count], none, (*stops, *brief, *short))
 
 
-def _begins(arc: np.ndarray) -> int:
+def _find_start(arc: np.ndarray) -> int:
     """Find the last of the frames that wait at the start of the path."""
     return max(int(np.searchsorted(arc, arc[0] + 1e-12, side="right")) - 1, 0)
 
 
-def _again(first: int, count: int, total: int, fps: float, told: tuple[str, ...]) -> Ending:
+def _repeat_laps(first: int, count: int, total: int, fps: float, messages: tuple[str, ...]) -> Ending:
     later = np.arange(total - count)
-    shown = np.concatenate([np.arange(count), first + later % (count - first)])
-    again = np.arange(count, total, count - first)
-    times = "once" if len(again) == 1 else f"{len(again)} times"
-    line = TimedLine(f"the path ends after {count / fps:.1f} s; the motion restarts {times}", (count / fps,) * 2)
-    return Ending(count, shown, again, (line, *told))
+    displayed = np.concatenate([np.arange(count), first + later % (count - first)])
+    restarts = np.arange(count, total, count - first)
+    times = "once" if len(restarts) == 1 else f"{len(restarts)} times"
+    line = TimedMessage(f"the path ends after {count / fps:.1f} s; the motion restarts {times}", (count / fps,) * 2)
+    return Ending(count, displayed, restarts, (line, *messages))

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.errors import InputError
-from ..evaluation.paired_tests import judged
+from ..evaluation.paired_tests import compare_differences
 from .answers import Answers
 from .form import SAME, SCALE
 from .order import Study
@@ -99,7 +99,7 @@ class Analysis:
     notes: tuple[str, ...]
 
 
-def analysed(study: Study, answers: Answers, better: Sequence[tuple[str, str]] = ()) -> Analysis:
+def analyse_study(study: Study, answers: Answers, better: Sequence[tuple[str, str]] = ()) -> Analysis:
     """Analyse the answers to a study.
 
     Args:
@@ -116,19 +116,19 @@ def analysed(study: Study, answers: Answers, better: Sequence[tuple[str, str]] =
     for system in [name for pair in hypotheses for name in pair]:
         if system not in study.systems:
             raise InputError("system", system, f"one of {', '.join(study.systems)}", "correct the name")
-    if same := next((new for new, old in hypotheses if new == old), None):
-        raise InputError("hypothesis", f"{same} against itself", "two systems", "name another one")
-    find = _of_pairs if study.pairs else _of_ratings
+    if repeated := next((new for new, old in hypotheses if new == old), None):
+        raise InputError("hypothesis", f"{repeated} against itself", "two systems", "name another one")
+    find = _compare_choices if study.pairs else _compare_ratings
     findings = [find(study, answers, new, old) for new, old in hypotheses]
-    raised = holm([finding.p for finding in findings])
-    findings = [Finding(**{**vars(finding), "holm_p": p}) for finding, p in zip(findings, raised)]
+    adjusted = adjust_holm([finding.p for finding in findings])
+    findings = [Finding(**{**vars(finding), "holm_p": p}) for finding, p in zip(findings, adjusted)]
     scenarios = () if study.pairs else study.scenarios
-    return Analysis(study=study, answers=answers, by_system=() if study.pairs else _by_system(study, answers),
-                    by_scenario=tuple((scenario, _by_system(study, answers, scenario)) for scenario in scenarios),
-                    findings=tuple(findings), notes=tuple(_notes(study, answers)))  # fmt: skip
+    return Analysis(study=study, answers=answers, by_system=() if study.pairs else _count_by_system(study, answers),
+                    by_scenario=tuple((scenario, _count_by_system(study, answers, scenario)) for scenario in scenarios),
+                    findings=tuple(findings), notes=tuple(_list_notes(study, answers)))  # fmt: skip
 
 
-def holm(p: Sequence[float]) -> list[float]:
+def adjust_holm(p: Sequence[float]) -> list[float]:
     """Adjust p values so that all hypotheses together have the error rate of one (Holm 1979).
 
     Args:
@@ -145,7 +145,7 @@ def holm(p: Sequence[float]) -> list[float]:
     return out
 
 
-def cliffs_delta(new: np.ndarray, old: np.ndarray) -> float:
+def compute_cliffs_delta(new: np.ndarray, old: np.ndarray) -> float:
     """Compute Cliff's delta: the share of pairs with new above old minus the share below (Cliff 1993).
 
     Args:
@@ -159,7 +159,7 @@ def cliffs_delta(new: np.ndarray, old: np.ndarray) -> float:
     return float(np.sign(np.subtract.outer(np.asarray(new, float), np.asarray(old, float))).mean())
 
 
-def welch(new: np.ndarray, old: np.ndarray) -> float:
+def compute_welch_p(new: np.ndarray, old: np.ndarray) -> float:
     """Compute the one-sided p that the mean of `new` is no larger than that of `old`, with unequal variances (Welch
     1947).
 
@@ -178,74 +178,74 @@ def welch(new: np.ndarray, old: np.ndarray) -> float:
     return float(student.sf((new.mean() - old.mean()) / np.sqrt(parts.sum()), degrees))
 
 
-def _of_ratings(study: Study, answers: Answers, new: str, old: str) -> Finding:
+def _compare_ratings(study: Study, answers: Answers, new: str, old: str) -> Finding:
     """Build the finding of two systems from ratings."""
     table = {clip.name: clip for clip in study.clips}
-    each, every = [], {new: [], old: []}
+    differences, ratings = [], {new: [], old: []}
     for rater in answers.raters:
-        given = {(table[name].system, table[name].scenario): value for name, value in answers.ratings[rater].items()}
-        off = [given[new, s] - given[old, s] for s in study.scenarios if (new, s) in given and (old, s) in given]
+        rated = {(table[name].system, table[name].scenario): value for name, value in answers.ratings[rater].items()}
+        off = [rated[new, s] - rated[old, s] for s in study.scenarios if (new, s) in rated and (old, s) in rated]
         if off:
-            each.append(np.mean(off))
-        for system, values in every.items():
-            values += [value for (own, _), value in given.items() if own == system]
-    a, b = (np.array(every[system], float) for system in (new, old))
-    return _finding(new, old, np.array(each, float), welch(a, b), cliffs_delta(a, b))
+            differences.append(np.mean(off))
+        for system, values in ratings.items():
+            values += [value for (own, _), value in rated.items() if own == system]
+    a, b = (np.array(ratings[system], float) for system in (new, old))
+    return _build_finding(new, old, np.array(differences, float), compute_welch_p(a, b), compute_cliffs_delta(a, b))
 
 
-def _of_pairs(study: Study, answers: Answers, new: str, old: str) -> Finding:
+def _compare_choices(study: Study, answers: Answers, new: str, old: str) -> Finding:
     """Build the finding of two systems from choices between pairs."""
     from scipy.stats import binomtest
 
     table = {clip.name: clip for clip in study.clips}
-    each, votes = [], []
+    differences, votes = [], []
     for rater in answers.raters:
-        own = []
+        rater_votes = []
         for shown, chosen in answers.choices[rater].items():
             if {table[name].system for name in shown} == {new, old}:
-                own.append(0.0 if chosen == SAME else 1.0 if table[chosen].system == new else -1.0)
-        if own:
-            each.append(np.mean(own))
-        votes += [vote for vote in own if vote]
+                rater_votes.append(0.0 if chosen == SAME else 1.0 if table[chosen].system == new else -1.0)
+        if rater_votes:
+            differences.append(np.mean(rater_votes))
+        votes += [vote for vote in rater_votes if vote]
     won = votes.count(1.0)
     pooled = float(binomtest(won, len(votes), 0.5, "greater").pvalue) if votes else np.nan
     delta = (2 * won - len(votes)) / len(votes) if votes else np.nan
-    return _finding(new, old, np.array(each, float), pooled, delta)
+    return _build_finding(new, old, np.array(differences, float), pooled, delta)
 
 
-def _finding(new: str, old: str, off: np.ndarray, pooled: float, delta: float) -> Finding:
+def _build_finding(new: str, old: str, differences: np.ndarray, pooled: float, delta: float) -> Finding:
     """Build a finding from the raters' differences (N,) by paired tests."""
     from scipy.stats import t as student
 
-    count = len(off)
-    mean = float(off.mean()) if count else np.nan
-    sd = float(off.std(ddof=1)) if count > 1 else np.nan
-    varies = count > 1 and np.ptp(off) > 1e-12
-    tests = judged(-off)  # the tests expect negative differences
+    count = len(differences)
+    mean = float(differences.mean()) if count else np.nan
+    sd = float(differences.std(ddof=1)) if count > 1 else np.nan
+    varies = count > 1 and np.ptp(differences) > 1e-12
+    tests = compare_differences(-differences)  # the tests expect negative differences
     half = float(student.ppf(0.975, count - 1)) * sd / np.sqrt(count) if varies else np.nan
-    return Finding(new=new, old=old, differences=off, mean=mean, low=mean - half, high=mean + half,
+    return Finding(new=new, old=old, differences=differences, mean=mean, low=mean - half, high=mean + half,
                    t=mean / (sd / np.sqrt(count)) if varies else np.nan, degrees=max(count - 1, 0), p=tests.t_p,
                    wilcoxon_p=tests.wilcoxon_p, normal_p=tests.normal, pooled_p=pooled,
                    d=mean / sd if varies else np.nan, delta=delta)  # fmt: skip
 
 
-def _shares(name: str, values: list[int]) -> Shares:
+def _count_shares(name: str, values: list[int]) -> Shares:
     counts = np.bincount(np.array(values, int), minlength=len(SCALE) + 1)[1:]
     mean = float(np.mean(values)) if values else np.nan
     return Shares(name, counts, mean, float(np.std(values, ddof=1)) if len(values) > 1 else np.nan)
 
 
-def _by_system(study: Study, answers: Answers, scenario: str | None = None) -> tuple[Shares, ...]:
+def _count_by_system(study: Study, answers: Answers, scenario: str | None = None) -> tuple[Shares, ...]:
     """Count the ratings of each system, in one scenario or in all."""
     out = []
     for system in study.systems:
         names = {clip.name for clip in study.clips if clip.system == system and scenario in (None, clip.scenario)}
         rated = (answers.ratings[rater].items() for rater in answers.raters)
-        out.append(_shares(system, [value for row in rated for name, value in row if name in names]))
+        out.append(_count_shares(system, [value for row in rated for name, value in row if name in names]))
     return tuple(out)
 
 
-def _notes(study: Study, answers: Answers) -> list[str]:
+def _list_notes(study: Study, answers: Answers) -> list[str]:
     """List what to know about the raters: how many answered, who is missing, who always gives the same answer."""
     silent = [rater for rater in study.orders if rater not in answers.raters]
     notes = [f"{len(answers.raters)} of {len(study.orders)} raters answered"]
@@ -256,7 +256,7 @@ def _notes(study: Study, answers: Answers) -> list[str]:
     if len(answers.raters) < 6:
         notes.append("fewer than six raters: the tests have little power")
     for rater in answers.raters:
-        given = [*answers.ratings[rater].values(), *answers.choices[rater].values()]
-        if len(given) > 4 and len(set(given)) == 1:
+        values = [*answers.ratings[rater].values(), *answers.choices[rater].values()]
+        if len(values) > 4 and len(set(values)) == 1:
             notes.append(f"{rater} gave every clip the same answer")
     return notes

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..base.errors import InputError
-from ..files.content import utf8
+from ..files.content import read_utf8
 from ..files.tables import read_rows
 from .form import ANSWER_COLUMNS, BACKGROUND, SAME, SCALE
 from .order import Study
 
-_LARGEST = 5_000_000
+_MAX_BYTES = 5_000_000
 
 
 @dataclass(frozen=True)
@@ -51,40 +51,40 @@ def read_answers(study: Study, paths: Sequence[Path]) -> Answers:
             unknown choice; if one rater answers a question in two ways; or without any answer.
     """
     found: dict[str, dict[str, tuple[str, str]]] = {}
-    for path in answer_files(paths):
-        for place, mark, rater, question, answer in _rows(path):
+    for path in list_answer_files(paths):
+        for place, study_id, rater, question, answer in _iter_answers(path):
             if not answer:
                 continue
-            answer = _checked(study, place, mark, rater=rater, question=question, answer=answer)
+            answer = _check_answer(study, place, study_id, rater=rater, question=question, answer=answer)
             before = found.setdefault(rater, {}).setdefault(question, (answer, place))
             if before[0] != answer:
-                told = f"{rater} answers {answer} to {question} here and {before[0]} in {before[1]}"
-                raise InputError(place, told, "one answer", "remove one of the two")
+                conflict = f"{rater} answers {answer} to {question} here and {before[0]} in {before[1]}"
+                raise InputError(place, conflict, "one answer", "remove one of the two")
     if not found:
         raise InputError(paths[0] if paths else "answers", "no answers", "files saved by the form", "add them")
-    return _sorted_out(study, found)
+    return _sort_answers(study, found)
 
 
-def _sorted_out(study: Study, found: Mapping[str, Mapping[str, tuple[str, str]]]) -> Answers:
+def _sort_answers(study: Study, found: Mapping[str, Mapping[str, tuple[str, str]]]) -> Answers:
     """Sort the answers by rater into background, ratings and choices."""
-    asked = {question.key for question in BACKGROUND}
+    background_keys = {question.key for question in BACKGROUND}
     background, ratings, choices = {}, {}, {}
     missing = 0
     for rater in sorted(found):
-        said = {question: answer for question, (answer, _) in found[rater].items()}
-        background[rater] = {key: answer for key, answer in said.items() if key in asked}
-        shown = [row for row in study.orders[rater] if study.counts(row)]
-        given = {row: said["/".join(row)] for row in shown if "/".join(row) in said}
-        missing += len(shown) - len(given)
-        ratings[rater] = {} if study.pairs else {row[0]: int(answer) for row, answer in given.items()}
-        choices[rater] = {row: answer for row, answer in given.items()} if study.pairs else {}
+        answers = {question: answer for question, (answer, _) in found[rater].items()}
+        background[rater] = {key: answer for key, answer in answers.items() if key in background_keys}
+        pages = [row for row in study.orders[rater] if study.is_counted(row)]
+        page_answers = {row: answers["/".join(row)] for row in pages if "/".join(row) in answers}
+        missing += len(pages) - len(page_answers)
+        ratings[rater] = {} if study.pairs else {row[0]: int(answer) for row, answer in page_answers.items()}
+        choices[rater] = {row: answer for row, answer in page_answers.items()} if study.pairs else {}
     return Answers(background, ratings, choices, missing)
 
 
-def _checked(study: Study, place: str, mark: str, rater: str, question: str, answer: str) -> str:
+def _check_answer(study: Study, place: str, study_id: str, rater: str, question: str, answer: str) -> str:
     """Check that an answer belongs to this study, and return it."""
-    if mark != study.id:
-        raise InputError(place, f"answers to study {mark or 'without an id'}", study.id, "choose this study's answers")
+    if study_id != study.id:
+        raise InputError(place, f"answers to study {study_id or 'without an id'}", study.id, "choose this study's answers")
     if rater not in study.orders:
         raise InputError(place, f"rater {rater!r}", f"one of {', '.join(list(study.orders)[:12])}", "correct the name")
     possible = {one.key: [key for key, _ in one.choices] for one in BACKGROUND}
@@ -97,7 +97,7 @@ def _checked(study: Study, place: str, mark: str, rater: str, question: str, ans
     return answer
 
 
-def answer_files(paths: Sequence[Path]) -> list[Path]:
+def list_answer_files(paths: Sequence[Path]) -> list[Path]:
     """List the files that answers are read from.
 
     Args:
@@ -112,16 +112,16 @@ def answer_files(paths: Sequence[Path]) -> list[Path]:
     return out
 
 
-def _rows(path: Path) -> Iterable[tuple[str, ...]]:
+def _iter_answers(path: Path) -> Iterable[tuple[str, ...]]:
     """Iterate over (place, study, rater, question, answer) of one file."""
     if path.suffix.lower() != ".json":
         for place, row in read_rows(path, ANSWER_COLUMNS, separators=",;\t"):
             yield place, *(row[column] for column in ANSWER_COLUMNS)
         return
     try:
-        told = json.loads(utf8(path, "answers in JSON", _LARGEST))
-        answers = told["answers"].items()
+        data = json.loads(read_utf8(path, "answers in JSON", _MAX_BYTES))
+        answers = data["answers"].items()
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
         raise InputError(path, "not answers in JSON", "a file saved by the form", "save it again") from None
     for question, answer in answers:
-        yield str(path), str(told.get("study", "")), str(told.get("rater", "")), str(question), str(answer).strip()
+        yield str(path), str(data.get("study", "")), str(data.get("rater", "")), str(question), str(answer).strip()

@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..evaluation.html_page import Html, build_page, build_section, element, fragment
+from ..evaluation.html_page import Html, build_page, build_section, build_element, join_html
 from .order import Study
 
 MOVIES = (".mp4", ".webm", ".m4v", ".mov", ".gif")
@@ -121,7 +121,7 @@ INTRODUCTION = (
 )
 
 
-def form_page(study: Study, rater: str, sources: Mapping[str, str]) -> str:
+def build_form_page(study: Study, rater: str, sources: Mapping[str, str]) -> str:
     """Build the form of one rater as HTML.
 
     Args:
@@ -131,23 +131,23 @@ def form_page(study: Study, rater: str, sources: Mapping[str, str]) -> str:
     Returns:
         The page as text.
     """
-    pages = [_introduction(study), _background()]
+    pages = [_build_introduction(study), _build_background()]
     order, what = study.orders[rater], "Pair" if study.pairs else "Clip"
     for number, shown in enumerate(order, 1):
-        pages.append(_clip_page(study, shown, sources, f"{what} {number} of {len(order)}"))
-    pages.append(_end())
-    told = {"study": study.id, "rater": rater, "columns": ANSWER_COLUMNS, "questions": questions_of(study, rater)}
-    data = json.dumps(told, ensure_ascii=True).replace("<", "\\u003c")
+        pages.append(_build_clip_page(study, shown, sources, f"{what} {number} of {len(order)}"))
+    pages.append(_build_end())
+    content = {"study": study.id, "rater": rater, "columns": ANSWER_COLUMNS, "questions": list_questions(study, rater)}
+    data = json.dumps(content, ensure_ascii=True).replace("<", "\\u003c")
     return build_page(
-        "How natural does it look?", element("progress", max=len(pages) - 1, value=0), *pages,
-        element("p", _button("back", "Back"), _button("next", "Next")),
-        element("noscript", element("p", f"This form needs JavaScript; fill in {rater}.csv instead.")),
-        Html(f'<script type="application/json" id="study">{data}</script>'), element("script", Html(_SCRIPT)),
+        "How natural does it look?", build_element("progress", max=len(pages) - 1, value=0), *pages,
+        build_element("p", _build_button("back", "Back"), _build_button("next", "Next")),
+        build_element("noscript", build_element("p", f"This form needs JavaScript; fill in {rater}.csv instead.")),
+        Html(f'<script type="application/json" id="study">{data}</script>'), build_element("script", Html(_SCRIPT)),
         style=_STYLE,
     )  # fmt: skip
 
 
-def form_table(study: Study, rater: str) -> str:
+def build_form_table(study: Study, rater: str) -> str:
     """Build the same questions as a CSV to type into, with an empty answer for each, in the rater's order.
 
     Args:
@@ -159,11 +159,11 @@ def form_table(study: Study, rater: str) -> str:
     text = io.StringIO(newline="")
     table = csv.writer(text, lineterminator="\r\n")
     table.writerow(ANSWER_COLUMNS)
-    table.writerows((study.id, rater, question, "") for question in questions_of(study, rater))
+    table.writerows((study.id, rater, question, "") for question in list_questions(study, rater))
     return text.getvalue()
 
 
-def questions_of(study: Study, rater: str) -> list[str]:
+def list_questions(study: Study, rater: str) -> list[str]:
     """List the keys of all questions in a rater's order; the key of a pair is both names with a slash between.
 
     Args:
@@ -175,7 +175,7 @@ def questions_of(study: Study, rater: str) -> list[str]:
     return [question.key for question in BACKGROUND] + ["/".join(shown) for shown in study.orders[rater]]
 
 
-def clip_source(folder: Path, name: str) -> Path | None:
+def find_movie(folder: Path, name: str) -> Path | None:
     """Find the movie of a clip in a folder.
 
     Args:
@@ -187,50 +187,50 @@ def clip_source(folder: Path, name: str) -> Path | None:
     return next((path for suffix in MOVIES if (path := folder / f"{name}{suffix}").is_file()), None)
 
 
-def _introduction(study: Study) -> Html:
-    many = len(next(iter(study.orders.values()), ()))
-    told = [element("p", line) for line in (*INTRODUCTION, f"There are {many} pages with clips.")]
-    return element("section", element("h1", "How natural does it look?"), *told)
+def _build_introduction(study: Study) -> Html:
+    page_count = len(next(iter(study.orders.values()), ()))
+    paragraphs = [build_element("p", line) for line in (*INTRODUCTION, f"There are {page_count} pages with clips.")]
+    return build_element("section", build_element("h1", "How natural does it look?"), *paragraphs)
 
 
-def _background() -> Html:
-    parts = [_choices(question.key, question.text, question.choices, question.needed) for question in BACKGROUND]
-    return element("section", build_section("About you", *parts), hidden=True)
+def _build_background() -> Html:
+    parts = [_build_choices(question.key, question.text, question.choices, question.needed) for question in BACKGROUND]
+    return build_element("section", build_section("About you", *parts), hidden=True)
 
 
-def _clip_page(study: Study, shown: tuple[str, ...], sources: Mapping[str, str], title: str) -> Html:
+def _build_clip_page(study: Study, shown: tuple[str, ...], sources: Mapping[str, str], title: str) -> Html:
     """Build the page of one clip or of a pair with its question."""
     name = "/".join(shown)
-    training = () if study.counts(shown) else (" ", element("span", "(to get used to it)", class_="quiet"))
+    training = () if study.is_counted(shown) else (" ", build_element("span", "(to get used to it)", class_="quiet"))
     sides = ("Left", "Right") if len(shown) == 2 else ("",)
-    clips = [element("div", _clip(sources[one]), element("p", side, class_="quiet")) for one, side in zip(shown, sides)]
+    clips = [build_element("div", _build_clip(sources[one]), build_element("p", side, class_="quiet")) for one, side in zip(shown, sides)]
     if study.pairs:
         choices = tuple(zip((shown[0], SAME, shown[1]), ("Left", "No difference", "Right")))
     else:
         choices = tuple((str(mark), text) for mark, text in enumerate(SCALE, 1))
-    asked = _choices(name, COMPARE if study.pairs else RATE, choices, needed=True)
-    shown_clips = element("div", *clips, class_="pair" if len(shown) == 2 else "one")
-    return element("section", build_section(fragment(title, *training), shown_clips, asked), hidden=True)
+    question = _build_choices(name, COMPARE if study.pairs else RATE, choices, needed=True)
+    shown_clips = build_element("div", *clips, class_="pair" if len(shown) == 2 else "one")
+    return build_element("section", build_section(join_html(title, *training), shown_clips, question), hidden=True)
 
 
-def _clip(source: str) -> Html:
+def _build_clip(source: str) -> Html:
     if source.lower().endswith(".gif") or source.startswith("data:image/"):
-        return element("img", alt="the clip", src=source)
-    return element("video", src=source, controls=True, loop=True, muted=True, playsinline=True, preload="auto")
+        return build_element("img", alt="the clip", src=source)
+    return build_element("video", src=source, controls=True, loop=True, muted=True, playsinline=True, preload="auto")
 
 
-def _choices(key: str, text: str, choices: tuple[tuple[str, str], ...], needed: bool) -> Html:
+def _build_choices(key: str, text: str, choices: tuple[tuple[str, str], ...], needed: bool) -> Html:
     """Build a question with one choice."""
-    inputs = [element("label", element("input", type="radio", name=key, value=value), f" {said}")
-              for value, said in choices]  # fmt: skip
-    return element("fieldset", element("legend", text), *inputs, data_needed=needed)
+    inputs = [build_element("label", build_element("input", type="radio", name=key, value=value), f" {label}")
+              for value, label in choices]  # fmt: skip
+    return build_element("fieldset", build_element("legend", text), *inputs, data_needed=needed)
 
 
-def _button(id_: str, text: str) -> Html:
-    return element("button", text, id=id_, type="button")
+def _build_button(id_: str, text: str) -> Html:
+    return build_element("button", text, id=id_, type="button")
 
 
-def _end() -> Html:
+def _build_end() -> Html:
     thanks = "Save your answers and send the file to the person who gave you this form. Nothing has been sent."
-    buttons = element("p", _button("csv", "Save as a table (CSV)"), _button("json", "Save as JSON"))
-    return element("section", build_section("Thank you", element("p", thanks), buttons), hidden=True)
+    buttons = build_element("p", _build_button("csv", "Save as a table (CSV)"), _build_button("json", "Save as JSON"))
+    return build_element("section", build_section("Thank you", build_element("p", thanks), buttons), hidden=True)

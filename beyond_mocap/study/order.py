@@ -18,19 +18,19 @@ import numpy as np
 
 from ..base.digest import hex_digest
 from ..base.errors import InputError
-from ..files.content import utf8
+from ..files.content import read_utf8
 from ..files.tables import read_rows, write_report
 
 TRAINING = "training"
 """System of the clips that come first and do not count."""
-MOST_CLIPS = 500
+MAX_CLIPS = 500
 _LETTERS = "bcdfghjkmnpqrstvwxyz23456789"  # no vowels, so no words; no characters that look alike
-_LONG = 4  # letters of a clip's name
-_TRIES = 200  # random orders to try until one differs from all others
+_NAME_LENGTH = 4  # letters of a clip's name
+_MAX_TRIES = 200  # random orders to try until one differs from all others
 STUDY_FILE = "study.json"
 VERSION = 1
 COLUMNS = ("file", "system", "scenario")
-_LARGEST = 20_000_000
+_MAX_BYTES = 20_000_000
 _NAME = re.compile(r"[A-Za-z0-9_-]{1,40}")  # of clips and raters, used as file names
 
 
@@ -85,7 +85,7 @@ class Study:
         """Names of the two clips that do not count."""
         return tuple(clip.name for clip in self.clips if clip.system == TRAINING)
 
-    def counts(self, shown: Sequence[str]) -> bool:
+    def is_counted(self, shown: Sequence[str]) -> bool:
         """Return whether a page counts.
 
         Args:
@@ -94,7 +94,7 @@ class Study:
         return not set(shown) & set(self.training)
 
 
-def ordered(clips: Sequence[Clip], raters: int, seed: int = 0, pairs: bool = False) -> Study:
+def build_study(clips: Sequence[Clip], raters: int, seed: int = 0, pairs: bool = False) -> Study:
     """Build the study of some clips.
 
     It is the same for the same clips and seed, and the first raters' orders do not depend on the number of raters.
@@ -111,21 +111,21 @@ def ordered(clips: Sequence[Clip], raters: int, seed: int = 0, pairs: bool = Fal
             each
             clip once, and enough clips for so many different orders.
     """
-    _check(clips)
-    named = _named(clips, seed)
-    mark = hex_digest(repr((seed, pairs, [(c.file, c.system, c.scenario) for c in named])), digits=8)
-    taken: set[tuple] = set()
+    _check_clips(clips)
+    named_clips = _name_clips(clips, seed)
+    study_id = hex_digest(repr((seed, pairs, [(c.file, c.system, c.scenario) for c in named_clips])), digits=8)
+    used: set[tuple] = set()
     orders = {}
     for number in range(raters):
-        for attempt in range(_TRIES):
-            order = _order(named, np.random.default_rng([seed, number, attempt]), pairs)
-            if order not in taken:
+        for attempt in range(_MAX_TRIES):
+            order = _build_order(named_clips, np.random.default_rng([seed, number, attempt]), pairs)
+            if order not in used:
                 break
         else:
             raise InputError("raters", str(raters), "at most one per order", "add clips or reduce the raters")
-        taken.add(order)
+        used.add(order)
         orders[f"R{number + 1:02d}"] = order
-    return Study(id=mark, seed=seed, pairs=pairs, clips=named, orders=orders)
+    return Study(id=study_id, seed=seed, pairs=pairs, clips=named_clips, orders=orders)
 
 
 def read_clips(path: Path) -> tuple[Clip, ...]:
@@ -172,24 +172,24 @@ def read_study(folder: Path) -> Study:
         InputError: if study.json is missing or invalid.
     """
     path = Path(folder) / STUDY_FILE
-    text = utf8(path, "a study.json, as 'beyond-mocap study order' writes it", _LARGEST)
+    text = read_utf8(path, "a study.json, as 'beyond-mocap study order' writes it", _MAX_BYTES)
     try:
-        told = json.loads(text)
-        json.dumps(told, ensure_ascii=False).encode("utf-8")  # lone surrogates can be read but not written
-        clips = tuple(Clip(*(str(row[key]) for key in ("file", "system", "scenario", "name"))) for row in told["clips"])
+        data = json.loads(text)
+        json.dumps(data, ensure_ascii=False).encode("utf-8")  # lone surrogates can be read but not written
+        clips = tuple(Clip(*(str(row[key]) for key in ("file", "system", "scenario", "name"))) for row in data["clips"])
         names = {clip.name for clip in clips}
-        orders = {str(rater): tuple(_shown(row, names) for row in rows) for rater, rows in told["orders"].items()}
-        if told["version"] != VERSION or not isinstance(told["pairs"], bool) or len(names) != len(clips):
+        orders = {str(rater): tuple(_parse_page(row, names) for row in rows) for rater, rows in data["orders"].items()}
+        if data["version"] != VERSION or not isinstance(data["pairs"], bool) or len(names) != len(clips):
             raise ValueError("another version")
-        if odd := next((name for name in (*names, *orders) if not _NAME.fullmatch(name)), None):
-            raise ValueError(f"{odd!r} is not a valid name")
-        return Study(id=str(told["study"]), seed=int(told["seed"]), pairs=told["pairs"], clips=clips, orders=orders)
+        if invalid := next((name for name in (*names, *orders) if not _NAME.fullmatch(name)), None):
+            raise ValueError(f"{invalid!r} is not a valid name")
+        return Study(id=str(data["study"]), seed=int(data["seed"]), pairs=data["pairs"], clips=clips, orders=orders)
     except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError) as error:
         found = f"not a study ({type(error).__name__}: {error})"
         raise InputError(path, found, "a file written by 'study order'", "create the study again") from None
 
 
-def _order(clips: Sequence[Clip], rng: np.random.Generator, pairs: bool) -> tuple[tuple[str, ...], ...]:
+def _build_order(clips: Sequence[Clip], rng: np.random.Generator, pairs: bool) -> tuple[tuple[str, ...], ...]:
     """Build one rater's random order."""
     first = [clip.name for clip in clips if clip.system == TRAINING]
     first = [first[place] for place in rng.permutation(len(first))]
@@ -201,18 +201,18 @@ def _order(clips: Sequence[Clip], rng: np.random.Generator, pairs: bool) -> tupl
     return (tuple(first), *((left.name, right.name) for left, right in shown))
 
 
-def _named(clips: Sequence[Clip], seed: int) -> tuple[Clip, ...]:
+def _name_clips(clips: Sequence[Clip], seed: int) -> tuple[Clip, ...]:
     """Give the clips neutral names, which depend only on the seed and the number of clips."""
     rng, names = np.random.default_rng([seed, len(clips)]), {}
     while len(names) < len(clips):
-        names["".join(_LETTERS[letter] for letter in rng.integers(0, len(_LETTERS), _LONG))] = None
+        names["".join(_LETTERS[letter] for letter in rng.integers(0, len(_LETTERS), _NAME_LENGTH))] = None
     return tuple(Clip(clip.file, clip.system, clip.scenario, name) for clip, name in zip(clips, names))
 
 
-def _check(clips: Sequence[Clip]) -> None:
+def _check_clips(clips: Sequence[Clip]) -> None:
     """Check the clips of a study, see `build_study`."""
-    if len(clips) > MOST_CLIPS:
-        raise InputError("clips", str(len(clips)), f"{MOST_CLIPS} at most", "remove some")
+    if len(clips) > MAX_CLIPS:
+        raise InputError("clips", str(len(clips)), f"{MAX_CLIPS} at most", "remove some")
     training = [clip for clip in clips if clip.system == TRAINING]
     if len(training) != 2:
         found = f"{len(training)} clips of the system {TRAINING!r}"
@@ -221,17 +221,17 @@ def _check(clips: Sequence[Clip]) -> None:
     systems = list(dict.fromkeys(clip.system for clip in real))
     if len(systems) < 2:
         raise InputError("clips", f"{len(systems)} systems", "two or more to compare", "add clips of another system")
-    have = [(clip.system, clip.scenario) for clip in real]
+    pairs = [(clip.system, clip.scenario) for clip in real]
     for system, scenario in itertools.product(systems, dict.fromkeys(clip.scenario for clip in real)):
-        if (count := have.count((system, scenario))) != 1:
+        if (count := pairs.count((system, scenario))) != 1:
             found = f"{count} clips of scenario {scenario!r} by {system!r}"
             raise InputError("clips", found, "one of each scenario by each system", "add or remove rows")
     files = [clip.file for clip in clips]
-    if twice := next((file for file in files if files.count(file) > 1), None):
-        raise InputError("clips", f"{twice} is listed twice", "each file once", "remove one of them")
+    if repeated := next((file for file in files if files.count(file) > 1), None):
+        raise InputError("clips", f"{repeated} is listed twice", "each file once", "remove one of them")
 
 
-def _shown(row, names: set[str]) -> tuple[str, ...]:
+def _parse_page(row, names: set[str]) -> tuple[str, ...]:
     """Check one page of an order: one or two known names."""
     shown = tuple(map(str, row))
     if isinstance(row, (str, Mapping)) or not 1 <= len(shown) <= 2 or not set(shown) <= names:

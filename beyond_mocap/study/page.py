@@ -22,11 +22,11 @@ from ..evaluation.html_page import (
     build_section,
     build_table,
     build_title,
-    element,
-    fragment,
+    build_element,
+    join_html,
 )
 from ..evaluation.plots import create_canvas, render_png, require_matplotlib
-from ..evaluation.report import rounded
+from ..evaluation.report import round_values
 from .analysis import ALPHA, Analysis, Finding, Shares
 from .form import BACKGROUND, SCALE
 
@@ -39,7 +39,7 @@ COLOURS = ("#b5482a", "#e3a587", "#d9d9d9", "#8fb8de", "#2563a8")
 _NAME: dict[str, Any] = {"fontsize": 9, "parse_math": False}  # names may contain dollar signs
 
 
-def study_report(found: Analysis) -> dict:
+def build_study_report(analysis: Analysis) -> dict:
     """Build the analysis as plain values for JSON.
 
     Args:
@@ -47,22 +47,22 @@ def study_report(found: Analysis) -> dict:
     Returns:
         The report; None where a value is unknown.
     """
-    said = found.answers.background.values()
-    background = {key: dict(Counter(one[key] for one in said if key in one)) for key in (q.key for q in BACKGROUND)}
-    return rounded({
-        "version": 1, "study": found.study.id, "pairs": found.study.pairs, "raters": list(found.answers.raters),
-        "missing": found.answers.missing, "background": background,
-        "systems": [_shares(row) for row in found.by_system],
-        "scenarios": [{"scenario": title, "systems": list(map(_shares, rows))} for title, rows in found.by_scenario],
+    answers = analysis.answers.background.values()
+    background = {key: dict(Counter(one[key] for one in answers if key in one)) for key in (q.key for q in BACKGROUND)}
+    return round_values({
+        "version": 1, "study": analysis.study.id, "pairs": analysis.study.pairs, "raters": list(analysis.answers.raters),
+        "missing": analysis.answers.missing, "background": background,
+        "systems": [_shares_to_dict(row) for row in analysis.by_system],
+        "scenarios": [{"scenario": title, "systems": list(map(_shares_to_dict, rows))} for title, rows in analysis.by_scenario],
         "findings": [
             {**{key: value for key, value in vars(one).items() if key != "differences"}, "raters": len(one.differences),
-             "differences": one.differences.tolist(), "better": one.better} for one in found.findings
+             "differences": one.differences.tolist(), "better": one.better} for one in analysis.findings
         ],
-        "notes": list(found.notes),
+        "notes": list(analysis.notes),
     })  # fmt: skip
 
 
-def study_page(found: Analysis) -> str:
+def build_study_page(analysis: Analysis) -> str:
     """Build the analysis as an HTML page.
 
     Args:
@@ -73,14 +73,14 @@ def study_page(found: Analysis) -> str:
         InputError: if matplotlib is not installed.
     """
     require_matplotlib()
-    unit = "choices: 1 is always the first, -1 always the second" if found.study.pairs else "points of the scale"
-    drawn = differences(found.findings, f"each rater's mean difference, {unit}")
+    unit = "choices: 1 is always the first, -1 always the second" if analysis.study.pairs else "points of the scale"
+    picture = draw_differences(analysis.findings, f"each rater's mean difference, {unit}")
     return build_page(
-        f"Study {found.study.id}", element("h1", f"How natural it looks: study {found.study.id}"),
-        *(element("p", note) for note in found.notes),
-        build_section("Is it better?", *(_sentence(one, found.study.pairs) for one in found.findings),
-                      _findings(found), build_image(drawn, "raters' differences")),
-        *(_systems(found) if found.by_system else ()), build_section("Who answered", *_background(found)),
+        f"Study {analysis.study.id}", build_element("h1", f"How natural it looks: study {analysis.study.id}"),
+        *(build_element("p", note) for note in analysis.notes),
+        build_section("Is it better?", *(_describe_finding(one, analysis.study.pairs) for one in analysis.findings),
+                      _build_findings(analysis), build_image(picture, "raters' differences")),
+        *(_build_systems(analysis) if analysis.by_system else ()), build_section("Who answered", *_build_background(analysis)),
     )  # fmt: skip
 
 
@@ -97,18 +97,18 @@ def place_bar(counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return left - (share[:2].sum() + share[2] / 2.0), share
 
 
-def _systems(found: Analysis) -> tuple[Html, Html]:
-    pictures = (build_image(diverging([("", found.by_system)]), "ratings by system"),
-                build_image(diverging(found.by_scenario), "ratings by scenario"))  # fmt: skip
+def _build_systems(analysis: Analysis) -> tuple[Html, Html]:
+    pictures = (build_image(draw_ratings([("", analysis.by_system)]), "ratings by system"),
+                build_image(draw_ratings(analysis.by_scenario), "ratings by scenario"))  # fmt: skip
     head = ("system", *map(build_title, (*SCALE, "mean", "sd")))
     rows = [
         build_row(row.name, *map(build_number_cell, row.counts), *(build_number_cell(x, 2) for x in (row.mean, row.sd)))
-        for row in found.by_system
+        for row in analysis.by_system
     ]
     return build_section("By system", pictures[0], build_table(head, rows)), build_section("By scenario", pictures[1])
 
 
-def p_text(p: float) -> str:
+def format_p(p: float) -> str:
     """Format a p value: "p = 0.0391", "p < 0.0001", "p is unknown".
 
     Args:
@@ -121,50 +121,50 @@ def p_text(p: float) -> str:
     return "p < 0.0001" if p < 1e-4 else f"p = {p:.4f}"
 
 
-def _sentence(one: Finding, pairs: bool) -> Html:
-    said = f"{one.new} looks more natural than {one.old}"
-    if not math.isfinite(one.p):
-        return element("p", f"Whether {said} cannot be tested: too few raters, or no differences.")
+def _describe_finding(finding: Finding, pairs: bool) -> Html:
+    claim = f"{finding.new} looks more natural than {finding.old}"
+    if not math.isfinite(finding.p):
+        return build_element("p", f"Whether {claim} cannot be tested: too few raters, or no differences.")
     unit = "" if pairs else " points"
-    told = (f"{one.mean:+.2f}{unit} (95 %: {one.low:+.2f} to {one.high:+.2f}), t({one.degrees}) = {one.t:.2f}, "
-            f"one-sided {p_text(one.holm_p)}")  # fmt: skip
-    if one.better:
-        return element("p", element("b", said, class_="met"), f": {told}.")
-    return element("p", f"Not significant that {said}: {told}.")
+    figures = (f"{finding.mean:+.2f}{unit} (95 %: {finding.low:+.2f} to {finding.high:+.2f}), t({finding.degrees}) = {finding.t:.2f}, "
+            f"one-sided {format_p(finding.holm_p)}")  # fmt: skip
+    if finding.better:
+        return build_element("p", build_element("b", claim, class_="met"), f": {figures}.")
+    return build_element("p", f"Not significant that {claim}: {figures}.")
 
 
-def _findings(found: Analysis) -> Html:
+def _build_findings(analysis: Analysis) -> Html:
     rows = [
         build_row(f"{one.new} over {one.old}", build_number_cell(len(one.differences)),
-                  *(_cell(getattr(one, key), digits) for key, _, digits in _COLUMNS)) for one in found.findings
+                  *(_build_cell(getattr(one, key), digits) for key, _, digits in _COLUMNS)) for one in analysis.findings
     ]  # fmt: skip
-    told = (f"Difference: mean over raters with its 95 % interval. p: one-sided paired t-test by rater; Holm: adjusted "
+    legend = (f"Difference: mean over raters with its 95 % interval. p: one-sided paired t-test by rater; Holm: adjusted "
             f"for all hypotheses, at {ALPHA:g}. Wilcoxon: the same by ranks. Pooled: all answers as if each had a "
             "rater of its own (Faustino §5.1.2). d: Cohen's d of raters' differences. delta: Cliff's.")  # fmt: skip
     head = ("hypothesis", build_title("raters"), *(build_title(title) for _, title, _ in _COLUMNS))
-    return fragment(build_table(head, rows), element("p", told, class_="quiet"))
+    return join_html(build_table(head, rows), build_element("p", legend, class_="quiet"))
 
 
-def _background(found: Analysis) -> list[Html]:
+def _build_background(analysis: Analysis) -> list[Html]:
     parts = []
     for question in BACKGROUND:
-        said = Counter(answers.get(question.key, "") for answers in found.answers.background.values())
-        rows = [(text, said[key]) for key, text in question.choices] + [("no answer", said[""])]
+        counts = Counter(answers.get(question.key, "") for answers in analysis.answers.background.values())
+        rows = [(text, counts[key]) for key, text in question.choices] + [("no answer", counts[""])]
         cells = [build_row(text, build_number_cell(count)) for text, count in rows if count]
-        parts += [element("p", question.text), build_table((), cells)]
+        parts += [build_element("p", question.text), build_table((), cells)]
     return parts
 
 
-def _shares(row: Shares) -> dict:
+def _shares_to_dict(row: Shares) -> dict:
     return {**vars(row), "counts": row.counts.tolist()}
 
 
-def _cell(value: float, digits: int) -> Html:
+def _build_cell(value: float, digits: int) -> Html:
     """Build a number cell; values with four digits are p values and show "< 0.0001" below that."""
-    return element("td", "< 0.0001", class_="n") if digits == 4 and value < 1e-4 else build_number_cell(value, digits)
+    return build_element("td", "< 0.0001", class_="n") if digits == 4 and value < 1e-4 else build_number_cell(value, digits)
 
 
-def diverging(groups: Sequence[tuple[str, Sequence[Shares]]]) -> bytes:
+def draw_ratings(groups: Sequence[tuple[str, Sequence[Shares]]]) -> bytes:
     """Draw ratings as diverging stacked bars.
 
     Args:
@@ -180,7 +180,7 @@ def diverging(groups: Sequence[tuple[str, Sequence[Shares]]]) -> bytes:
             ax.text(0.0, y, title, transform=ax.get_yaxis_transform(), weight="bold", va="center", **_NAME)
             y += 0.8
         for row in rows:
-            _bar(ax, y, row.counts)
+            _draw_bar(ax, y, row.counts)
             ticks.append(y)
             names.append(f"{row.name} ({int(row.counts.sum())})")
             y += 1.0
@@ -191,11 +191,11 @@ def diverging(groups: Sequence[tuple[str, Sequence[Shares]]]) -> bytes:
     ax.set_xticks(range(-100, 101, 25), [f"{abs(at)} %" for at in range(-100, 101, 25)])
     ax.axvline(0.0, color="#333333", lw=0.8)
     handles = [ax.barh([-9], [0.0], color=colour, label=text) for colour, text in zip(COLOURS, SCALE)]
-    ax.legend(handles=handles, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=5, fontsize=8, frameon=False)
+    ax.choose_clip_colours(handles=handles, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=5, fontsize=8, frameon=False)
     return render_png(figure)
 
 
-def differences(findings: Sequence[Finding], unit: str) -> bytes:
+def draw_differences(findings: Sequence[Finding], unit: str) -> bytes:
     """Draw each rater's difference as a dot, and the mean with its 95 % interval.
 
     Args:
@@ -217,7 +217,7 @@ def differences(findings: Sequence[Finding], unit: str) -> bytes:
     return render_png(figure)
 
 
-def _bar(ax, y: float, counts: np.ndarray) -> None:
+def _draw_bar(ax, y: float, counts: np.ndarray) -> None:
     for left, share, colour, count in zip(*place_bar(counts), COLOURS, counts):
         ax.barh([y], [share], left=left, color=colour, height=0.72)
         if share >= 4.0:

@@ -17,22 +17,22 @@ from ..motion.track.ball_path import BallPath
 from .plan import Plan
 from .take import Take
 
-_EVEN = 1e-9  # m, rounding in the height of a ball on the ground
+_ROUNDING = 1e-9  # m, rounding in the height of a ball on the ground
 
 
-def taken_in_library_size(take: Take, size: float) -> Take:
+def to_library_size(take: Take, size: float) -> Take:
     """Convert a take back to the library's size, without its pins and with the ball as it was met."""
     motion, contacts = take.unpinned or (take.motion, take.contacts)
-    ball = take.met_ball or take.ball
+    ball = take.contact_ball or take.ball
     take = replace(
-        take, motion=motion, contacts=contacts, ball=ball, pins=(), unpinned=None, met_ball=None, dribbled=()
+        take, motion=motion, contacts=contacts, ball=ball, pins=(), unpinned=None, contact_ball=None, dribble_touches=()
     )
     if size == 1.0:
         return take
-    return _scaled(take, 1.0 / size, take.plan, lambda ball: ball / size)
+    return _scale_take(take, 1.0 / size, take.plan, lambda ball: ball / size)
 
 
-def in_own_size(take: Take, size: float, plan: Plan, before: Take | None = None) -> Take:
+def to_player_size(take: Take, size: float, plan: Plan, before: Take | None = None) -> Take:
     """Scale a take from the library's size to the player's.
 
     Args:
@@ -43,7 +43,7 @@ def in_own_size(take: Take, size: float, plan: Plan, before: Take | None = None)
     """
     if size == 1.0:
         return replace(take, plan=plan)
-    grown = _scaled(take, size, plan, lambda ball: real_ball(ball, size))
+    grown = _scale_take(take, size, plan, lambda ball: scale_ball(ball, size))
     if before is None or len(before.motion) != len(take.motion):
         return grown
     old, _ = before.unpinned or (before.motion, before.contacts)
@@ -55,17 +55,17 @@ def in_own_size(take: Take, size: float, plan: Plan, before: Take | None = None)
     return replace(grown, motion=motion)
 
 
-def real_ball(ball: np.ndarray, size: float) -> np.ndarray:
+def scale_ball(ball: np.ndarray, size: float) -> np.ndarray:
     """Scale ball positions (..., 3) m from the library's size; a ball on the ground rests on its own radius."""
     out = ball * size
-    out[..., 2] = np.where(ball[..., 2] <= BALL_RADIUS + _EVEN, BALL_RADIUS, np.maximum(out[..., 2], BALL_RADIUS))
+    out[..., 2] = np.where(ball[..., 2] <= BALL_RADIUS + _ROUNDING, BALL_RADIUS, np.maximum(out[..., 2], BALL_RADIUS))
     return out
 
 
-def _scaled(take: Take, size: float, plan: Plan, ball_scaled) -> Take:
+def _scale_take(take: Take, size: float, plan: Plan, ball_scaled) -> Take:
     """Scale motion, ball and measures in metres."""
     motion, ball = take.motion, take.ball
-    motion = Motion(motion.skeleton.scaled(size), motion.root_positions * size, motion.rotations, motion.fps)
+    motion = Motion(motion.skeleton.scale(size), motion.root_positions * size, motion.rotations, motion.fps)
     ball = None if ball is None else BallPath(ball.times, ball_scaled(ball.positions), ball.measured)
     moved = [None if values is None else values * size for values in (take.correction, take.ik_miss)]
     return replace(take, motion=motion, ball=ball, correction=moved[0], ik_miss=moved[1], plan=plan)

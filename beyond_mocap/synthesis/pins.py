@@ -31,21 +31,21 @@ def read_pins(path: str | os.PathLike) -> tuple[Pin, ...]:
         missing = [name for name in COLUMNS[:-1] if name not in (reader.fieldnames or ())]
         if missing:
             raise InputError(f"{path}:1", f"no column {', '.join(missing)}", f"a header with {','.join(COLUMNS)}")
-        return tuple(_pin(row, f"{path}:{reader.line_num}") for row in reader)
+        return tuple(_build_pin(row, f"{path}:{reader.line_num}") for row in reader)
     except csv.Error as error:
         raise InputError(f"{path}:{reader.line_num}", str(error), "comma-separated values") from None
 
 
-def _pin(row: dict, place: str) -> Pin:
+def _build_pin(row: dict, place: str) -> Pin:
     """Build the pin of a row."""
-    time, x, y, z, hold = (_number(row, name, place) for name in ("time_s", "x_m", "y_m", "z_m", "hold_s"))
+    time, x, y, z, hold = (_parse_number(row, name, place) for name in ("time_s", "x_m", "y_m", "z_m", "hold_s"))
     try:
         return Pin(time, (row["part"] or "").strip().lower(), (x, y, z), hold)
     except InputError as error:
         raise InputError(place, str(error)) from None
 
 
-def _number(row: dict, name: str, place: str) -> float:
+def _parse_number(row: dict, name: str, place: str) -> float:
     """Parse a number of a row; a blank hold is 0."""
     text = (row.get(name) or "").strip()
     try:

@@ -13,18 +13,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..annotation import Timeline
-from ..base.errors import InputError, told_time
-from ..base.settings import defaults, rows_of, setting
+from ..base.errors import InputError, format_seconds
+from ..base.settings import collect_defaults, list_settings, find_setting
 from ..base.settings.setting import LATER, add_fields, check_limits
-from ..base.time_series import interpolate
-from ..motion.skeleton import frozen_array
-from ..motion.track import SampledTrack, Track, sample
+from ..base.time_series import interpolate_columns
+from ..motion.skeleton import freeze_array
+from ..motion.track import SampledTrack, Track, sample_track
 
 PARTS = ("left_hand", "right_hand", "left_foot", "right_foot", "gaze")
 FEET = ("", "left", "right")
-METHODS = setting("synthesis", "method").choice_names
-_DEFAULTS = defaults("synthesis", "player")
-_HEIGHT = setting("player", "height")
+METHODS = find_setting("synthesis", "method").choice_names
+_DEFAULTS = collect_defaults("synthesis", "player")
+_HEIGHT = find_setting("player", "height")
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ class Pin:
 
 
 @dataclass(frozen=True)
-class Touched:
+class PlayerTouch:
     """A player changed the ball's course.
 
     Attributes:
@@ -76,13 +76,13 @@ class Touched:
     """
 
     time: float
-    mine: bool | None
+    is_own: bool | None
     part: str
     kind: str
 
 
 @dataclass(frozen=True, eq=False)
-class SolvedCourse:
+class SolvedTrajectory:
     """The ball's trajectory, solved from its samples.
 
     Attributes:
@@ -95,14 +95,14 @@ class SolvedCourse:
     times: np.ndarray
     ball: np.ndarray
     filled: np.ndarray
-    touches: tuple[Touched, ...] = ()
+    touches: tuple[PlayerTouch, ...] = ()
 
     def __post_init__(self):
-        object.__setattr__(self, "times", frozen_array(self.times))
-        object.__setattr__(self, "ball", frozen_array(self.ball))
-        object.__setattr__(self, "filled", frozen_array(self.filled, bool))
+        object.__setattr__(self, "times", freeze_array(self.times))
+        object.__setattr__(self, "ball", freeze_array(self.ball))
+        object.__setattr__(self, "filled", freeze_array(self.filled, bool))
 
-    def at(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def interpolate(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Interpolate the trajectory.
 
         Args:
@@ -110,13 +110,13 @@ class SolvedCourse:
         Returns:
             The ball (T, 3) m, NaN where it is not known, and whether the feed has filled it in (T,).
         """
-        ball = interpolate(times, self.times, self.ball, outside=np.nan)
+        ball = interpolate_columns(times, self.times, self.ball, fill_value=np.nan)
         near = np.clip(np.searchsorted(self.times, times), 0, len(self.times) - 1)
         return ball, self.filled[near]
 
 
 @dataclass(frozen=True)
-@add_fields(rows_of("synthesis"))
+@add_fields(list_settings("synthesis"))
 class Plan:
     """The request for one player.
 
@@ -167,12 +167,12 @@ class Plan:
     solve_touches: bool = field(default=_DEFAULTS["solve_touches"], metadata=LATER)
     variety: float = field(default=_DEFAULTS["variety"], metadata=LATER)
     lag: float = field(default=_DEFAULTS["lag"], metadata=LATER)
-    solved: SolvedCourse | None = field(default=None, compare=False, repr=False, metadata=LATER)
+    solved: SolvedTrajectory | None = field(default=None, compare=False, repr=False, metadata=LATER)
 
     def __post_init__(self):
         object.__setattr__(self, "pins", tuple(sorted(self.pins, key=lambda pin: (pin.time, pin.part))))
         object.__setattr__(self, "style", tuple(dict.fromkeys(self.style)))
-        check_limits(self, (*rows_of("synthesis"), *rows_of("player")))
+        check_limits(self, (*list_settings("synthesis"), *list_settings("player")))
         if 0.0 < self.omega < 1.0:
             raise InputError("omega", f"{self.omega:g}", "1 or more, or 0 for the default thresholds")
         if self.height and not _HEIGHT.least <= self.height <= _HEIGHT.most:
@@ -187,21 +187,21 @@ class Plan:
         def __getattr__(self, name: str) -> Any:
             """Settings that do not appear above."""
 
-    def sampled(self, fps: float) -> SampledTrack:
+    def sample_track(self, fps: float) -> SampledTrack:
         """Sample the track, with the solved ball (`sample_with_trajectory`), at `fps` frames per second."""
-        return sample_with_course(self.track, self.solved, fps, self.track_window)
+        return sample_with_trajectory(self.track, self.solved, fps, self.track_window)
 
     def _check_pins(self):
         """Raise InputError for two pins of one part at one time."""
         for part in PARTS:
-            mine = [pin for pin in self.pins if pin.part == part]
-            for before, after in zip(mine, mine[1:]):
+            part_pins = [pin for pin in self.pins if pin.part == part]
+            for before, after in zip(part_pins, part_pins[1:]):
                 if after.time <= before.end:
-                    found = f"two pins of {part} at {told_time(after.time)} s"
+                    found = f"two pins of {part} at {format_seconds(after.time)} s"
                     raise InputError("pins", found, "one place at a time", "move one, or shorten the earlier hold")
 
 
-def sample_with_course(track: Track, course: SolvedCourse | None, fps: float, window: float) -> SampledTrack:
+def sample_with_trajectory(track: Track, trajectory: SolvedTrajectory | None, fps: float, window: float) -> SampledTrack:
     """Sample a track with its solved ball.
 
     Where the ball is solved, its solved height is used everywhere, and its solved place where the feed has not measured
@@ -213,10 +213,10 @@ def sample_with_course(track: Track, course: SolvedCourse | None, fps: float, wi
         fps: frames per second.
         window: s, of the window that removes the feed's jitter.
     """
-    sampled = sample(track, fps, window)
-    if course is None:
+    sampled = sample_track(track, fps, window)
+    if trajectory is None:
         return sampled
-    ball, filled = course.at(sampled.times)
+    ball, filled = trajectory.interpolate(sampled.times)
     known = np.isfinite(ball).all(axis=1)
     measured = sampled.ball_measured & ~(known & filled)
     return replace(
@@ -237,25 +237,25 @@ class ResolvedPlan:
         size: how many times as tall as the library's skeleton the player is.
     """
 
-    asked: Plan
+    requested: Plan
     timeline: Timeline
     track: Track
-    course: SolvedCourse | None
+    trajectory: SolvedTrajectory | None
     size: float
 
     @property
     def method(self) -> str:
         """Method of the search, one of `plan.METHODS`."""
-        return self.asked.method
+        return self.requested.method
 
     @property
     def fps(self) -> float:
         """Output frames per second."""
-        return self.asked.fps
+        return self.requested.fps
 
-    def sampled(self, fps: float) -> SampledTrack:
+    def sample_track(self, fps: float) -> SampledTrack:
         """Sample the track, with the solved ball, in the library's size, at `fps` frames per second."""
-        course = self.course
-        if course is not None and self.size != 1.0:
-            course = replace(course, ball=course.ball / self.size)
-        return sample_with_course(self.track, course, fps, self.asked.track_window)
+        trajectory = self.trajectory
+        if trajectory is not None and self.size != 1.0:
+            trajectory = replace(trajectory, ball=trajectory.ball / self.size)
+        return sample_with_trajectory(self.track, trajectory, fps, self.requested.track_window)

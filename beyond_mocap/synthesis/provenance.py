@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from ..annotation import spoken
+from ..annotation import sort_labels
 from ..files.tables import format_csv, parse_column, parse_flags, read_rows
 from ..files.whole import atomic_write
 from ..library.library import Library
-from ..motion.skeleton import frozen_array
-from .search.footage import Shown
+from ..motion.skeleton import freeze_array
+from .search.footage import SourceFrames
 from .take import Take
 
 PROVENANCE_COLUMNS = (
@@ -43,13 +43,13 @@ class Provenance:
 
     def __post_init__(self):
         for name, kind in (("times", float), ("clip_frame", float), ("mirrored", bool), ("contacts", bool)):
-            object.__setattr__(self, name, frozen_array(getattr(self, name), kind))
+            object.__setattr__(self, name, freeze_array(getattr(self, name), kind))
 
     def __len__(self) -> int:
         return len(self.times)
 
 
-def provenance_of(take: Take) -> Provenance:
+def build_provenance(take: Take) -> Provenance:
     """Build the provenance of a take."""
     return Provenance(
         times=take.start_time + np.arange(len(take.motion)) / take.motion.fps,
@@ -70,7 +70,7 @@ def write_provenance(path: str | os.PathLike, take: Take | Provenance) -> None:
         path: the file.
         take: a take or its provenance.
     """
-    table = provenance_of(take) if isinstance(take, Take) else take
+    table = build_provenance(take) if isinstance(take, Take) else take
     columns = zip(
         (f"{time:.6f}" for time in table.times),
         table.clip,
@@ -99,33 +99,33 @@ def read_provenance(path: str | os.PathLike) -> Provenance:
     )
 
 
-def provenance_fields(library: Library, shown: Shown) -> dict[str, Any]:
+def build_provenance_fields(library: Library, frames_shown: SourceFrames) -> dict[str, Any]:
     """Build the fields of a `Take` that say what its frames show: clips, clip, clip_frame, mirrored, words and seams.
 
     Args:
         library: the clips.
         frames_shown: T source frames.
     """
-    sources = sources_shown(library, shown)
+    sources = list_sources(library, frames_shown)
     names = tuple(dict.fromkeys(sources))
     number = {name: i for i, name in enumerate(names)}
     return {
         "clips": names,
         "clip": np.array([number[source] for source in sources]),
-        "clip_frame": shown.clip_frame,
-        "mirrored": np.array([library.clips[clip].mirrored for clip in shown.clip]),
-        "words": words_shown(library, shown),
-        "seams": shown.seams,
+        "clip_frame": frames_shown.clip_frame,
+        "mirrored": np.array([library.clips[clip].mirrored for clip in frames_shown.clip]),
+        "words": list_labels_shown(library, frames_shown),
+        "seams": frames_shown.transitions,
     }
 
 
-def sources_shown(library: Library, shown: Shown) -> tuple[str, ...]:
+def list_sources(library: Library, frames_shown: SourceFrames) -> tuple[str, ...]:
     """List the file, below the library, of every shown frame: a recording, or the synthetic continuation of one."""
-    frames = zip(shown.clip, np.round(shown.clip_frame, 6))
+    frames = zip(frames_shown.clip, np.round(frames_shown.clip_frame, 6))
     return tuple(library.clips[clip].source_at(frame) for clip, frame in frames)
 
 
-def words_shown(library: Library, shown: Shown) -> tuple[tuple[str, ...], ...]:
+def list_labels_shown(library: Library, frames_shown: SourceFrames) -> tuple[tuple[str, ...], ...]:
     """List the labels that every shown frame's clip carries there."""
-    frames = zip(shown.clip, np.round(shown.clip_frame, 6))
-    return tuple(spoken(library.clips[clip].words_at(frame)) for clip, frame in frames)
+    frames = zip(frames_shown.clip, np.round(frames_shown.clip_frame, 6))
+    return tuple(sort_labels(library.clips[clip].words_at(frame)) for clip, frame in frames)

@@ -12,14 +12,14 @@ from __future__ import annotations
 from dataclasses import replace
 
 from ..library.library import Library
-from ..motion.humanoid import stature
+from ..motion.humanoid import estimate_stature
 from ..motion.track import Track
-from .known_touches import solve_touches
-from .plan import Plan, ResolvedPlan, SolvedCourse
+from .known_touches import resolve_touches
+from .plan import Plan, ResolvedPlan, SolvedTrajectory
 
 
 def resolve_plan(
-    plan: Plan, library: Library, *, course: SolvedCourse | None = None, touches_solved: bool = False
+    plan: Plan, library: Library, *, trajectory: SolvedTrajectory | None = None, are_touches_resolved: bool = False
 ) -> ResolvedPlan:
     """Solve the touches and the body size of a plan for a library.
 
@@ -30,14 +30,14 @@ def resolve_plan(
         are_touches_resolved: whether the plan's key moments are at its touches already
             (`resolved_touches.resolve_touches`).
     """
-    known = plan if touches_solved else solve_touches(plan, course)
-    size = plan.height / stature(library.skeleton) if plan.height else 1.0
+    with_touches = plan if are_touches_resolved else resolve_touches(plan, trajectory)
+    size = plan.height / estimate_stature(library.skeleton) if plan.height else 1.0
     return ResolvedPlan(
-        asked=plan, timeline=known.timeline, track=_scaled(known.track, size), course=known.solved, size=size
+        requested=plan, timeline=with_touches.timeline, track=_scale_track(with_touches.track, size), trajectory=with_touches.solved, size=size
     )
 
 
-def _scaled(track: Track, size: float) -> Track:
+def _scale_track(track: Track, size: float) -> Track:
     """Scale a track and its ball to the library's size."""
     if size == 1.0:
         return track

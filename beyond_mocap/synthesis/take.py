@@ -7,10 +7,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..annotation import KeyMoment, Timeline
-from ..annotation.ball_contact import meeting_words
+from ..annotation.ball_contact import choose_contact_labels
 from ..motion.motion import Motion
 from ..motion.track.ball_path import BallPath
-from .plan import Pin, Plan, SolvedCourse
+from .plan import Pin, Plan, SolvedTrajectory
 from .search.edit_list import EditList
 
 
@@ -28,7 +28,7 @@ class KeyResult:
         used_instead: the labels used where the library lacks the requested ones, else None.
     """
 
-    asked: KeyMoment
+    requested: KeyMoment
     frame: float
     clip: str
     clip_frame: float
@@ -37,9 +37,9 @@ class KeyResult:
     used_instead: tuple[str, ...] | None = None
 
     @property
-    def touching(self) -> tuple[str, ...]:
+    def contact_labels(self) -> tuple[str, ...]:
         """Labels that say which part meets the ball (`ball_contact.choose_contact_labels`)."""
-        return meeting_words(self.words, self.asked.words)
+        return choose_contact_labels(self.words, self.requested.words)
 
 
 @dataclass(frozen=True)
@@ -126,8 +126,8 @@ class Take:
     plan: Plan | None = None
     edit: EditList | None = None
     pins: tuple[PinResult, ...] = ()
-    cut_short: bool = False
+    is_cut_short: bool = False
     unpinned: tuple[Motion, np.ndarray] | None = None
-    solved: SolvedCourse | None = None
-    met_ball: BallPath | None = None
-    dribbled: tuple[DribbleTouch, ...] = ()
+    solved: SolvedTrajectory | None = None
+    contact_ball: BallPath | None = None
+    dribble_touches: tuple[DribbleTouch, ...] = ()

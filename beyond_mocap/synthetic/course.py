@@ -13,13 +13,13 @@ import numpy as np
 from ..base.easing import quintic_step
 from ..base.errors import InputError
 from ..base.time_series import hann_smooth
-from ..motion.retargeting.neutral import Neutral
+from ..motion.retargeting.neutral import NeutralStance
 from . import gait_tables as tables
-from .gait_tables import at_speed
+from .gait_tables import interpolate_figure
 
 # the plan extends this many seconds beyond both ends, so that stances which cross them are known; less for a body that
 # runs all the time, that is from this speed in m/s on
-_PAD, _RUNNERS_PAD, _RUNS = 2.5, 1.9, 2.0
+_PAD, _RUNNING_PAD, _RUNNING_SPEED = 2.5, 1.9, 2.0
 # Hz: feet are planned at this rate or more, a multiple of the output's rate
 _PLAN_RATE = 120.0
 
@@ -58,7 +58,7 @@ class GaitStyle:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Course:
+class GaitPlan:
     """A gait planned over N moments, `pad` of them before the first and after the last requested frame.
 
     Attributes:
@@ -76,7 +76,7 @@ class Course:
 
     times: np.ndarray
     speed: np.ndarray
-    gear: np.ndarray
+    adult_speed: np.ndarray
     direction: np.ndarray
     heading: np.ndarray
     path: np.ndarray
@@ -86,14 +86,14 @@ class Course:
     stride: int
 
     @property
-    def asked(self) -> slice:
+    def requested(self) -> slice:
         """The moments that are frames of the result."""
         return slice(self.pad, len(self.times) - self.pad, self.stride)
 
 
-def plan(
-    speed, duration, fps: float, neutral: Neutral, *, phase=0.0, turn_rate=0.0, direction=0.0, style=GaitStyle(), seed=0
-) -> Course:
+def plan_gait(
+    speed, duration, fps: float, neutral: NeutralStance, *, phase=0.0, turn_rate=0.0, direction=0.0, style=GaitStyle(), seed=0
+) -> GaitPlan:
     """Plan a gait.
 
     Args:
@@ -104,31 +104,31 @@ def plan(
     Raises:
         InputError: for speeds below 0 or above 9.5 m/s, or arrays of different lengths.
     """
-    count = _count(speed, duration, fps, turn_rate, direction)
+    count = _count_frames(speed, duration, fps, turn_rate, direction)
     stride = int(np.ceil(_PLAN_RATE / fps))
     rate = fps * stride
-    pad = int(np.ceil((_RUNNERS_PAD if np.min(speed) >= _RUNS else _PAD) * rate))
+    pad = int(np.ceil((_RUNNING_PAD if np.min(speed) >= _RUNNING_SPEED else _PAD) * rate))
     times = (np.arange((count - 1) * stride + 1 + 2 * pad) - pad) / rate
-    speed, turn_rate, direction = (_at(values, times, fps, count) for values in (speed, turn_rate, direction))
+    speed, turn_rate, direction = (_interpolate(values, times, fps, count) for values in (speed, turn_rate, direction))
     if np.any(speed < 0.0) or np.any(speed > tables.FASTEST + 1e-9) or not np.all(np.isfinite(speed)):
         raise InputError("gait", f"speed {np.min(speed):.3g} .. {np.max(speed):.3g} m/s", "0 .. 9.5")
-    heading = _integral(turn_rate, rate, pad)
-    way = heading + direction
-    velocity = speed[:, None] * np.stack([np.cos(way), np.sin(way)], axis=-1)
-    path = np.stack([_integral(velocity[:, axis], rate, pad) for axis in range(2)], axis=-1)
+    heading = _integrate(turn_rate, rate, pad)
+    travel_angle = heading + direction
+    velocity = speed[:, None] * np.stack([np.cos(travel_angle), np.sin(travel_angle)], axis=-1)
+    path = np.stack([_integrate(velocity[:, axis], rate, pad) for axis in range(2)], axis=-1)
     acceleration = np.stack(
         [hann_smooth(np.gradient(velocity[:, axis], 1.0 / rate), int(0.35 * rate)) for axis in (0, 1)], -1
     )
     root_scale = np.sqrt(neutral.leg / tables.LEG)
-    gear = speed / root_scale
-    frequency = stride_frequency(gear, direction, turn_rate * root_scale) / root_scale * style.cadence
-    frequency = frequency * (1.0 + 0.015 * style.life * wander(times, seed, 3.1))
-    strides = phase + _integral(frequency, rate, pad)
-    return Course(times=times, speed=speed, gear=gear, direction=direction, heading=heading, path=path,
+    adult_speed = speed / root_scale
+    frequency = compute_stride_frequency(adult_speed, direction, turn_rate * root_scale) / root_scale * style.cadence
+    frequency = frequency * (1.0 + 0.015 * style.life * compute_wander(times, seed, 3.1))
+    strides = phase + _integrate(frequency, rate, pad)
+    return GaitPlan(times=times, speed=speed, adult_speed=adult_speed, direction=direction, heading=heading, path=path,
                   acceleration=acceleration, phase=strides, pad=pad, stride=stride)
 
 
-def stride_frequency(gear: np.ndarray, direction: np.ndarray, turn_rate: np.ndarray) -> np.ndarray:
+def compute_stride_frequency(adult_speed: np.ndarray, direction: np.ndarray, turn_rate: np.ndarray) -> np.ndarray:
     """Compute the stride frequency of an adult.
 
     It is higher when going backward or sideways, or when turning on the spot.
@@ -140,12 +140,12 @@ def stride_frequency(gear: np.ndarray, direction: np.ndarray, turn_rate: np.ndar
     Returns:
         (T,) strides per second.
     """
-    usual = at_speed("frequency", gear) * (1.0 + 0.22 * np.sin(0.5 * direction) ** 2 + 0.5 * np.sin(direction) ** 2)
-    on_the_spot = 1.0 - quintic_step(gear / 1.8)
-    return np.hypot(usual, on_the_spot * turn_rate / 1.3)
+    walking = interpolate_figure("frequency", adult_speed) * (1.0 + 0.22 * np.sin(0.5 * direction) ** 2 + 0.5 * np.sin(direction) ** 2)
+    on_the_spot = 1.0 - quintic_step(adult_speed / 1.8)
+    return np.hypot(walking, on_the_spot * turn_rate / 1.3)
 
 
-def wander(times: np.ndarray, seed: int, period: float) -> np.ndarray:
+def compute_wander(times: np.ndarray, seed: int, period: float) -> np.ndarray:
     """Compute a slow random wave of roughly unit size: four sines around `period` seconds with seeded phases.
 
     Args:
@@ -160,7 +160,7 @@ def wander(times: np.ndarray, seed: int, period: float) -> np.ndarray:
     return np.sin(2.0 * np.pi * rates * times[:, None] + phases) @ np.array([0.5, 0.45, 0.35, 0.25])
 
 
-def _count(speed, duration, fps, turn_rate, direction) -> int:
+def _count_frames(speed, duration, fps, turn_rate, direction) -> int:
     """Find the number of requested frames; InputError if duration and arrays disagree."""
     lengths = {np.size(v) for v in (speed, turn_rate, direction) if np.ndim(v)}
     if duration is not None:
@@ -170,13 +170,13 @@ def _count(speed, duration, fps, turn_rate, direction) -> int:
     return lengths.pop()
 
 
-def _at(values, times: np.ndarray, fps: float, count: int) -> np.ndarray:
+def _interpolate(values, times: np.ndarray, fps: float, count: int) -> np.ndarray:
     """Interpolate one value or values (count,) of the frames to times (T,) s."""
     values = np.broadcast_to(np.asarray(values, dtype=float), (count,))
     return np.interp(times, np.arange(count) / fps, values)
 
 
-def _integral(values: np.ndarray, rate: float, zero: int) -> np.ndarray:
+def _integrate(values: np.ndarray, rate: float, zero: int) -> np.ndarray:
     """Integrate values (T,) over time by the trapezoidal rule; the result is 0 at index `zero`."""
     total = np.concatenate([[0.0], np.cumsum(0.5 * (values[1:] + values[:-1]))]) / rate
     return total - total[zero]

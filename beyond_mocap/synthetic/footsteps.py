@@ -12,12 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.easing import quintic_step
-from ..base.time_series import interpolate
-from ..motion.retargeting.neutral import Neutral
+from ..base.time_series import interpolate_columns
+from ..motion.retargeting.neutral import NeutralStance
 from . import gait_tables as tables
 
 # rad of pitch beyond which the ball of the foot leaves the ground and the toe tip stays
-_TOE_LIFTS = np.radians(42.0)
+_TOE_LIFT_PITCH = np.radians(42.0)
 # m for an adult: a step this long is a full one; shorter ones roll and lift less
 _FULL_STEP = 0.55
 
@@ -44,18 +44,18 @@ class Footsteps:
     speed: np.ndarray
     direction: np.ndarray
 
-    def current(self, times: np.ndarray) -> np.ndarray:
+    def find_stance(self, times: np.ndarray) -> np.ndarray:
         """Find the stance at each of `times` (T,): the current one, or the last one before it."""
         return np.clip(np.searchsorted(self.on, times, side="right") - 1, 0, len(self.on) - 2)
 
-    def standing(self, times: np.ndarray) -> np.ndarray:
+    def is_in_contact(self, times: np.ndarray) -> np.ndarray:
         """Whether the foot is in contact with the ground at `times`: (T,) bool."""
-        return times <= self.off[self.current(times)]
+        return times <= self.off[self.find_stance(times)]
 
-    def step_size(self, scale: float) -> np.ndarray:
+    def compute_step_size(self, scale: float) -> np.ndarray:
         """Compute the share (K-1,) of a full step between each stance and the next; turning on the spot counts too."""
-        moved = np.linalg.norm(np.diff(self.place, axis=0), axis=1) / scale
-        return quintic_step((moved + 0.3 * np.abs(np.diff(self.yaw))) / _FULL_STEP)
+        distances = np.linalg.norm(np.diff(self.place, axis=0), axis=1) / scale
+        return quintic_step((distances + 0.3 * np.abs(np.diff(self.yaw))) / _FULL_STEP)
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +75,7 @@ class FootPath:
     bend: np.ndarray
 
 
-def stand(steps: Footsteps, which: np.ndarray, share: np.ndarray, neutral: Neutral) -> FootPath:
+def compute_stance(steps: Footsteps, which: np.ndarray, share: np.ndarray, neutral: NeutralStance) -> FootPath:
     """Compute the foot within its stances: it rolls over heel, ball and toe tip, none of which slides.
 
     Args:
@@ -86,13 +86,13 @@ def stand(steps: Footsteps, which: np.ndarray, share: np.ndarray, neutral: Neutr
     Returns:
         The foot at these T moments.
     """
-    sizes = steps.step_size(neutral.leg / tables.LEG)
+    sizes = steps.compute_step_size(neutral.leg / tables.LEG)
     before = np.concatenate([sizes[:1], sizes])[which]
     after = np.concatenate([sizes, sizes[-1:]])[which]
     amount = before + (after - before) * quintic_step((share - 0.2) / 0.3)
-    pitch = amount * _directed_pitch(share, steps.speed[which], steps.direction[which])
-    tip_pitch = 0.6 * np.maximum(pitch - _TOE_LIFTS, 0.0)
-    forward, up = _roll(pitch, tip_pitch, neutral, steps.side)
+    pitch = amount * _compute_pitch(share, steps.speed[which], steps.direction[which])
+    tip_pitch = 0.6 * np.maximum(pitch - _TOE_LIFT_PITCH, 0.0)
+    forward, up = _roll_foot(pitch, tip_pitch, neutral, steps.side)
     yaw = steps.yaw[which]
     ankle = np.stack(
         [steps.place[which, 0] + forward * np.cos(yaw), steps.place[which, 1] + forward * np.sin(yaw), up], axis=-1
@@ -100,15 +100,15 @@ def stand(steps: Footsteps, which: np.ndarray, share: np.ndarray, neutral: Neutr
     return FootPath(ankle, pitch, yaw, np.maximum(pitch, 0.0) - tip_pitch)
 
 
-def _directed_pitch(share: np.ndarray, speed: np.ndarray, direction: np.ndarray) -> np.ndarray:
+def _compute_pitch(share: np.ndarray, speed: np.ndarray, direction: np.ndarray) -> np.ndarray:
     """Compute the pitch (T,) rad of the sole for a direction of travel.
 
     Forward the foot rolls from heel to toe, backward the other way round and less (source T); sideways the heel hardly
     leaves the ground.
     """
     ahead, back = np.maximum(np.cos(direction), 0.0) ** 2, np.maximum(-np.cos(direction), 0.0) ** 2
-    forward_roll = tables.stance_pitch(share, speed)
-    backward_roll = tables.stance_pitch(1.0 - share, speed)
+    forward_roll = tables.interpolate_stance_pitch(share, speed)
+    backward_roll = tables.interpolate_stance_pitch(1.0 - share, speed)
     return (
         ahead * forward_roll
         + 0.5 * back * backward_roll
@@ -116,7 +116,7 @@ def _directed_pitch(share: np.ndarray, speed: np.ndarray, direction: np.ndarray)
     )
 
 
-def _roll(pitch: np.ndarray, tip_pitch: np.ndarray, neutral: Neutral, side: int) -> tuple[np.ndarray, np.ndarray]:
+def _roll_foot(pitch: np.ndarray, tip_pitch: np.ndarray, neutral: NeutralStance, side: int) -> tuple[np.ndarray, np.ndarray]:
     """Compute how far the ankle is ahead of its flat place and above the ground, (T,) m each, when the sole pitches."""
     ball_ahead, drop = neutral.ball[side, 0], -neutral.ball[side, 2]
     ball_up = neutral.ankle_height - drop
@@ -132,8 +132,8 @@ def _roll(pitch: np.ndarray, tip_pitch: np.ndarray, neutral: Neutral, side: int)
     return np.where(pitch >= 0.0, ahead, heel_ahead), np.where(pitch >= 0.0, up, heel_up)
 
 
-def travel(
-    steps: Footsteps, times: np.ndarray, hip: np.ndarray, heading: np.ndarray, neutral: Neutral,
+def compute_foot_path(
+    steps: Footsteps, times: np.ndarray, hip: np.ndarray, heading: np.ndarray, neutral: NeutralStance,
     thigh_shank: tuple[float, float],
 ) -> FootPath:
     """Compute the whole movement of one foot.
@@ -148,78 +148,78 @@ def travel(
     Returns:
         The foot at these T moments.
     """
-    which = steps.current(times)
+    which = steps.find_stance(times)
     share = np.clip((times - steps.on[which]) / (steps.off[which] - steps.on[which]), 0.0, 1.0)
-    standing = stand(steps, which, share, neutral)
-    air = times > steps.off[which]
-    if not np.any(air):
-        return standing
-    flying = _swing(steps, which[air], times, air=air, hip=hip, heading=heading, neutral=neutral,
+    stance = compute_stance(steps, which, share, neutral)
+    is_in_air = times > steps.off[which]
+    if not np.any(is_in_air):
+        return stance
+    swing = _compute_swing(steps, which[is_in_air], times, air=is_in_air, hip=hip, heading=heading, neutral=neutral,
                     thigh_shank=thigh_shank)
     out = {}
     for name in ("ankle", "pitch", "yaw", "bend"):
-        out[name] = getattr(standing, name).copy()
-        out[name][air] = getattr(flying, name)
+        out[name] = getattr(stance, name).copy()
+        out[name][is_in_air] = getattr(swing, name)
     return FootPath(**out)
 
 
-def _swing(steps, which, times, air, hip, heading, neutral: Neutral, thigh_shank) -> FootPath:
+def _compute_swing(steps, which, times, air, hip, heading, neutral: NeutralStance, thigh_shank) -> FootPath:
     """Compute the foot in the air at `times[air]`, after stances `which`."""
     scale = neutral.leg / tables.LEG
     begin, end = steps.off[which], steps.on[which + 1]
     length = end - begin
     share = (times[air] - begin) / length
-    leave, land = (stand(steps, w, np.full(len(w), u), neutral) for w, u in ((which, 1.0), (which + 1, 0.0)))
-    leave_speed, land_speed = _edge_speeds(steps, which, neutral)
+    leave, land = (compute_stance(steps, w, np.full(len(w), u), neutral) for w, u in ((which, 1.0), (which + 1, 0.0)))
+    leave_speed, land_speed = _compute_edge_speeds(steps, which, neutral)
     speed = 0.5 * (steps.speed[which] + steps.speed[which + 1])
     direction = steps.direction[which + 1]
 
-    def free(at, share_at):
+    def published_swing(at, share_at):
         """Ankle (N, 3) and pitch (N,) of the published swing, hung on the hip at seconds `at`."""
-        hip_at = interpolate(at, times, hip)
-        turned = np.interp(at, times, heading)
-        forward, up, pitch = _leg_swing(share_at, speed, direction, thigh_shank)
-        across = np.stack([forward * np.cos(turned), forward * np.sin(turned), up], axis=-1)
+        hip_at = interpolate_columns(at, times, hip)
+        heading_at = np.interp(at, times, heading)
+        forward, up, pitch = _compute_leg_swing(share_at, speed, direction, thigh_shank)
+        across = np.stack([forward * np.cos(heading_at), forward * np.sin(heading_at), up], axis=-1)
         return np.concatenate([hip_at + across, pitch[:, None]], axis=-1)
 
-    now = free(times[air], share)
+    now = published_swing(times[air], share)
     step = 0.01
-    at_leave, at_land = free(begin, np.zeros_like(share)), free(end, np.ones_like(share))
+    at_leave, at_land = published_swing(begin, np.zeros_like(share)), published_swing(end, np.ones_like(share))
     # velocities of the published swing at its ends, by one-sided differences
-    free_leave = (free(begin + step * length, np.full_like(share, step)) - at_leave) / (step * length)[:, None]
-    free_land = (at_land - free(end - step * length, np.full_like(share, 1 - step))) / (step * length)[:, None]
+    free_leave = (published_swing(begin + step * length, np.full_like(share, step)) - at_leave) / (step * length)[:, None]
+    free_land = (at_land - published_swing(end - step * length, np.full_like(share, 1 - step))) / (step * length)[:, None]
     wanted_leave = np.concatenate([leave.ankle, leave.pitch[:, None]], axis=-1)
     wanted_land = np.concatenate([land.ankle, land.pitch[:, None]], axis=-1)
-    full = now + _bridge(share, length, wanted_leave - at_leave, offset1=wanted_land - at_land,
+    full = now + _bridge_ends(share, length, wanted_leave - at_leave, offset1=wanted_land - at_land,
                          speed0=leave_speed - free_leave, speed1=land_speed - free_land)
-    size = steps.step_size(scale)[which]
-    small = _small_step(share, wanted_leave, wanted_land, size * 0.05 * scale)
+    size = steps.compute_step_size(scale)[which]
+    small = _compute_small_step(share, wanted_leave, wanted_land, size * 0.05 * scale)
     mixed = full * size[:, None] + small * (1.0 - size[:, None])
     yaw = leave.yaw + (land.yaw - leave.yaw) * quintic_step(share)
     ankle = mixed[:, :3].copy()
-    ankle[:, 2] += _clearance(ankle[:, 2], mixed[:, 3], share, size, neutral)
+    ankle[:, 2] += _compute_clearance(ankle[:, 2], mixed[:, 3], share, size, neutral)
     return FootPath(ankle, mixed[:, 3], yaw, leave.bend * (1.0 - quintic_step(share / 0.3)))
 
 
-def _edge_speeds(steps: Footsteps, which: np.ndarray, neutral: Neutral) -> tuple[np.ndarray, np.ndarray]:
+def _compute_edge_speeds(steps: Footsteps, which: np.ndarray, neutral: NeutralStance) -> tuple[np.ndarray, np.ndarray]:
     """Compute the velocities (N, 4) of ankle and pitch at the end of stances `which` and at the start of the next ones.
     """
     edges = []
     for stance, inner, edge in ((which, 0.98, 1.0), (which + 1, 0.02, 0.0)):
-        a, b = (stand(steps, stance, np.full(len(stance), u), neutral) for u in (inner, edge))
+        a, b = (compute_stance(steps, stance, np.full(len(stance), u), neutral) for u in (inner, edge))
         span = (edge - inner) * (steps.off[stance] - steps.on[stance])
         change = np.concatenate([b.ankle - a.ankle, (b.pitch - a.pitch)[:, None]], axis=-1)
         edges.append(change / span[:, None])
     return edges[0], edges[1]
 
 
-def _leg_swing(share, speed, direction, thigh_shank) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _compute_leg_swing(share, speed, direction, thigh_shank) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Compute the ankle ahead of and above the hip joint, (N,) m each, and the sole's pitch (N,) rad, from published
     angles.
     """
     parts = []
     for at in (share, 1.0 - share):
-        thigh, knee, ankle = np.moveaxis(tables.swing_angles(at, speed), -1, 0)
+        thigh, knee, ankle = np.moveaxis(tables.interpolate_swing(at, speed), -1, 0)
         shank = thigh - knee
         ahead = thigh_shank[0] * np.sin(thigh) + thigh_shank[1] * np.sin(shank)
         up = -thigh_shank[0] * np.cos(thigh) - thigh_shank[1] * np.cos(shank)
@@ -233,7 +233,7 @@ def _leg_swing(share, speed, direction, thigh_shank) -> tuple[np.ndarray, np.nda
     )
 
 
-def _bridge(share, length, offset0, offset1, speed0, speed1) -> np.ndarray:
+def _bridge_ends(share, length, offset0, offset1, speed0, speed1) -> np.ndarray:
     """Compute what to add (N, C) along a swing so that both ends move by the offsets and their speeds change as
     requested.
 
@@ -248,20 +248,20 @@ def _bridge(share, length, offset0, offset1, speed0, speed1) -> np.ndarray:
     return out
 
 
-def _small_step(share, leave, land, lift) -> np.ndarray:
+def _compute_small_step(share, leave, land, lift) -> np.ndarray:
     """Compute a foot (N, 4) that moves straight to its next place, slightly lifted."""
     out = leave + (land - leave) * quintic_step(share)[:, None]
     out[:, 2] += lift * np.sin(np.pi * share) ** 2
     return out
 
 
-def _clearance(ankle_up, pitch, share, size, neutral: Neutral) -> np.ndarray:
+def _compute_clearance(ankle_up, pitch, share, size, neutral: NeutralStance) -> np.ndarray:
     """Compute how much (N,) m to lift the swinging foot so that toes and heel pass above the ground."""
-    wanted = 0.014 * size * np.sin(np.pi * share) ** 2
-    return lift_off_ground(ankle_up, pitch, neutral, wanted) * np.sqrt(np.clip(np.sin(np.pi * share), 0.0, 1.0))
+    clearance = 0.014 * size * np.sin(np.pi * share) ** 2
+    return compute_ground_lift(ankle_up, pitch, neutral, clearance) * np.sqrt(np.clip(np.sin(np.pi * share), 0.0, 1.0))
 
 
-def lift_foot(rows: np.ndarray, neutral: Neutral) -> np.ndarray:
+def lift_foot(rows: np.ndarray, neutral: NeutralStance) -> np.ndarray:
     """Convert table rows of a foot to the body's size, above the ground.
 
     Args:
@@ -274,12 +274,12 @@ def lift_foot(rows: np.ndarray, neutral: Neutral) -> np.ndarray:
     ahead, left, raised, pitch, yaw = rows.T
     pitch, yaw = np.radians(pitch), np.radians(yaw)
     up = neutral.ankle_height + raised * scale
-    up = up + lift_off_ground(up, pitch, neutral) * (np.abs(pitch) > 1e-3)
+    up = up + compute_ground_lift(up, pitch, neutral) * (np.abs(pitch) > 1e-3)
     return np.stack([ahead * scale, left * scale, up, np.zeros_like(up), pitch, yaw], axis=-1)
 
 
-def lift_off_ground(
-    ankle_up: np.ndarray, pitch: np.ndarray, neutral: Neutral, clearance: float | np.ndarray = 0.0
+def compute_ground_lift(
+    ankle_up: np.ndarray, pitch: np.ndarray, neutral: NeutralStance, clearance: float | np.ndarray = 0.0
 ) -> np.ndarray:
     """Compute how much to raise a foot for its lowest point to be `clearance` above the ground, with a soft limit.
 

@@ -27,11 +27,11 @@ from scipy.interpolate import CubicSpline, PchipInterpolator
 from ..base.easing import quintic_step
 from ..motion.retargeting import adult
 
-LEG = adult.LEG
+LEG = adult.ADULT_LEG
 GRAVITY = 9.81  # m/s^2
 FASTEST = 9.5  # m/s, the tables' last speed
 # m/s between which walking changes into running (N: spontaneous change at 1.9 to 2.3 m/s)
-_CHANGE = (1.95, 2.35)
+_WALK_TO_RUN = (1.95, 2.35)
 
 _SPEEDS: dict[str, list[tuple[float, float]]] = {
     # strides per second: G below 2 (cadence grows as the root of speed), N and D above
@@ -87,12 +87,12 @@ _SPEEDS: dict[str, list[tuple[float, float]]] = {
 
 
 @lru_cache(maxsize=None)
-def _curve(name: str) -> PchipInterpolator:
+def _build_curve(name: str) -> PchipInterpolator:
     x, y = zip(*_SPEEDS[name])
     return PchipInterpolator(x, y, extrapolate=False)
 
 
-def at_speed(name: str, speed: float | np.ndarray) -> np.ndarray:
+def interpolate_figure(name: str, speed: float | np.ndarray) -> np.ndarray:
     """Interpolate a figure of the table.
 
     Args:
@@ -101,12 +101,12 @@ def at_speed(name: str, speed: float | np.ndarray) -> np.ndarray:
     Returns:
         (...,) degrees, metres or Hz, as the table says.
     """
-    return _curve(name)(np.clip(speed, 0.0, FASTEST))
+    return _build_curve(name)(np.clip(speed, 0.0, FASTEST))
 
 
-def run_share(speed: np.ndarray) -> np.ndarray:
+def compute_run_share(speed: np.ndarray) -> np.ndarray:
     """Compute how far running has replaced walking, 0 to 1, at `speed` (...,) m/s."""
-    return quintic_step((np.asarray(speed) - _CHANGE[0]) / (_CHANGE[1] - _CHANGE[0]))
+    return quintic_step((np.asarray(speed) - _WALK_TO_RUN[0]) / (_WALK_TO_RUN[1] - _WALK_TO_RUN[0]))
 
 
 # The swinging leg: thigh against the vertical (forward positive), knee flexion, ankle (dorsiflexion positive), in
@@ -133,12 +133,12 @@ _SWING = {
 
 
 @lru_cache(maxsize=None)
-def _swing_curves() -> tuple[np.ndarray, CubicSpline]:
+def _build_swing_curves() -> tuple[np.ndarray, CubicSpline]:
     table = np.array([_SWING[v] for v in sorted(_SWING)], dtype=float)
     return np.array(sorted(_SWING)), CubicSpline(_SWING_AT, table.transpose(2, 0, 1), axis=0)
 
 
-def swing_angles(share: np.ndarray, speed: np.ndarray) -> np.ndarray:
+def interpolate_swing(share: np.ndarray, speed: np.ndarray) -> np.ndarray:
     """Interpolate the angles of a swinging leg.
 
     Args:
@@ -148,7 +148,7 @@ def swing_angles(share: np.ndarray, speed: np.ndarray) -> np.ndarray:
         (..., 3) rad: thigh, knee and ankle.
     """
     share, speed = np.broadcast_arrays(share, speed)
-    speeds, spline = _swing_curves()
+    speeds, spline = _build_swing_curves()
     values = spline(np.clip(share, 0.0, 1.0))
     position = np.interp(speed, speeds, np.arange(len(speeds)))
     weights = np.maximum(0.0, 1.0 - np.abs(position[..., None] - np.arange(len(speeds))))
@@ -167,12 +167,12 @@ _STANCE = {
 
 
 @lru_cache(maxsize=None)
-def _stance_curves() -> tuple[np.ndarray, PchipInterpolator]:
+def _build_stance_curves() -> tuple[np.ndarray, PchipInterpolator]:
     table = np.array([_STANCE[v] for v in sorted(_STANCE)], dtype=float)
     return np.array(sorted(_STANCE)), PchipInterpolator(_STANCE_AT, table.T, axis=0)
 
 
-def stance_pitch(share: np.ndarray, speed: np.ndarray) -> np.ndarray:
+def interpolate_stance_pitch(share: np.ndarray, speed: np.ndarray) -> np.ndarray:
     """Interpolate the pitch of the sole in stance.
 
     Args:
@@ -181,7 +181,7 @@ def stance_pitch(share: np.ndarray, speed: np.ndarray) -> np.ndarray:
     Returns:
         (...,) rad, toes down positive.
     """
-    speeds, curve = _stance_curves()
+    speeds, curve = _build_stance_curves()
     values = curve(np.clip(share, 0.0, 1.0))
     position = np.interp(speed, speeds, np.arange(len(speeds)))
     weights = np.maximum(0.0, 1.0 - np.abs(position[..., None] - np.arange(len(speeds))))
@@ -189,7 +189,7 @@ def stance_pitch(share: np.ndarray, speed: np.ndarray) -> np.ndarray:
 
 
 @lru_cache(maxsize=None)
-def _bounce_table() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _build_bounce_table() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Compute the height of a mass over one step for duty factors (share of the step), by integrating source L's
     sine-wave model twice.
     """
@@ -206,7 +206,7 @@ def _bounce_table() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return duties, phase, heights
 
 
-def bounce(step_phase: np.ndarray, contact_share: np.ndarray, step_time: np.ndarray) -> np.ndarray:
+def compute_bounce(step_phase: np.ndarray, contact_share: np.ndarray, step_time: np.ndarray) -> np.ndarray:
     """Compute the height of the body over its mean in running (source L).
 
     The foot is in contact from step phase 0 to `contact_share`, then the body flies.
@@ -218,7 +218,7 @@ def bounce(step_phase: np.ndarray, contact_share: np.ndarray, step_time: np.ndar
     Returns:
         (...,) m.
     """
-    duties, phase, heights = _bounce_table()
+    duties, phase, heights = _build_bounce_table()
     # fractional row and column of the table, then bilinear interpolation
     row = np.interp(contact_share, duties, np.arange(len(duties)))
     column = (np.asarray(step_phase) % 1.0) * (len(phase) - 1)

@@ -19,16 +19,16 @@ from scipy.interpolate import CubicSpline, PchipInterpolator
 from ..base.easing import quintic_step
 from ..base.errors import InputError
 from ..motion import quaternion
-from ..motion.humanoid import identify
+from ..motion.humanoid import identify_joints
 from ..motion.motion import Motion
-from ..motion.retargeting.adult import adult_skeleton
-from ..motion.retargeting.neutral import Neutral, neutral_stance
-from ..motion.retargeting.posture import Posture, hip_joints, to_motion
+from ..motion.retargeting.adult import build_adult_skeleton
+from ..motion.retargeting.neutral import NeutralStance, build_neutral_stance
+from ..motion.retargeting.posture import Posture, compute_hip_positions, to_motion
 from ..motion.skeleton import Skeleton
 from . import gait_tables as tables
-from .course import Course, GaitStyle, plan
-from .footsteps import Footsteps, lift_off_ground
-from .gait import footsteps, kept_bent, posture_over, thigh_shank, with_feet
+from .course import GaitPlan, GaitStyle, plan_gait
+from .footsteps import Footsteps, compute_ground_lift
+from .gait import plan_footsteps, limit_leg_reach, build_posture, measure_leg, plant_feet
 
 LEFT, RIGHT = 0, 1
 
@@ -51,7 +51,7 @@ class Gesture:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Strike:
+class StrikeRecipe:
     """How the right foot meets the ball and how the body moves; seconds from the touch, metres of an adult, degrees.
 
     Attributes:
@@ -78,12 +78,12 @@ class Strike:
     at: float
     sink: tuple
     head: float = 14.0
-    fling: float = 1.0
+    blend_share: float = 1.0
 
 
 _KICK_SPEEDS = ((-2.6, 2.4), (-1.4, 2.9), (-0.6, 2.8), (0.0, 1.9), (0.45, 1.3), (1.0, 1.6), (2.2, 2.3))
 STRIKES = {
-    "kick low inside": Strike(
+    "kick low inside": StrikeRecipe(
         foot=(
             (-0.15, -0.42, -0.14, 0.34, 45, -35, 0), (0.0, 0.30, -0.11, 0.105, 2, -68, -6),
             (0.09, 0.58, -0.08, 0.22, -4, -62, -8), (0.20, 0.60, -0.09, 0.32, 0, -40, -4),
@@ -97,7 +97,7 @@ STRIKES = {
         at=0.46,
         sink=((-0.1, 0.01), (0.0, 0.015), (0.2, 0.005)),
     ),
-    "kick low top": Strike(
+    "kick low top": StrikeRecipe(
         foot=(
             (-0.14, -0.52, -0.16, 0.50, 88, -8, 0), (0.0, 0.24, -0.09, 0.175, 36, -10, 6),
             (0.07, 0.66, 0.02, 0.42, 18, 2, 4), (0.17, 0.70, 0.10, 0.72, -10, 10, 0),
@@ -112,7 +112,7 @@ STRIKES = {
         at=0.42,
         sink=((-0.1, 0.015), (0.0, 0.02), (0.2, 0.0)),
     ),
-    "receive foot low inside": Strike(
+    "receive foot low inside": StrikeRecipe(
         foot=(
             (-0.16, 0.26, -0.14, 0.16, 0, -48, 0), (0.0, 0.34, -0.14, 0.15, -4, -70, -6),
             (0.16, 0.10, -0.15, 0.13, 2, -66, -4), (0.26, 0.10, -0.13, 0.11, 2, -45, 0),
@@ -134,14 +134,14 @@ STRIKES = {
 _RUNNING_SPEEDS = ((-0.8, 1.0), (-0.35, 1.0), (0.0, 0.96), (0.25, 0.95), (0.8, 1.0))
 # m/s between which a kick becomes one at full run; there: factor on cadence, and share of the support foot's
 # stance that has passed at the touch
-_FULL_RUN, _RUNNING_PACE, _RUNNING_STANCE = (3.0, 6.0), 0.93, 0.45
+_FULL_RUN, _RUNNING_PACE, _RUNNING_STANCE_SHARE = (3.0, 6.0), 0.93, 0.45
 
 
 # s that the kicking foot needs to reach the ground
-_LANDING = 0.1
+_LANDING_SECONDS = 0.1
 
 
-def strike(
+def build_strike(
     kind: str, skeleton: Skeleton | None = None, fps: float = 60.0, speed: float = 1.0, seed: int = 0, *,
     at_speed: float | None = None, example: Motion | None = None,
 ) -> Gesture:
@@ -160,105 +160,105 @@ def strike(
     Returns:
         The move.
     """
-    recipe = STRIKES[kind] if at_speed is None else _on_the_run(STRIKES[kind], at_speed)
-    neutral = neutral_stance(skeleton or adult_skeleton(), example)
+    recipe = STRIKES[kind] if at_speed is None else _adapt_to_run(STRIKES[kind], at_speed)
+    neutral = build_neutral_stance(skeleton or build_adult_skeleton(), example)
     key = -recipe.speeds[0][0]
     end = key + recipe.speeds[-1][0]
     times = np.arange(int(round(end * fps)) + 1) / fps
-    speeds = speed * keyed(recipe.speeds, times - key)[:, 0]
+    speeds = speed * interpolate_rows(recipe.speeds, times - key)[:, 0]
     style = GaitStyle(head=np.radians(recipe.head))
-    course = plan(speeds, None, fps, neutral, style=style, seed=seed)
-    course = _in_step(course, key, recipe)
-    steps = tuple(footsteps(course, neutral, style, side) for side in (LEFT, RIGHT))
-    posture = posture_over(course, steps, neutral, style, seed)
-    posture = _laid_over(posture, course, steps, key=key, recipe=recipe, neutral=neutral)
-    begin, land = _swing_around(steps[RIGHT], key)
-    return Gesture(to_motion(posture.frames(course.asked), neutral), key, begin - 0.15, land + 0.1)
+    gait_plan = plan_gait(speeds, None, fps, neutral, style=style, seed=seed)
+    gait_plan = _adapt_phase(gait_plan, key, recipe)
+    steps = tuple(plan_footsteps(gait_plan, neutral, style, side) for side in (LEFT, RIGHT))
+    posture = build_posture(gait_plan, steps, neutral, style, seed)
+    posture = _blend_strike(posture, gait_plan, steps, key=key, recipe=recipe, neutral=neutral)
+    begin, land = _find_swing(steps[RIGHT], key)
+    return Gesture(to_motion(posture.frames(gait_plan.requested), neutral), key, begin - 0.15, land + 0.1)
 
 
-def _on_the_run(recipe: Strike, speed: float) -> Strike:
+def _adapt_to_run(recipe: StrikeRecipe, speed: float) -> StrikeRecipe:
     """Adapt a strike to a run at `speed` m/s.
 
     Steps keep their rhythm, arms and trunk swing less, and the touch falls in the middle of the support foot's short
     stance.
     """
     share = float(quintic_step((speed - _FULL_RUN[0]) / (_FULL_RUN[1] - _FULL_RUN[0])))
-    duty = float(tables.at_speed("duty", speed))
-    at = (0.5 + (_RUNNING_STANCE - 1.0) * duty) / (1.0 - duty)
+    duty = float(tables.interpolate_figure("duty", speed))
+    at = (0.5 + (_RUNNING_STANCE_SHARE - 1.0) * duty) / (1.0 - duty)
     return replace(
         recipe, speeds=tuple((time, part * speed) for time, part in _RUNNING_SPEEDS),
         pace=recipe.pace + (_RUNNING_PACE - recipe.pace) * share,
-        at=recipe.at + (max(at, recipe.at) - recipe.at) * share, fling=1.0 - 0.5 * share,
+        at=recipe.at + (max(at, recipe.at) - recipe.at) * share, blend_share=1.0 - 0.5 * share,
     )
 
 
-def _in_step(course: Course, key: float, recipe: Strike) -> Course:
+def _adapt_phase(gait_plan: GaitPlan, key: float, recipe: StrikeRecipe) -> GaitPlan:
     """Adapt a plan: the cadence dips around the touch, and the right foot is in its swing then."""
-    rate = np.gradient(course.phase, course.times)
-    dip = 1.0 - (1.0 - recipe.pace) * np.exp(-(((course.times - key - 0.1) / 0.33) ** 2))
+    rate = np.gradient(gait_plan.phase, gait_plan.times)
+    dip = 1.0 - (1.0 - recipe.pace) * np.exp(-(((gait_plan.times - key - 0.1) / 0.33) ** 2))
     phase = np.concatenate([[0.0], np.cumsum(0.5 * (rate * dip)[1:] + 0.5 * (rate * dip)[:-1])])
-    phase = phase * (course.times[1] - course.times[0])
-    duty = float(tables.at_speed("duty", np.interp(key - 0.2, course.times, course.gear)))
-    wanted = 0.5 + duty + recipe.at * (1.0 - duty)
-    return replace(course, phase=phase + wanted - np.interp(key, course.times, phase))
+    phase = phase * (gait_plan.times[1] - gait_plan.times[0])
+    duty = float(tables.interpolate_figure("duty", np.interp(key - 0.2, gait_plan.times, gait_plan.adult_speed)))
+    wanted_phase = 0.5 + duty + recipe.at * (1.0 - duty)
+    return replace(gait_plan, phase=phase + wanted_phase - np.interp(key, gait_plan.times, phase))
 
 
-def _swing_around(steps: Footsteps, moment: float) -> tuple[float, float]:
+def _find_swing(steps: Footsteps, moment: float) -> tuple[float, float]:
     """Find the seconds at which the swing around `moment` begins and ends."""
-    which = int(steps.current(np.array([moment]))[0])
+    which = int(steps.find_stance(np.array([moment]))[0])
     return float(steps.off[which]), float(steps.on[which + 1])
 
 
-def _laid_over(posture: Posture, course: Course, steps, key: float, recipe: Strike, neutral: Neutral) -> Posture:
+def _blend_strike(posture: Posture, gait_plan: GaitPlan, steps, key: float, recipe: StrikeRecipe, neutral: NeutralStance) -> Posture:
     """Blend a strike's trunk, arms and foot over the posture of a run."""
     scale = neutral.leg / tables.LEG
-    times = course.times - key
+    times = gait_plan.times - key
     hips = posture.hips.copy()
-    ease = envelope(times, -0.42, -0.16, 0.26, 0.65)
-    hips[:, 2] -= scale * ease * keyed(recipe.sink, times)[:, 0]
-    posture = with_feet(posture.changed(hips=hips), course.times, steps, neutral)
-    fling = recipe.fling * ease
-    pelvis = mixed(posture.pelvis, np.radians(keyed(recipe.pelvis, times)), fling)
-    spine = mixed(posture.spine, np.radians(keyed(recipe.spine, times)), fling)
+    ease = compute_envelope(times, -0.42, -0.16, 0.26, 0.65)
+    hips[:, 2] -= scale * ease * interpolate_rows(recipe.sink, times)[:, 0]
+    posture = plant_feet(posture.replace_arrays(hips=hips), gait_plan.times, steps, neutral)
+    fling = recipe.blend_share * ease
+    pelvis = blend_arrays(posture.pelvis, np.radians(interpolate_rows(recipe.pelvis, times)), fling)
+    spine = blend_arrays(posture.spine, np.radians(interpolate_rows(recipe.spine, times)), fling)
     head = posture.head - (pelvis + spine - posture.pelvis - posture.spine) * np.array([0.8, 0.6, 0.95])
     arms = posture.arms.copy()
     for side, rows in ((LEFT, recipe.left_arm), (RIGHT, recipe.right_arm)):
-        arms[:, side, :4] = mixed(arms[:, side, :4], np.radians(keyed(rows, times)), fling)
-    posture = posture.changed(pelvis=pelvis, spine=spine, head=head, arms=arms)
-    return _kicking_foot(posture, course, steps[RIGHT], key=key, rows=recipe.foot, neutral=neutral)
+        arms[:, side, :4] = blend_arrays(arms[:, side, :4], np.radians(interpolate_rows(rows, times)), fling)
+    posture = posture.replace_arrays(pelvis=pelvis, spine=spine, head=head, arms=arms)
+    return _guide_foot(posture, gait_plan, steps[RIGHT], key=key, rows=recipe.foot, neutral=neutral)
 
 
-def _kicking_foot(posture: Posture, course: Course, steps: Footsteps, key: float, rows, neutral: Neutral) -> Posture:
+def _guide_foot(posture: Posture, gait_plan: GaitPlan, steps: Footsteps, key: float, rows, neutral: NeutralStance) -> Posture:
     """Guide the right foot's swing around `key` seconds through the rows of a Strike; its ends stay as they were."""
-    swing = _swing_around(steps, key)
+    swing = _find_swing(steps, key)
     scale = neutral.leg / tables.LEG
-    inside = (course.times > swing[0]) & (course.times < swing[1])
+    inside = (gait_plan.times > swing[0]) & (gait_plan.times < swing[1])
     edges = np.flatnonzero(inside)[[0, -1]] + [-1, 1]
     ground = posture.hips * [1.0, 1.0, 0.0]
-    into = quaternion.about_up(-posture.heading)
+    into = quaternion.from_up_angle(-posture.heading)
     frame = np.concatenate([quaternion.rotate(into, posture.ankles[:, RIGHT] - ground), posture.feet[:, RIGHT]], axis=1)
     frame[:, 5] -= posture.heading
-    rows = np.array([r for r in rows if swing[0] + 0.04 < key + r[0] < swing[1] - _LANDING], dtype=float)
+    rows = np.array([r for r in rows if swing[0] + 0.04 < key + r[0] < swing[1] - _LANDING_SECONDS], dtype=float)
     values = np.column_stack([rows[:, 1:4] * scale, np.radians(rows[:, [6, 4, 5]])])
-    at = np.concatenate([course.times[edges[:1]], key + rows[:, 0], course.times[edges[1:]]])
-    speeds = np.gradient(frame, course.times, axis=0)[edges + [-1, 1]]
+    at = np.concatenate([gait_plan.times[edges[:1]], key + rows[:, 0], gait_plan.times[edges[1:]]])
+    speeds = np.gradient(frame, gait_plan.times, axis=0)[edges + [-1, 1]]
     through = np.concatenate([frame[edges[:1]], values, frame[edges[1:]]])
-    path = CubicSpline(at, through, axis=0, bc_type=((1, speeds[0]), (1, speeds[1])))(course.times[inside])
+    path = CubicSpline(at, through, axis=0, bc_type=((1, speeds[0]), (1, speeds[1])))(gait_plan.times[inside])
     ankles, feet = posture.ankles.copy(), posture.feet.copy()
-    back = quaternion.about_up(posture.heading[inside])
+    back = quaternion.from_up_angle(posture.heading[inside])
     free = ground[inside] + quaternion.rotate(back, path[:, :3])
-    hip = hip_joints(posture, neutral)[inside, RIGHT]
-    ankles[inside, RIGHT] = kept_bent(free, hip, course.times[inside], steps, sum(thigh_shank(neutral, RIGHT)))
-    edge = np.sin(np.pi * (course.times[inside] - swing[0]) / (swing[1] - swing[0]))
-    ankles[inside, RIGHT, 2] += lift_off_ground(ankles[inside, RIGHT, 2], path[:, 4], neutral) * np.sqrt(
+    hip = compute_hip_positions(posture, neutral)[inside, RIGHT]
+    ankles[inside, RIGHT] = limit_leg_reach(free, hip, gait_plan.times[inside], steps, sum(measure_leg(neutral, RIGHT)))
+    edge = np.sin(np.pi * (gait_plan.times[inside] - swing[0]) / (swing[1] - swing[0]))
+    ankles[inside, RIGHT, 2] += compute_ground_lift(ankles[inside, RIGHT, 2], path[:, 4], neutral) * np.sqrt(
         np.maximum(edge, 0.0)
     )
     feet[inside, RIGHT] = path[:, 3:] + np.stack([0 * path[:, 0], 0 * path[:, 0], posture.heading[inside]], axis=-1)
-    return posture.changed(ankles=ankles, feet=feet)
+    return posture.replace_arrays(ankles=ankles, feet=feet)
 
 
-def dribble(
-    speed: float, duration: float, skeleton: Skeleton | None = None, fps: float = 30.0, seed: int = 0, **way
+def build_dribble(
+    speed: float, duration: float, skeleton: Skeleton | None = None, fps: float = 30.0, seed: int = 0, **gait_options
 ) -> Motion:
     """Build a run with the ball at the feet: short strides, bent knees, the head down; each right swing ends in a
     touch.
@@ -273,14 +273,14 @@ def dribble(
     Returns:
         The motion.
     """
-    neutral = neutral_stance(skeleton or adult_skeleton())
+    neutral = build_neutral_stance(skeleton or build_adult_skeleton())
     style = GaitStyle(cadence=1.12, crouch=np.radians(7), lean=np.radians(4), head=np.radians(30), abduct=np.radians(9))
-    course = plan(speed, duration, fps, neutral, style=style, seed=seed, **way)
-    steps = tuple(footsteps(course, neutral, style, side) for side in (LEFT, RIGHT))
-    posture = posture_over(course, steps, neutral, style, seed)
+    gait_plan = plan_gait(speed, duration, fps, neutral, style=style, seed=seed, **gait_options)
+    steps = tuple(plan_footsteps(gait_plan, neutral, style, side) for side in (LEFT, RIGHT))
+    posture = build_posture(gait_plan, steps, neutral, style, seed)
     ankles, feet = posture.ankles.copy(), posture.feet.copy()
-    which = steps[RIGHT].current(course.times)
-    share = (course.times - steps[RIGHT].off[which]) / (steps[RIGHT].on[which + 1] - steps[RIGHT].off[which])
+    which = steps[RIGHT].find_stance(gait_plan.times)
+    share = (gait_plan.times - steps[RIGHT].off[which]) / (steps[RIGHT].on[which + 1] - steps[RIGHT].off[which])
     touch = np.where(share > 0, np.exp(-(((np.clip(share, 0, 1) - 0.78) / 0.1) ** 2)), 0.0)
     touch = touch * quintic_step(np.clip((1.0 - share) / 0.1, 0, 1))
     scale = neutral.leg / tables.LEG
@@ -288,12 +288,12 @@ def dribble(
     ankles[:, RIGHT] += 0.05 * scale * touch[:, None] * ahead
     feet[:, RIGHT, 1] += np.radians(16) * touch
     feet[:, RIGHT, 2] -= np.radians(22) * touch
-    ankles[:, RIGHT, 2] += touch * lift_off_ground(ankles[:, RIGHT, 2], feet[:, RIGHT, 1], neutral)
-    posture = posture.changed(ankles=ankles, feet=feet)
-    return to_motion(posture.frames(course.asked), neutral)
+    ankles[:, RIGHT, 2] += touch * compute_ground_lift(ankles[:, RIGHT, 2], feet[:, RIGHT, 1], neutral)
+    posture = posture.replace_arrays(ankles=ankles, feet=feet)
+    return to_motion(posture.frames(gait_plan.requested), neutral)
 
 
-def keyed(rows, times: np.ndarray) -> np.ndarray:
+def interpolate_rows(rows, times: np.ndarray) -> np.ndarray:
     """Interpolate rows smoothly without overshoot; constant before the first and after the last row.
 
     Args:
@@ -302,11 +302,11 @@ def keyed(rows, times: np.ndarray) -> np.ndarray:
     Returns:
         (T, values).
     """
-    first, last, curve = _curve(tuple(map(tuple, rows)))
+    first, last, curve = _build_curve(tuple(map(tuple, rows)))
     return curve(np.clip(times, first, last))
 
 
-def keyed_rounded(rows, times: np.ndarray, frames: float) -> np.ndarray:
+def interpolate_rounded(rows, times: np.ndarray, frames: float) -> np.ndarray:
     """Interpolate rows as `interpolate_rows`, without corners in the speed.
 
     Args:
@@ -318,10 +318,10 @@ def keyed_rounded(rows, times: np.ndarray, frames: float) -> np.ndarray:
     """
     from scipy.ndimage import gaussian_filter1d
 
-    return gaussian_filter1d(keyed(rows, times), frames, axis=0, mode="nearest")
+    return gaussian_filter1d(interpolate_rows(rows, times), frames, axis=0, mode="nearest")
 
 
-def begin_plan(style, neutral: Neutral, times: np.ndarray, frames: float) -> tuple:
+def build_plan_parts(style, neutral: NeutralStance, times: np.ndarray, frames: float) -> tuple:
     """Compute what synthetic throws and kicks have in common.
 
     Args:
@@ -337,14 +337,14 @@ def begin_plan(style, neutral: Neutral, times: np.ndarray, frames: float) -> tup
         height: height of the hips, m.
     """
 
-    def curve(rows) -> np.ndarray:
-        return keyed_rounded(rows, times, frames)
+    def read_rows(rows) -> np.ndarray:
+        return interpolate_rounded(rows, times, frames)
 
     arms = np.zeros((len(times), 2, 5))
-    arms[:, RIGHT, :4], arms[:, LEFT, :4] = np.radians(curve(style.right_arm)), np.radians(curve(style.left_arm))
-    body = identify(neutral.skeleton)
+    arms[:, RIGHT, :4], arms[:, LEFT, :4] = np.radians(read_rows(style.right_arm)), np.radians(read_rows(style.left_arm))
+    body = identify_joints(neutral.skeleton)
     height = 0.5 * float(neutral.positions[body.left.upper_leg, 2] + neutral.positions[body.right.upper_leg, 2])
-    return curve, np.radians(curve(style.pelvis)), np.radians(curve(style.spine)), arms, height
+    return read_rows, np.radians(read_rows(style.pelvis)), np.radians(read_rows(style.spine)), arms, height
 
 
 def choose_style(
@@ -365,27 +365,27 @@ def choose_style(
     Raises:
         InputError: for an unknown style or side, or a speed out of range.
     """
-    how = style if isinstance(style, type(next(iter(styles.values())))) else styles.get(style)
-    if side not in ("left", "right") or how is None:
+    chosen = style if isinstance(style, type(next(iter(styles.values())))) else styles.get(style)
+    if side not in ("left", "right") or chosen is None:
         raise InputError(action, f"{style} with the {side} {limb}", f"left or right, {' or '.join(styles)}")
     if not speeds[0] <= speed <= speeds[1]:
         raise InputError(action, f"{speed:g} m/s", f"{speeds[0]:g} to {speeds[1]:g} m/s")
-    return how
+    return chosen
 
 
 @lru_cache(maxsize=256)
-def _curve(rows: tuple) -> tuple[float, float, PchipInterpolator]:
+def _build_curve(rows: tuple) -> tuple[float, float, PchipInterpolator]:
     """Build the first time, last time and curve of a table; cached, because a synthetic move is planned many times."""
     table = np.array(rows, dtype=float)
     return table[0, 0], table[-1, 0], PchipInterpolator(table[:, 0], table[:, 1:], axis=0)
 
 
-def envelope(times: np.ndarray, begin: float, full: float, fade: float, end: float) -> np.ndarray:
+def compute_envelope(times: np.ndarray, begin: float, full: float, fade: float, end: float) -> np.ndarray:
     """Compute weights (T,): 0 before `begin`, 1 from `full` to `fade`, 0 after `end`."""
     return quintic_step((times - begin) / (full - begin)) * (1.0 - quintic_step((times - fade) / (end - fade)))
 
 
-def mixed(a: np.ndarray, b: np.ndarray, weight: np.ndarray) -> np.ndarray:
+def blend_arrays(a: np.ndarray, b: np.ndarray, weight: np.ndarray) -> np.ndarray:
     """Blend arrays (T, ...) by a weight (T,): 0 gives `a`, 1 gives `b`."""
     weight = weight.reshape(weight.shape + (1,) * (a.ndim - 1))
     return a * (1.0 - weight) + b * weight

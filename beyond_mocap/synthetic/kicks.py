@@ -17,23 +17,23 @@ import numpy as np
 
 from ..base.easing import quintic_step
 from ..motion import quaternion
-from ..motion.humanoid import identify
+from ..motion.humanoid import identify_joints
 from ..motion.mirror import mirror
-from ..motion.motion import Motion, at_frames, place, pose_kinematics
-from ..motion.retargeting.neutral import Neutral
-from ..motion.retargeting.posture import Posture, hip_joints, to_motion
+from ..motion.motion import Motion, sample_frames, place_motion, compute_pose
+from ..motion.retargeting.neutral import NeutralStance
+from ..motion.retargeting.posture import Posture, compute_hip_positions, to_motion
 from . import gait_tables as tables
 from .footsteps import lift_foot
-from .gestures import RIGHT, begin_plan
+from .gestures import RIGHT, build_plan_parts
 
 BEFORE, AFTER = 1.5, 1.3
 """Seconds of a hard kick before and after the contact; slower ones take longer."""
-_PLAN = 480.0  # Hz at which a kick is planned
-_NEAR = 0.05  # s around the contact that are enough to compute it
-_ROUND = 0.008  # s over which corners of the tables are rounded
-_LIFT = 0.07  # s, standard deviation of the time in which the foot is guided higher or lower around the contact
-_TOES_UP = 0.35  # rad by which the toes are bent up at the contact
-_FREE, _DOWN = (-0.29, -0.19), (0.26, 0.50)  # s from contact: the leg leaves the ground, and returns to it
+_PLAN_RATE = 480.0  # Hz at which a kick is planned
+_CONTACT_SECONDS = 0.05  # s around the contact that are enough to compute it
+_ROUNDING_SECONDS = 0.008  # s over which corners of the tables are rounded
+_LIFT_SECONDS = 0.07  # s, standard deviation of the time in which the foot is guided higher or lower around the contact
+_TOE_BEND = 0.35  # rad by which the toes are bent up at the contact
+_SWING_START, _SWING_END = (-0.29, -0.19), (0.26, 0.50)  # s from contact: the leg leaves the ground, and returns to it
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -136,13 +136,13 @@ _INSIDE = KickStyle(
 )  # fmt: skip
 KICKS = {"instep": _INSTEP, "inside": _INSIDE}
 _HIPS_AT_CONTACT = np.array([-0.22, 0.18])  # m from the kicking ankle at the contact
-_PLANTED = np.array([-0.05, 0.30])  # m, the support foot's ankle
-_APART = 0.19  # m between the lines of the left and the right foot
+_SUPPORT_FOOT = np.array([-0.05, 0.30])  # m, the support foot's ankle
+_FOOT_DISTANCE = 0.19  # m between the lines of the left and the right foot
 _STEPS = ((-1.30, -0.90), (-1.02, -0.47), (-0.55, -0.11))  # s, off the ground and down again: left, right, left
 
 
-def kicked(
-    style: KickStyle, neutral: Neutral, foot: str = "right", lift: float = 0.0, loft: float = 0.0, rate: float = 1.0,
+def build_kick(
+    style: KickStyle, neutral: NeutralStance, foot: str = "right", lift: float = 0.0, loft: float = 0.0, rate: float = 1.0,
     turn: float = 0.0, fps: float = 120.0,
 ) -> Motion:
     """Build a kick along +X, or turned about the vertical.
@@ -159,17 +159,17 @@ def kicked(
     Returns:
         The motion.
     """
-    times = np.arange(int(round((AFTER + BEFORE) * _PLAN)) + 1) / _PLAN - BEFORE
-    posture, curve = _upright(style, neutral, times)
-    plan = to_motion(_swung(posture, style, times, neutral=neutral, curve=curve, lift=lift, loft=loft), neutral)
+    times = np.arange(int(round((AFTER + BEFORE) * _PLAN_RATE)) + 1) / _PLAN_RATE - BEFORE
+    posture, curve = _build_base_posture(style, neutral, times)
+    plan = to_motion(_swing_leg(posture, style, times, neutral=neutral, curve=curve, lift=lift, loft=loft), neutral)
     plan = mirror(plan) if foot == "left" else plan
-    seconds = np.arange(int(np.floor((len(plan) - 1) / _PLAN / rate * fps + 1e-6)) + 1) / fps
-    root, rotations = at_frames(plan, seconds * rate * _PLAN)
-    return place(Motion(plan.skeleton, root, rotations, fps), turn)
+    seconds = np.arange(int(np.floor((len(plan) - 1) / _PLAN_RATE / rate * fps + 1e-6)) + 1) / fps
+    root, rotations = sample_frames(plan, seconds * rate * _PLAN_RATE)
+    return place_motion(Motion(plan.skeleton, root, rotations, fps), turn)
 
 
-def contact(
-    style: KickStyle, neutral: Neutral, foot: str, ways: Sequence[tuple[float, float]] | np.ndarray
+def compute_contacts(
+    style: KickStyle, neutral: NeutralStance, foot: str, variants: Sequence[tuple[float, float]] | np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Compute ankle and toe joint at the contact of `build_kick`, in N variants.
 
@@ -182,32 +182,32 @@ def contact(
         places: (N, 2, 3) m, ankle and toe joint.
         velocities: (N, 2, 3) m/s.
     """
-    count = int(round(2.0 * _NEAR * _PLAN))
-    times = np.arange(count + 1) / _PLAN - _NEAR
-    before, curve = _upright(style, neutral, times)
+    count = int(round(2.0 * _CONTACT_SECONDS * _PLAN_RATE))
+    times = np.arange(count + 1) / _PLAN_RATE - _CONTACT_SECONDS
+    base_posture, curve = _build_base_posture(style, neutral, times)
     around = slice(count // 2 - 1, count // 2 + 2)
-    each = [_swung(
-        before, style, times, neutral=neutral, curve=curve, lift=lift, loft=loft,
-    ).frames(around) for lift, loft in ways]
-    motion = to_motion(Posture.joined(each), neutral)
+    postures = [_swing_leg(
+        base_posture, style, times, neutral=neutral, curve=curve, lift=lift, loft=loft,
+    ).frames(around) for lift, loft in variants]
+    motion = to_motion(Posture.join(postures), neutral)
     motion = mirror(motion) if foot == "left" else motion
-    limb = getattr(identify(motion.skeleton), foot)
-    places, _ = pose_kinematics(motion.skeleton, motion.root_positions, motion.rotations)
-    line = places[:, [limb.foot, limb.toe_or_foot]].reshape(len(each), 3, 2, 3)
-    return line[:, 1], 0.5 * _PLAN * (line[:, 2] - line[:, 0])
+    limb = getattr(identify_joints(motion.skeleton), foot)
+    places, _ = compute_pose(motion.skeleton, motion.root_positions, motion.rotations)
+    line = places[:, [limb.foot, limb.toe_or_foot]].reshape(len(postures), 3, 2, 3)
+    return line[:, 1], 0.5 * _PLAN_RATE * (line[:, 2] - line[:, 0])
 
 
-def _upright(style: KickStyle, neutral: Neutral, times: np.ndarray) -> tuple[Posture, Callable]:
+def _build_base_posture(style: KickStyle, neutral: NeutralStance, times: np.ndarray) -> tuple[Posture, Callable]:
     """Build the kick's posture at the planning rate without the leg's swing, and the function that reads its tables."""
     nothing = np.zeros_like(times)
-    curve, pelvis, spine, arms, height = begin_plan(style, neutral, times, _ROUND * _PLAN)
-    falls = _footfalls(style)
-    way = curve(_hips(style, falls)) * (neutral.leg / tables.LEG)
-    feet = [_foot(curve(rows), neutral, side) for side, rows in enumerate(_steps(style, falls))]
+    curve, pelvis, spine, arms, height = build_plan_parts(style, neutral, times, _ROUNDING_SECONDS * _PLAN_RATE)
+    footfalls = _plan_footfalls(style)
+    hips = curve(_build_hip_rows(style, footfalls)) * (neutral.leg / tables.LEG)
+    feet = [_compute_foot(curve(rows), neutral, side) for side, rows in enumerate(_build_step_rows(style, footfalls))]
     look = np.clip(-(pelvis[:, 2] + spine[:, 2]), -1.1, 1.1)
     nod = -0.4 * (pelvis[:, 1] + spine[:, 1]) + np.radians(curve(_NOD)[:, 0])
     posture = Posture(
-        fps=_PLAN, hips=np.stack([way[:, 0], way[:, 1], height - way[:, 2]], axis=-1), heading=nothing, pelvis=pelvis,
+        fps=_PLAN_RATE, hips=np.stack([hips[:, 0], hips[:, 1], height - hips[:, 2]], axis=-1), heading=nothing, pelvis=pelvis,
         spine=spine, head=np.stack([-0.6 * spine[:, 0] - 0.6 * pelvis[:, 0], nod, look], axis=-1), arms=arms,
         wrists=np.full((len(times), 2), 0.1), ankles=np.stack([foot[:, :3] for foot in feet], axis=1),
         feet=np.stack([foot[:, 3:6] for foot in feet], axis=1), toes=np.stack([foot[:, 6] for foot in feet], axis=-1),
@@ -220,41 +220,41 @@ _NOD = ((-1.5, 8), (-0.6, 16), (0.0, 26), (0.15, 20), (0.4, -4), (1.3, 0))
 """Degrees that the head looks down: at the ball until it has left."""
 
 
-def _footfalls(style: KickStyle) -> dict[str, np.ndarray]:
+def _plan_footfalls(style: KickStyle) -> dict[str, np.ndarray]:
     """Compute the places (2,) m of the feet in order: `left0` and `right0` at the start, `left1`, `right1`, `planted`,
     at the end `right2`, `left2`.
     """
     turn = np.radians(style.approach)
     ahead, left = np.array([np.cos(turn), -np.sin(turn)]), np.array([np.sin(turn), np.cos(turn)])
     first, second, third = style.strides
-    right1 = _PLANTED - third * ahead - _APART * left
-    left1 = right1 - second * ahead + _APART * left
+    right1 = _SUPPORT_FOOT - third * ahead - _FOOT_DISTANCE * left
+    left1 = right1 - second * ahead + _FOOT_DISTANCE * left
     left0 = left1 - first * ahead
     end = _HIPS_AT_CONTACT + np.array(style.hips[-1][1:3])
     return {
-        "left0": left0, "right0": left0 - _APART * left, "left1": left1, "right1": right1, "planted": _PLANTED,
+        "left0": left0, "right0": left0 - _FOOT_DISTANCE * left, "left1": left1, "right1": right1, "planted": _SUPPORT_FOOT,
         "right2": end + [-0.02, -0.10], "left2": end + [0.06, 0.11],
     }  # fmt: skip
 
 
-def _hips(style: KickStyle, falls: dict[str, np.ndarray]) -> tuple:
+def _build_hip_rows(style: KickStyle, footfalls: dict[str, np.ndarray]) -> tuple:
     """Build rows (time, ahead, left, lowered) of the middle between the hip joints, m."""
     turn = np.radians(style.approach)
     ahead, left = np.array([np.cos(turn), -np.sin(turn)]), np.array([np.sin(turn), np.cos(turn)])
 
-    def beside(fall: str, behind: float, side: float) -> np.ndarray:
-        return falls[fall] - behind * ahead + side * 0.5 * _APART * left
+    def place_beside(fall: str, behind: float, side: float) -> np.ndarray:
+        return footfalls[fall] - behind * ahead + side * 0.5 * _FOOT_DISTANCE * left
 
-    begin = 0.5 * (falls["left0"] + falls["right0"])
+    begin = 0.5 * (footfalls["left0"] + footfalls["right0"])
     run = (
-        (-1.5, *begin, 0.01), (-1.3, *(begin + 0.03 * ahead), 0.03), (-0.9, *beside("left1", 0.25, -0.7), 0.05),
-        (-0.68, *beside("left1", -0.20, -0.7), 0.05), (-0.47, *beside("right1", 0.17 * style.strides[2], 0.7), 0.08),
-        (-0.30, *beside("right1", -0.22 * style.strides[2], 0.7), 0.07),
+        (-1.5, *begin, 0.01), (-1.3, *(begin + 0.03 * ahead), 0.03), (-0.9, *place_beside("left1", 0.25, -0.7), 0.05),
+        (-0.68, *place_beside("left1", -0.20, -0.7), 0.05), (-0.47, *place_beside("right1", 0.17 * style.strides[2], 0.7), 0.08),
+        (-0.30, *place_beside("right1", -0.22 * style.strides[2], 0.7), 0.07),
     )  # fmt: skip
     return run + tuple((t, *(_HIPS_AT_CONTACT + [x, y]), low) for t, x, y, low in style.hips)
 
 
-def _steps(style: KickStyle, falls: dict[str, np.ndarray]) -> tuple[tuple, tuple]:
+def _build_step_rows(style: KickStyle, footfalls: dict[str, np.ndarray]) -> tuple[tuple, tuple]:
     """Build rows (time, ahead, left, raised, pitch, yaw) of both feet.
 
     From _SWING_START on, the right foot follows the leg.
@@ -262,33 +262,33 @@ def _steps(style: KickStyle, falls: dict[str, np.ndarray]) -> tuple[tuple, tuple
     yaw = -style.approach
     one, two, three = _STEPS
     left = (
-        *_step(one, falls["left0"], falls["left1"], high=0.10, yaw=yaw, later=yaw),
-        *_step(three, falls["left1"], falls["planted"], high=0.13, yaw=yaw, later=-10.0),
-        *_step((0.39, 0.82), falls["planted"], falls["left2"], high=0.10, yaw=-10.0, later=0.0),
+        *_build_one_step(one, footfalls["left0"], footfalls["left1"], high=0.10, yaw=yaw, later=yaw),
+        *_build_one_step(three, footfalls["left1"], footfalls["planted"], high=0.13, yaw=yaw, later=-10.0),
+        *_build_one_step((0.39, 0.82), footfalls["planted"], footfalls["left2"], high=0.10, yaw=-10.0, later=0.0),
     )
     right = (
-        *_step(two, falls["right0"], falls["right1"], high=0.12, yaw=yaw, later=yaw - 4.0),
-        *_step((-0.27, _DOWN[1]), falls["right1"], falls["right2"], high=0.12, yaw=yaw - 4.0, later=-6.0),
+        *_build_one_step(two, footfalls["right0"], footfalls["right1"], high=0.12, yaw=yaw, later=yaw - 4.0),
+        *_build_one_step((-0.27, _SWING_END[1]), footfalls["right1"], footfalls["right2"], high=0.12, yaw=yaw - 4.0, later=-6.0),
     )
     return left, right
 
 
-def _step(when: tuple[float, float], off: np.ndarray, down: np.ndarray, high: float, yaw: float, later: float) -> tuple:
+def _build_one_step(when: tuple[float, float], off: np.ndarray, down: np.ndarray, high: float, yaw: float, later: float) -> tuple:
     """Build rows of one step: the heel rises, the foot swings over and lands heel first."""
     begin, end = when
-    d, way = end - begin, down - off
+    d, along = end - begin, down - off
 
-    def row(share, gone, raised, pitch):
-        return (begin + share * d, *(off + gone * way), raised, pitch, yaw + gone * (later - yaw))
+    def build_row(share, travelled, raised, pitch):
+        return (begin + share * d, *(off + travelled * along), raised, pitch, yaw + travelled * (later - yaw))
 
     return (
-        row(-min(0.35, 0.12 / d), 0.0, 0.0, 0.0), row(0.0, 0.0, 0.0, 38.0), row(0.24, 0.08, high, 48.0),
-        row(0.62, 0.58, 0.6 * high, 4.0),
-        row(0.88, 0.92, 0.12 * high, -12.0), row(1.0, 1.0, 0.0, -8.0), row(1.12, 1.0, 0.0, 0.0),
+        build_row(-min(0.35, 0.12 / d), 0.0, 0.0, 0.0), build_row(0.0, 0.0, 0.0, 38.0), build_row(0.24, 0.08, high, 48.0),
+        build_row(0.62, 0.58, 0.6 * high, 4.0),
+        build_row(0.88, 0.92, 0.12 * high, -12.0), build_row(1.0, 1.0, 0.0, -8.0), build_row(1.12, 1.0, 0.0, 0.0),
     )  # fmt: skip
 
 
-def _foot(rows: np.ndarray, neutral: Neutral, side: int) -> np.ndarray:
+def _compute_foot(rows: np.ndarray, neutral: NeutralStance, side: int) -> np.ndarray:
     """Compute ankle, rotation and toes (T, 7) of a foot from rows (T, 5).
 
     A heel that rises turns about the ball of the foot, which stays in place.
@@ -303,30 +303,30 @@ def _foot(rows: np.ndarray, neutral: Neutral, side: int) -> np.ndarray:
     return np.column_stack([foot, toes])
 
 
-def _swung(
-    posture: Posture, style: KickStyle, times: np.ndarray, neutral: Neutral, curve, lift: float, loft: float
+def _swing_leg(
+    posture: Posture, style: KickStyle, times: np.ndarray, neutral: NeutralStance, curve, lift: float, loft: float
 ) -> Posture:
     """Swing the right leg of a posture as the style says, from leaving the ground until it returns."""
     lift, loft = lift * neutral.leg / tables.LEG, np.radians(loft)
     thigh, knee = np.radians(curve(style.leg)).T
     turn, abduction = np.radians(curve(style.plane)).T
     bent, out = np.radians(curve(style.foot)).T
-    places, body = neutral.positions, identify(neutral.skeleton).right
+    places, body = neutral.positions, identify_joints(neutral.skeleton).right
     upper = np.linalg.norm(places[body.lower_leg] - places[body.upper_leg])
     lower = np.linalg.norm(places[body.foot] - places[body.lower_leg])
     shank = thigh - knee
     in_plane = upper * np.stack([np.sin(thigh), np.zeros_like(thigh), -np.cos(thigh)], axis=-1)
     in_plane += lower * np.stack([np.sin(shank), np.zeros_like(thigh), -np.cos(shank)], axis=-1)
-    aside = quaternion.about_axis(np.array([1.0, 0.0, 0.0]), -abduction)
-    leg = quaternion.rotate(quaternion.about_up(turn), quaternion.rotate(aside, in_plane))
-    ankle = hip_joints(posture, neutral)[:, RIGHT] + leg
-    near = np.exp(-0.5 * (times / _LIFT) ** 2)
+    aside = quaternion.from_axis_angle(np.array([1.0, 0.0, 0.0]), -abduction)
+    leg = quaternion.rotate(quaternion.from_up_angle(turn), quaternion.rotate(aside, in_plane))
+    ankle = compute_hip_positions(posture, neutral)[:, RIGHT] + leg
+    near = np.exp(-0.5 * (times / _LIFT_SECONDS) ** 2)
     ankle[:, 2] += lift * near
     foot = np.stack([np.zeros_like(times), bent - loft * near - shank, turn - out], axis=-1)
-    free = quintic_step((times - _FREE[0]) / (_FREE[1] - _FREE[0]))
-    free = free * (1.0 - quintic_step((times - _DOWN[0]) / (_DOWN[1] - _DOWN[0])))
+    free = quintic_step((times - _SWING_START[0]) / (_SWING_START[1] - _SWING_START[0]))
+    free = free * (1.0 - quintic_step((times - _SWING_END[0]) / (_SWING_END[1] - _SWING_END[0])))
     ankles, feet, toes = posture.ankles.copy(), posture.feet.copy(), posture.toes.copy()
     ankles[:, RIGHT] += free[:, None] * (ankle - ankles[:, RIGHT])
     feet[:, RIGHT] += free[:, None] * (foot - feet[:, RIGHT])
-    toes[:, RIGHT] += free * (_TOES_UP * near - toes[:, RIGHT])
-    return posture.changed(ankles=ankles, feet=feet, toes=toes)
+    toes[:, RIGHT] += free * (_TOE_BEND * near - toes[:, RIGHT])
+    return posture.replace_arrays(ankles=ankles, feet=feet, toes=toes)

@@ -10,15 +10,15 @@ from scipy.interpolate import CubicSpline
 
 from ..base.easing import quintic_step
 from ..motion.motion import Motion
-from ..motion.retargeting.adult import adult_skeleton
-from ..motion.retargeting.neutral import Neutral, neutral_stance
+from ..motion.retargeting.adult import build_adult_skeleton
+from ..motion.retargeting.neutral import NeutralStance, build_neutral_stance
 from ..motion.retargeting.posture import to_motion
 from ..motion.skeleton import Skeleton
 from . import gait_tables as tables
-from .course import Course, GaitStyle, plan
+from .course import GaitPlan, GaitStyle, plan_gait
 from .footsteps import Footsteps
-from .gait import footsteps, posture_over, with_feet
-from .gestures import LEFT, RIGHT, Gesture, envelope, keyed, mixed
+from .gait import plan_footsteps, build_posture, plant_feet
+from .gestures import LEFT, RIGHT, Gesture, compute_envelope, interpolate_rows, blend_arrays
 
 # rows: seconds from the touch, then (hips up, ahead), (list, tilt, turn), spine, arms (flexion, abduction, inward,
 # elbow)
@@ -47,7 +47,7 @@ _HEADER = {
 _FLIGHT = 0.25  # s, half the flight of an adult's jump
 
 
-def header(skeleton: Skeleton | None = None, fps: float = 60.0, seed: int = 0) -> Gesture:
+def build_header(skeleton: Skeleton | None = None, fps: float = 60.0, seed: int = 0) -> Gesture:
     """Build a jump from both feet out of standing: the trunk arches, strikes the ball at the top, and the body lands.
 
     Args:
@@ -57,36 +57,36 @@ def header(skeleton: Skeleton | None = None, fps: float = 60.0, seed: int = 0) -
     Returns:
         The move; its key is the touch.
     """
-    neutral = neutral_stance(skeleton or adult_skeleton())
+    neutral = build_neutral_stance(skeleton or build_adult_skeleton())
     scale = neutral.leg / tables.LEG
     key = 1.5
-    course, steps, posture = standing_posture(neutral, key + 1.9, fps, seed, width=0.10)
-    times = course.times - key
+    gait_plan, steps, posture = build_standing(neutral, key + 1.9, fps, seed, width=0.10)
+    times = gait_plan.times - key
     air = _FLIGHT * np.sqrt(scale)
-    trunk, arms = np.radians(keyed(_HEADER["trunk"], times)), np.radians(keyed(_HEADER["arms"], times))
-    ease = envelope(times, -1.1, -0.8, 0.9, 1.4)
-    pitch = np.radians(62) * envelope(times, -air - 0.14, -air, air, air + 0.12)
+    trunk, arms = np.radians(interpolate_rows(_HEADER["trunk"], times)), np.radians(interpolate_rows(_HEADER["arms"], times))
+    ease = compute_envelope(times, -1.1, -0.8, 0.9, 1.4)
+    pitch = np.radians(62) * compute_envelope(times, -air - 0.14, -air, air, air + 0.12)
     hips, ankles, feet, toes = posture.hips.copy(), posture.ankles.copy(), posture.feet.copy(), posture.toes.copy()
-    rise, tuck = _jump(times, air, hips[:, 2], neutral)
+    rise, tuck = _compute_jump(times, air, hips[:, 2], neutral)
     hips[:, 2] = rise
     for side in (LEFT, RIGHT):
-        ankles[:, side], feet[:, side, 1], toes[:, side] = _jumping_foot(
+        ankles[:, side], feet[:, side, 1], toes[:, side] = _compute_jumping_foot(
             ankles[:, side], feet[:, side, 2], times, air=air, rise=rise, pitch=pitch, tuck=tuck * scale,
             neutral=neutral,
         )
     pelvis = posture.pelvis + np.stack([0 * times, trunk[:, 0], 0 * times], -1) * ease[:, None]
     spine = posture.spine + np.stack([0 * times, trunk[:, 1], 0 * times], -1) * ease[:, None]
     head = posture.head + np.stack([0 * times, trunk[:, 2], 0 * times], -1) * ease[:, None]
-    both = posture.arms.copy()
+    arm_angles = posture.arms.copy()
     for side in (LEFT, RIGHT):
-        both[:, side, :4] = mixed(both[:, side, :4], arms, ease)
-    posture = posture.changed(
-        hips=hips, ankles=ankles, feet=feet, toes=toes, pelvis=pelvis, spine=spine, head=head, arms=both
+        arm_angles[:, side, :4] = blend_arrays(arm_angles[:, side, :4], arms, ease)
+    posture = posture.replace_arrays(
+        hips=hips, ankles=ankles, feet=feet, toes=toes, pelvis=pelvis, spine=spine, head=head, arms=arm_angles
     )
-    return Gesture(to_motion(posture.frames(course.asked), neutral), key, key - 0.9, key + 0.9)
+    return Gesture(to_motion(posture.frames(gait_plan.requested), neutral), key, key - 0.9, key + 0.9)
 
 
-def _jump(times, air: float, standing: np.ndarray, neutral: Neutral) -> tuple[np.ndarray, np.ndarray]:
+def _compute_jump(times, air: float, standing: np.ndarray, neutral: NeutralStance) -> tuple[np.ndarray, np.ndarray]:
     """Compute the height of the hips (N,) m, free fall in the air, and how far (N,) the ankles are drawn up and back
     there.
     """
@@ -105,10 +105,10 @@ def _jump(times, air: float, standing: np.ndarray, neutral: Neutral) -> tuple[np
     )
     rise = np.where(np.abs(times) <= air, flight, np.where(times < 0, before(times), after(times)))
     rise = np.where((times < crouch[0, 0]) | (times > absorb[-1, 0]), standing, rise)
-    return rise, keyed(_HEADER["legs"], times)[:, 0] * (np.abs(times) < air)
+    return rise, interpolate_rows(_HEADER["legs"], times)[:, 0] * (np.abs(times) < air)
 
 
-def _jumping_foot(ankle, yaw, times, air, rise, pitch, tuck, neutral: Neutral):
+def _compute_jumping_foot(ankle, yaw, times, air, rise, pitch, tuck, neutral: NeutralStance):
     """Compute ankle (N, 3), pitch (N,) and toe bend (N,) of a foot that rolls up on its ball, hangs in the air and
     lands.
     """
@@ -126,7 +126,7 @@ def _jumping_foot(ankle, yaw, times, air, rise, pitch, tuck, neutral: Neutral):
     return out, pitch, np.where(flying, 0.3, 1.0) * pitch
 
 
-def standing_posture(neutral: Neutral, duration: float, fps: float, seed: int, width: float = 0.0):
+def build_standing(neutral: NeutralStance, duration: float, fps: float, seed: int, width: float = 0.0):
     """Build standing.
 
     Args:
@@ -141,9 +141,9 @@ def standing_posture(neutral: Neutral, duration: float, fps: float, seed: int, w
         posture: the posture.
     """
     style = GaitStyle(width=width, life=0.6)
-    course = plan(0.0, duration, fps, neutral, style=style, seed=seed)
-    steps = tuple(footsteps(course, neutral, style, side) for side in (LEFT, RIGHT))
-    return course, steps, posture_over(course, steps, neutral, style, seed)
+    gait_plan = plan_gait(0.0, duration, fps, neutral, style=style, seed=seed)
+    steps = tuple(plan_footsteps(gait_plan, neutral, style, side) for side in (LEFT, RIGHT))
+    return gait_plan, steps, build_posture(gait_plan, steps, neutral, style, seed)
 
 
 _THROW = {
@@ -174,7 +174,7 @@ _THROW = {
 }
 
 
-def throw_in(skeleton: Skeleton | None = None, fps: float = 60.0, seed: int = 0) -> Gesture:
+def build_throw_in(skeleton: Skeleton | None = None, fps: float = 60.0, seed: int = 0) -> Gesture:
     """Build a throw-in: the ball in both hands behind the head, the left foot steps ahead, the trunk whips.
 
     Args:
@@ -184,34 +184,34 @@ def throw_in(skeleton: Skeleton | None = None, fps: float = 60.0, seed: int = 0)
     Returns:
         The move; its key is the release.
     """
-    neutral = neutral_stance(skeleton or adult_skeleton())
+    neutral = build_neutral_stance(skeleton or build_adult_skeleton())
     scale = neutral.leg / tables.LEG
     key = 2.2
-    course, _, posture = standing_posture(neutral, key + 2.0, fps, seed)
-    times = course.times - key
-    moved = keyed(_THROW["hips"], times) * scale
+    gait_plan, _, posture = build_standing(neutral, key + 2.0, fps, seed)
+    times = gait_plan.times - key
+    moved = interpolate_rows(_THROW["hips"], times) * scale
     hips = posture.hips.copy()
     hips[:, 0] += moved[:, 0]
     hips[:, 2] -= moved[:, 1]
     steps = (
-        walked_steps(course, neutral, LEFT, key, ((-0.72, -0.36, 0.52),)),
-        walked_steps(course, neutral, RIGHT, key, ((0.16, 0.62, 0.46),)),
+        build_steps(gait_plan, neutral, LEFT, key, ((-0.72, -0.36, 0.52),)),
+        build_steps(gait_plan, neutral, RIGHT, key, ((0.16, 0.62, 0.46),)),
     )
-    trunk, arms = np.radians(keyed(_THROW["trunk"], times)), np.radians(keyed(_THROW["arms"], times))
-    ease = envelope(times, -2.2, -1.6, 0.8, 1.5)
+    trunk, arms = np.radians(interpolate_rows(_THROW["trunk"], times)), np.radians(interpolate_rows(_THROW["arms"], times))
+    ease = compute_envelope(times, -2.2, -1.6, 0.8, 1.5)
     nothing = np.zeros_like(times)
     lean = {
         name: getattr(posture, name) + ease[:, None] * np.stack([nothing, trunk[:, column], nothing], -1)
         for column, name in enumerate(("pelvis", "spine", "head"))
     }
-    both = posture.arms.copy()
+    arm_angles = posture.arms.copy()
     for side in (LEFT, RIGHT):
-        both[:, side] = mixed(both[:, side], arms, ease)
-    posture = with_feet(posture.changed(hips=hips, arms=both, **lean), course.times, steps, neutral)
-    return Gesture(to_motion(posture.frames(course.asked), neutral), key, key - 1.3, key + 0.8)
+        arm_angles[:, side] = blend_arrays(arm_angles[:, side], arms, ease)
+    posture = plant_feet(posture.replace_arrays(hips=hips, arms=arm_angles, **lean), gait_plan.times, steps, neutral)
+    return Gesture(to_motion(posture.frames(gait_plan.requested), neutral), key, key - 1.3, key + 0.8)
 
 
-def walked_steps(course: Course, neutral: Neutral, side: int, key: float, moves) -> Footsteps:
+def build_steps(gait_plan: GaitPlan, neutral: NeutralStance, side: int, key: float, moves) -> Footsteps:
     """Build the stances of one foot that stays in place except for some steps.
 
     Args:
@@ -225,14 +225,14 @@ def walked_steps(course: Course, neutral: Neutral, side: int, key: float, moves)
     """
     scale = neutral.leg / tables.LEG
     sign = 1.0 if side == LEFT else -1.0
-    left = sign * 0.5 * tables.at_speed("width", 0.0) * scale
-    behind = tables.at_speed("ahead", 0.0) * scale
+    left = sign * 0.5 * tables.interpolate_figure("width", 0.0) * scale
+    behind = tables.interpolate_figure("ahead", 0.0) * scale
     places = [behind] + [behind + scale * ahead for *_, ahead in moves]
-    on = np.array([course.times[0] - 1.0] + [key + land for _, land, _ in moves] + [course.times[-1] + 2.0])
-    off = np.array([key + leave for leave, *_ in moves] + [course.times[-1] + 1.0, course.times[-1] + 3.0])
+    on = np.array([gait_plan.times[0] - 1.0] + [key + land for _, land, _ in moves] + [gait_plan.times[-1] + 2.0])
+    off = np.array([key + leave for leave, *_ in moves] + [gait_plan.times[-1] + 1.0, gait_plan.times[-1] + 3.0])
     places = np.array(places + places[-1:])
     count = len(on)
-    yaw = np.full(count, sign * np.radians(tables.at_speed("toe_out", 0.3)))
+    yaw = np.full(count, sign * np.radians(tables.interpolate_figure("toe_out", 0.3)))
     return Footsteps(side=side, on=on, off=off, place=np.stack([places, np.full(count, left)], -1), yaw=yaw,
                      speed=np.full(count, 1.2), direction=np.zeros(count))
 
@@ -269,7 +269,7 @@ _UP = {
 _UP_TIME = 3.9
 
 
-def getting_up(
+def build_get_up(
     skeleton: Skeleton | None = None, fps: float = 60.0, seed: int = 0, rest: float = 0.8, example: Motion | None = None
 ) -> Gesture:
     """Build getting up from lying on the back: sitting up on the hands, feet drawn in, through the crouch.
@@ -283,35 +283,35 @@ def getting_up(
     Returns:
         The move; its key is halfway.
     """
-    neutral = neutral_stance(skeleton or adult_skeleton(), example)
+    neutral = build_neutral_stance(skeleton or build_adult_skeleton(), example)
     scale = neutral.leg / tables.LEG
     duration = rest + _UP_TIME + 0.9
-    course, _, posture = standing_posture(neutral, duration, fps, seed)
-    times = course.times - rest
-    trunk = np.radians(keyed(_UP["tilt"], times))
-    way = keyed(_UP["hips"], times) * scale
+    gait_plan, _, posture = build_standing(neutral, duration, fps, seed)
+    times = gait_plan.times - rest
+    trunk = np.radians(interpolate_rows(_UP["tilt"], times))
+    hip_path = interpolate_rows(_UP["hips"], times) * scale
     on_feet = quintic_step((times - 3.2) / 0.7)
     nothing = np.zeros_like(times)
-    hips = np.stack([way[:, 0], posture.hips[:, 1] * on_feet, way[:, 1]], -1)
-    hips[:, 2] = mixed(hips[:, 2], posture.hips[:, 2], on_feet)
+    hips = np.stack([hip_path[:, 0], posture.hips[:, 1] * on_feet, hip_path[:, 1]], -1)
+    hips[:, 2] = blend_arrays(hips[:, 2], posture.hips[:, 2], on_feet)
     arms, ankles, feet = posture.arms.copy(), posture.ankles.copy(), posture.feet.copy()
     for side, name in ((LEFT, "left"), (RIGHT, "right")):
-        arms[:, side, :4] = np.radians(keyed(_UP[name + "_arm"], times))
-        foot = keyed(_UP[name], times)
+        arms[:, side, :4] = np.radians(interpolate_rows(_UP[name + "_arm"], times))
+        foot = interpolate_rows(_UP[name], times)
         ankles[:, side, 0] = foot[:, 0] * scale
         ankles[:, side, 1] = (0.13, -0.13)[side] * scale
         ankles[:, side, 2] = foot[:, 1] * neutral.ankle_height / 0.0732
         feet[:, side] = np.stack([nothing, np.radians(foot[:, 2]), nothing + np.radians((14, -14)[side])], -1)
-    posture = posture.changed(
+    posture = posture.replace_arrays(
         hips=hips, pelvis=np.stack([nothing, trunk[:, 0], nothing], -1),
         spine=np.stack([nothing, trunk[:, 1], nothing], -1), head=np.stack([nothing, trunk[:, 2], nothing], -1),
-        arms=arms, wrists=np.radians(np.repeat(keyed(_UP["wrists"], times), 2, axis=1)), ankles=ankles, feet=feet,
+        arms=arms, wrists=np.radians(np.repeat(interpolate_rows(_UP["wrists"], times), 2, axis=1)), ankles=ankles, feet=feet,
         toes=np.zeros_like(posture.toes),
     )
-    return Gesture(to_motion(posture.frames(course.asked), neutral), rest + 1.9, rest + 0.3, rest + _UP_TIME)
+    return Gesture(to_motion(posture.frames(gait_plan.requested), neutral), rest + 1.9, rest + 0.3, rest + _UP_TIME)
 
 
-def celebration(duration: float = 6.0, skeleton: Skeleton | None = None, fps: float = 30.0, seed: int = 0) -> Motion:
+def build_celebration(duration: float = 6.0, skeleton: Skeleton | None = None, fps: float = 30.0, seed: int = 0) -> Motion:
     """Build a run in a curve with both arms spread like wings, leaning into it.
 
     Args:
@@ -322,14 +322,14 @@ def celebration(duration: float = 6.0, skeleton: Skeleton | None = None, fps: fl
     Returns:
         The motion.
     """
-    neutral = neutral_stance(skeleton or adult_skeleton())
+    neutral = build_neutral_stance(skeleton or build_adult_skeleton())
     times = np.arange(int(round(duration * fps)) + 1) / fps
     turn = 0.55 * np.sin(2.0 * np.pi * times / duration)
-    course = plan(3.4 + 0.0 * times, None, fps, neutral, turn_rate=turn, seed=seed)
-    steps = tuple(footsteps(course, neutral, GaitStyle(), side) for side in (LEFT, RIGHT))
-    posture = posture_over(course, steps, neutral, GaitStyle(head=np.radians(-8)), seed)
-    bank = np.interp(course.times, times, turn)
-    flap = np.radians(5.0) * np.sin(2.0 * np.pi * 2.0 * course.phase)
+    gait_plan = plan_gait(3.4 + 0.0 * times, None, fps, neutral, turn_rate=turn, seed=seed)
+    steps = tuple(plan_footsteps(gait_plan, neutral, GaitStyle(), side) for side in (LEFT, RIGHT))
+    posture = build_posture(gait_plan, steps, neutral, GaitStyle(head=np.radians(-8)), seed)
+    bank = np.interp(gait_plan.times, times, turn)
+    flap = np.radians(5.0) * np.sin(2.0 * np.pi * 2.0 * gait_plan.phase)
     arms = posture.arms.copy()
     for side, sign in ((LEFT, 1.0), (RIGHT, -1.0)):
         arms[:, side] = np.stack(
@@ -339,5 +339,5 @@ def celebration(duration: float = 6.0, skeleton: Skeleton | None = None, fps: fl
             ],
             axis=-1,
         )
-    posture = posture.changed(arms=arms)
-    return to_motion(posture.frames(course.asked), neutral)
+    posture = posture.replace_arrays(arms=arms)
+    return to_motion(posture.frames(gait_plan.requested), neutral)

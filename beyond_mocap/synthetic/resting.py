@@ -10,12 +10,12 @@ from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from ..base.vectors import unit_vectors
 from ..motion import quaternion
-from ..motion.humanoid import identify
-from ..motion.motion import pose_kinematics
-from ..motion.retargeting.neutral import Neutral
+from ..motion.humanoid import identify_joints
+from ..motion.motion import compute_pose
+from ..motion.retargeting.neutral import NeutralStance
 from ..motion.retargeting.posture import Posture, to_motion
 from ..motion.skeleton import Skeleton
-from ..motion.track import zero_phase_hann
+from ..motion.track import smooth_zero_phase_hann
 from . import gait_tables as tables
 
 THICKNESS = {
@@ -24,12 +24,12 @@ THICKNESS = {
 }
 """Metres from a joint to the skin below it."""
 
-_OTHERS, _TIP = 0.02, 0.01  # m: thickness at other joints and at tips
-_RAISED = np.radians(np.arange(0.0, 100.0, 1.0))  # rad by which an arm can be turned up
-_EVEN_SECONDS = 0.3  # s over which corrections are smoothed
+_OTHER_THICKNESS, _TIP_THICKNESS = 0.02, 0.01  # m: thickness at other joints and at tips
+_ARM_ANGLES = np.radians(np.arange(0.0, 100.0, 1.0))  # rad by which an arm can be turned up
+_SMOOTH_SECONDS = 0.3  # s over which corrections are smoothed
 
 
-def lowest_root(skeleton: Skeleton, rotations: np.ndarray, arms: bool = True) -> np.ndarray:
+def compute_lowest_root(skeleton: Skeleton, rotations: np.ndarray, arms: bool = True) -> np.ndarray:
     """Compute the height of the root at which the lowest part of the body touches the ground.
 
     Args:
@@ -39,13 +39,13 @@ def lowest_root(skeleton: Skeleton, rotations: np.ndarray, arms: bool = True) ->
     Returns:
         (T,) m.
     """
-    places, world = pose_kinematics(skeleton, np.zeros((len(rotations), 3)), rotations)
-    without = set() if arms else {joint for chain in _arms(skeleton) for joint in chain}
-    points = [(place, thick) for joint, place, thick in _surface(skeleton, places, world) if joint not in without]
+    places, world = compute_pose(skeleton, np.zeros((len(rotations), 3)), rotations)
+    without = set() if arms else {joint for chain in _list_arms(skeleton) for joint in chain}
+    points = [(place, thick) for joint, place, thick in _iter_surface(skeleton, places, world) if joint not in without]
     return -np.min([place[:, 2] - thick for place, thick in points], axis=0)
 
 
-def arms_above_ground(skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray, fps: float) -> np.ndarray:
+def raise_arms(skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray, fps: float) -> np.ndarray:
     """Turn arms that reach below the ground up at the shoulder, smoothly over time, so that little of them stays below.
 
     Args:
@@ -56,68 +56,68 @@ def arms_above_ground(skeleton: Skeleton, root: np.ndarray, rotations: np.ndarra
     Returns:
         (T, J, 4) local rotations.
     """
-    places, world = pose_kinematics(skeleton, root, rotations)
+    places, world = compute_pose(skeleton, root, rotations)
     out = rotations.copy()
-    for chain in _arms(skeleton):
+    for chain in _list_arms(skeleton):
         shoulder = places[:, chain[0]]
-        points = [(p - shoulder, thick) for joint, p, thick in _surface(skeleton, places, world) if joint in chain[1:]]
+        points = [(p - shoulder, thick) for joint, p, thick in _iter_surface(skeleton, places, world) if joint in chain[1:]]
         out_level = points[-1][0][:, :2]
         level = unit_vectors(out_level)
         along = np.stack([np.sum(p[:, :2] * level, axis=1) for p, _ in points], axis=1)[..., None]
         above = np.stack([p[:, 2] for p, _ in points], axis=1)[..., None]
         thick = np.array([t for _, t in points])[:, None]
         # height of each point of the arm for each angle in _ARM_ANGLES: (T, points, angles)
-        raised = above * np.cos(_RAISED) + along * np.sin(_RAISED) - thick + shoulder[:, 2, None, None]
-        angle = _RAISED[_first_enough(raised.min(axis=1))]
+        heights = above * np.cos(_ARM_ANGLES) + along * np.sin(_ARM_ANGLES) - thick + shoulder[:, 2, None, None]
+        angle = _ARM_ANGLES[_find_first_above(heights.min(axis=1))]
         axis = np.stack([level[:, 1], -level[:, 0], np.zeros(len(level))], axis=1)
-        turn = zero_phase_hann(axis * widened(angle, fps)[:, None], fps, _EVEN_SECONDS)
-        turned = quaternion.multiply(quaternion.from_rotation_vector(turn), world[:, chain[0]])
+        turn = smooth_zero_phase_hann(axis * smooth_above(angle, fps)[:, None], fps, _SMOOTH_SECONDS)
+        rotated = quaternion.multiply(quaternion.from_rotation_vector(turn), world[:, chain[0]])
         parent = world[:, skeleton.parents[chain[0]]]
-        moved = np.any(turn != 0.0, axis=1)[:, None]
-        out[:, chain[0]] = np.where(moved, quaternion.multiply(quaternion.inverse(parent), turned), out[:, chain[0]])
+        is_moved = np.any(turn != 0.0, axis=1)[:, None]
+        out[:, chain[0]] = np.where(is_moved, quaternion.multiply(quaternion.inverse(parent), rotated), out[:, chain[0]])
     return out
 
 
-def widened(values: np.ndarray, fps: float) -> np.ndarray:
+def smooth_above(values: np.ndarray, fps: float) -> np.ndarray:
     """Compute a smooth curve (T,) that is nowhere below `values` (T,) >= 0: a running maximum, then a running mean."""
-    width = 2 * int(_EVEN_SECONDS * fps / 2) + 1
+    width = 2 * int(_SMOOTH_SECONDS * fps / 2) + 1
     return uniform_filter1d(maximum_filter1d(values, width), width)
 
 
-def _first_enough(height: np.ndarray) -> np.ndarray:
+def _find_first_above(height: np.ndarray) -> np.ndarray:
     """Find the first column (T,) of height (T, A) m that is not below the ground; the highest if all are below."""
-    enough = height >= 0.0
-    return np.where(enough.any(axis=1), np.argmax(enough, axis=1), np.argmax(height, axis=1))
+    is_above = height >= 0.0
+    return np.where(is_above.any(axis=1), np.argmax(is_above, axis=1), np.argmax(height, axis=1))
 
 
-def _arms(skeleton: Skeleton) -> list[list[int]]:
+def _list_arms(skeleton: Skeleton) -> list[list[int]]:
     """List the joints of both arms from the upper arm on, with fingers."""
-    body = identify(skeleton)
+    body = identify_joints(skeleton)
     tops = [limb.upper_arm for limb in (body.left, body.right) if limb.upper_arm is not None]
-    return [[joint for joint in range(top, len(skeleton)) if _below(skeleton, joint, top)] for top in tops]
+    return [[joint for joint in range(top, len(skeleton)) if _is_below(skeleton, joint, top)] for top in tops]
 
 
-def _below(skeleton: Skeleton, joint: int, top: int) -> bool:
+def _is_below(skeleton: Skeleton, joint: int, top: int) -> bool:
     while joint > top:
         joint = skeleton.parents[joint]
     return joint == top
 
 
-def _surface(skeleton: Skeleton, places: np.ndarray, world: np.ndarray):
+def _iter_surface(skeleton: Skeleton, places: np.ndarray, world: np.ndarray):
     """Iterate over (joint, place (T, 3) m, thickness m) of every joint and every tip."""
-    for joint, thick in enumerate(thickness(skeleton)):
+    for joint, thick in enumerate(compute_thickness(skeleton)):
         yield joint, places[:, joint], thick
     for joint, tip in zip(skeleton.end_parents, skeleton.end_offsets):
-        yield joint, places[:, joint] + quaternion.rotate(world[:, joint], tip), _TIP
+        yield joint, places[:, joint] + quaternion.rotate(world[:, joint], tip), _TIP_THICKNESS
 
 
-def thickness(skeleton: Skeleton) -> np.ndarray:
+def compute_thickness(skeleton: Skeleton) -> np.ndarray:
     """Compute the distance (J,) m from each joint to the skin."""
-    body = identify(skeleton)
+    body = identify_joints(skeleton)
     parts = [("chest", joint) for joint in body.spine]
     parts += [(role, getattr(limb, role)) for limb in (body.left, body.right) for role in THICKNESS
               if hasattr(limb, role)]  # fmt: skip
-    out = np.full(len(skeleton), _OTHERS)
+    out = np.full(len(skeleton), _OTHER_THICKNESS)
     for role, joint in (*parts, ("neck", body.neck), ("head", body.head), ("hips", body.hips)):
         if joint is not None:
             out[joint] = THICKNESS[role]
@@ -138,7 +138,7 @@ _LYING = {
 _SLOPES, _DRAWN_IN = np.meshgrid(np.arange(-6.0, 22.0, 4.0), np.arange(-5.0, 46.0, 10.0))
 
 
-def on_the_side(neutral: Neutral, left: bool, settled: bool) -> np.ndarray:
+def build_lying_pose(neutral: NeutralStance, left: bool, settled: bool) -> np.ndarray:
     """Build a pose of lying on one side, facing along +X.
 
     Of several slopes of the trunk and places of the lower arm, which differ by skeleton, the one with the lowest body
@@ -152,15 +152,15 @@ def on_the_side(neutral: Neutral, left: bool, settled: bool) -> np.ndarray:
         (J, 4) local rotations.
     """
     table = _LYING if settled else _LANDING
-    ways = to_motion(_side_posture(table, neutral, left), neutral)
-    body = identify(neutral.skeleton)
-    root = np.zeros((len(ways), 3))
-    root[:, 2] = lowest_root(neutral.skeleton, ways.rotations)
-    places, _ = pose_kinematics(neutral.skeleton, root, ways.rotations)
-    return ways.rotations[int(np.argmin(places[:, body.hips, 2] + 0.5 * places[:, body.chest, 2]))]
+    variants = to_motion(_build_variants(table, neutral, left), neutral)
+    body = identify_joints(neutral.skeleton)
+    root = np.zeros((len(variants), 3))
+    root[:, 2] = compute_lowest_root(neutral.skeleton, variants.rotations)
+    places, _ = compute_pose(neutral.skeleton, root, variants.rotations)
+    return variants.rotations[int(np.argmin(places[:, body.hips, 2] + 0.5 * places[:, body.chest, 2]))]
 
 
-def _side_posture(table: dict, neutral: Neutral, left: bool) -> Posture:
+def _build_variants(table: dict, neutral: NeutralStance, left: bool) -> Posture:
     """Build all variants of lying of a table, one frame each."""
     sign, scale, count = 1.0 if left else -1.0, neutral.leg / tables.LEG, _SLOPES.size
     arms, ankles, feet = np.zeros((count, 2, 5)), np.zeros((count, 2, 3)), np.zeros((count, 2, 3))

@@ -12,14 +12,14 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from ..motion.retargeting.adult import STATURE, adult_skeleton
+from ..motion.retargeting.adult import STATURE, build_adult_skeleton
 from ..motion.skeleton import Skeleton
 from .kicks import KickStyle
-from .throws import STYLES, Throw, ThrowStyle, throw
+from .throws import STYLES, Throw, ThrowStyle, build_throw
 
 _KICK_SCATTER = {"approach": 2.0, "stride": 0.04, "back": 0.04, "follow": 0.05, "lean": 1.5, "off_arm": 0.06}
 """Standard deviation of the variation from kick to kick."""
-_WHIP = 0.05  # s around the contact in which the leg swings through the ball
+_WHIP_SECONDS = 0.05  # s around the contact in which the leg swings through the ball
 _LEAST_KICK = 8.0  # m/s of the ball in a kick with no effort
 
 _THROW_SCATTER = {
@@ -30,7 +30,7 @@ _LEAST_THROW = 9.0  # m/s of the ball in a throw with no effort
 
 
 @dataclass(frozen=True, eq=False)
-class Person:
+class Performer:
     """A synthetic performer.
 
     Attributes:
@@ -50,15 +50,15 @@ class Person:
     manner: object
 
 
-def make_adult(fastest: float, manner) -> Person:
+def build_adult(fastest: float, manner) -> Performer:
     """Build the performer with the project's own adult skeleton, in the manner of the tables."""
-    return Person("adult", STATURE, adult_skeleton(), side="right", fastest=fastest, manner=manner)
+    return Performer("adult", STATURE, build_adult_skeleton(), side="right", fastest=fastest, manner=manner)
 
 
-def make_person(
+def build_performer(
     name: str, manner: type, ranges: Mapping[str, tuple[float, float]], fastest: tuple[float, float],
     chance: np.random.Generator,
-) -> Person:
+) -> Performer:
     """Build a random performer of 1.6 to 2.0 m.
 
     Args:
@@ -71,12 +71,12 @@ def make_person(
         The performer.
     """
     stature = float(chance.uniform(1.60, 2.00))
-    own = manner(**{field: float(chance.uniform(low, high)) for field, (low, high) in ranges.items()})
+    manner_chosen = manner(**{field: float(chance.uniform(low, high)) for field, (low, high) in ranges.items()})
     hardest = float(chance.uniform(*fastest))
-    return Person(name, stature, make_body(stature, chance), side="right", fastest=hardest, manner=own)
+    return Performer(name, stature, build_body(stature, chance), side="right", fastest=hardest, manner=manner_chosen)
 
 
-def make_body(stature: float, chance: np.random.Generator) -> Skeleton:
+def build_body(stature: float, chance: np.random.Generator) -> Skeleton:
     """Build an adult whose limbs and trunk are some percent longer or shorter than average, the same on both sides.
 
     Args:
@@ -85,24 +85,24 @@ def make_body(stature: float, chance: np.random.Generator) -> Skeleton:
     Returns:
         The skeleton.
     """
-    usual = adult_skeleton(stature)
-    legs, arms, wide = chance.uniform([0.965, 0.95, 0.94], [1.035, 1.05, 1.06])
+    average = build_adult_skeleton(stature)
+    legs, arms, width = chance.uniform([0.965, 0.95, 0.94], [1.035, 1.05, 1.06])
     trunk = 1.0 - 0.9 * (legs - 1.0)  # long legs go with a short trunk
-    offsets = np.array(usual.offsets)
-    for joint, name in enumerate(usual.names):
+    offsets = np.array(average.offsets)
+    for joint, name in enumerate(average.names):
         part = name.removeprefix("Left").removeprefix("Right")
         if part in ("Leg", "Foot"):
             offsets[joint] *= legs
         elif part in ("ForeArm", "Hand"):
             offsets[joint] *= arms
         elif part in ("Shoulder", "Arm", "UpLeg"):
-            offsets[joint, 1] *= wide
+            offsets[joint, 1] *= width
         elif part.startswith("Spine") or part == "Neck":
             offsets[joint] *= trunk
-    return replace(usual, offsets=offsets)
+    return replace(average, offsets=offsets)
 
 
-def scatter_manner(manner, scatter: dict[str, float], chance: np.random.Generator):
+def vary_manner(manner, scatter: dict[str, float], chance: np.random.Generator):
     """Vary a manner randomly.
 
     Args:
@@ -112,9 +112,9 @@ def scatter_manner(manner, scatter: dict[str, float], chance: np.random.Generato
     Returns:
         The varied manner.
     """
-    off = np.clip(chance.standard_normal(len(scatter)), -2.0, 2.0)
+    deviations = np.clip(chance.standard_normal(len(scatter)), -2.0, 2.0)
     return replace(
-        manner, **{name: getattr(manner, name) + float(by) * scatter[name] for name, by in zip(scatter, off)}
+        manner, **{name: getattr(manner, name) + float(by) * scatter[name] for name, by in zip(scatter, deviations)}
     )
 
 
@@ -151,14 +151,14 @@ _KICK_RANGES = {
 """Lowest and highest value of each field."""
 
 
-def make_kicker(seed: int) -> Person:
+def build_kicker(seed: int) -> Performer:
     """Build a performer who kicks; the same seed gives the same one. Seed 0 has the project's own adult skeleton."""
     if seed == 0:
-        return make_adult(28.0, KickManner())
-    return make_person(f"kicker{seed:02d}", KickManner, _KICK_RANGES, (22.0, 28.0), np.random.default_rng([seed, 1863]))
+        return build_adult(28.0, KickManner())
+    return build_performer(f"kicker{seed:02d}", KickManner, _KICK_RANGES, (22.0, 28.0), np.random.default_rng([seed, 1863]))
 
 
-def vary_kick(who: Person, base: KickStyle, speed: float, chance: np.random.Generator) -> KickStyle:
+def vary_kick(performer: Performer, base: KickStyle, speed: float, chance: np.random.Generator) -> KickStyle:
     """Vary how a performer kicks.
 
     Args:
@@ -169,8 +169,8 @@ def vary_kick(who: Person, base: KickStyle, speed: float, chance: np.random.Gene
     Returns:
         The performer's style for this kick.
     """
-    effort = float(np.clip((speed - _LEAST_KICK) / (who.fastest - _LEAST_KICK), 0.0, 1.0))
-    return style_kick(base, scatter_manner(who.manner, _KICK_SCATTER, chance), effort)
+    effort = float(np.clip((speed - _LEAST_KICK) / (performer.fastest - _LEAST_KICK), 0.0, 1.0))
+    return style_kick(base, vary_manner(performer.manner, _KICK_SCATTER, chance), effort)
 
 
 def style_kick(base: KickStyle, manner: KickManner, effort: float = 1.0) -> KickStyle:
@@ -190,34 +190,34 @@ def style_kick(base: KickStyle, manner: KickManner, effort: float = 1.0) -> Kick
     return replace(
         base, approach=approach,
         strides=tuple(manner.stride * (0.8 + 0.2 * effort) * stride for stride in base.strides),
-        leg=_swung(base.leg, back, 0.72 + 0.28 * effort, follow),
-        pelvis=tuple((t, side, tilt, _turned(t, about, turn, manner.approach)) for t, side, tilt, about in base.pelvis),
-        spine=tuple((t, side - manner.lean * _near_zero(t), tilt, turn * about) for t, side, tilt, about in base.spine),
+        leg=_scale_leg(base.leg, back, 0.72 + 0.28 * effort, follow),
+        pelvis=tuple((t, side, tilt, _blend_turn(t, about, turn, manner.approach)) for t, side, tilt, about in base.pelvis),
+        spine=tuple((t, side - manner.lean * _weight_near_zero(t), tilt, turn * about) for t, side, tilt, about in base.spine),
         left_arm=arms[0], right_arm=arms[1],
     )
 
 
-def _swung(rows: tuple, back: float, whip: float, follow: float) -> tuple:
+def _scale_leg(rows: tuple, back: float, whip: float, follow: float) -> tuple:
     """Scale rows (time, thigh, knee) of the leg: backswing, whip through the ball, and follow-through."""
     at = next(row for row in rows if row[0] == 0.0)
     out = []
     for time, thigh, knee in rows:
-        if time < -_WHIP:
+        if time < -_WHIP_SECONDS:
             out.append((time, back * thigh, back * knee))
-        elif time > _WHIP:
+        elif time > _WHIP_SECONDS:
             out.append((time, follow * thigh, knee))
         else:
             out.append((time, at[1] + whip * (thigh - at[1]), at[2] + whip * (knee - at[2])))
     return tuple(out)
 
 
-def _turned(time: float, about: float, turn: float, approach: float) -> float:
+def _blend_turn(time: float, about: float, turn: float, approach: float) -> float:
     """Compute the pelvis' turn: the approach's on the run-up, then the style's."""
-    way_up = float(np.clip((-0.2 - time) / 0.2, 0.0, 1.0))
-    return about * (way_up + (1.0 - way_up) * turn) - way_up * approach
+    approach_share = float(np.clip((-0.2 - time) / 0.2, 0.0, 1.0))
+    return about * (approach_share + (1.0 - approach_share) * turn) - approach_share * approach
 
 
-def _near_zero(time: float) -> float:
+def _weight_near_zero(time: float) -> float:
     """Weight of a time (s) near the contact or release."""
     return float(np.exp(-0.5 * (time / 0.25) ** 2))
 
@@ -252,16 +252,16 @@ _THROW_RANGES = {
 """Lowest and highest value of each field."""
 
 
-def make_thrower(seed: int) -> Person:
+def build_thrower(seed: int) -> Performer:
     """Build a performer who throws; the same seed gives the same one. Seed 0 has the project's own adult skeleton."""
     if seed == 0:
-        return make_adult(34.0, ThrowManner())
+        return build_adult(34.0, ThrowManner())
     chance = np.random.default_rng([seed, 1907])
-    return make_person(f"subject{seed:02d}", ThrowManner, _THROW_RANGES, (24.0, 34.0), chance)
+    return build_performer(f"subject{seed:02d}", ThrowManner, _THROW_RANGES, (24.0, 34.0), chance)
 
 
-def make_throw(
-    thrower: Person, target: tuple[float, float, float], speed: float, chance: np.random.Generator, fps: float = 120.0
+def build_performer_throw(
+    thrower: Performer, target: tuple[float, float, float], speed: float, chance: np.random.Generator, fps: float = 120.0
 ) -> Throw:
     """Build a throw of a performer.
 
@@ -276,10 +276,10 @@ def make_throw(
     Raises:
         InputError: as for `throws.build_throw`.
     """
-    manner = scatter_manner(thrower.manner, _THROW_SCATTER, chance)
+    manner = vary_manner(thrower.manner, _THROW_SCATTER, chance)
     effort = float(np.clip((speed - _LEAST_THROW) / (thrower.fastest - _LEAST_THROW), 0.0, 1.0))
     style = style_throw(STYLES["overarm"], manner, effort)
-    return throw(target, speed, thrower.side, style=style, skeleton=thrower.skeleton, fps=fps)
+    return build_throw(target, speed, thrower.side, style=style, skeleton=thrower.skeleton, fps=fps)
 
 
 def style_throw(base: ThrowStyle, manner: ThrowManner, effort: float = 1.0) -> ThrowStyle:
@@ -293,27 +293,27 @@ def style_throw(base: ThrowStyle, manner: ThrowManner, effort: float = 1.0) -> T
         The style.
     """
     turn, out = 0.62 + 0.38 * effort, 0.78 + 0.22 * effort
-    way = manner.stride * (0.62 + 0.38 * effort)
+    stride = manner.stride * (0.62 + 0.38 * effort)
     raised = manner.lift * (0.25 + 0.75 * effort)
     lean = manner.lean * (0.55 + 0.45 * effort)
-    spine = [(t, side - manner.slot * _near_zero(t), lean * tilt, turn * about) for t, side, tilt, about in base.spine]
+    spine = [(t, side - manner.slot * _weight_near_zero(t), lean * tilt, turn * about) for t, side, tilt, about in base.spine]
     style = ThrowStyle(
         pelvis=scale_rows(base.pelvis, 1.0, lean, turn), spine=tuple(spine),
         right_arm=tuple((t, a, b, c if c > -60.0 else -60.0 + out * (c + 60.0), e) for t, a, b, c, e in base.right_arm),
         left_arm=scale_rows(base.left_arm, manner.off_arm, manner.off_arm, 1.0, 1.0), forearm=base.forearm,
-        hips=scale_rows(base.hips, way, 0.4 + 0.6 * way),
-        left_foot=scale_rows(base.left_foot, way, 1.0, raised, raised, turn),
-        right_foot=scale_rows(base.right_foot, way, 1.0, 1.0, 1.0, turn),
+        hips=scale_rows(base.hips, stride, 0.4 + 0.6 * stride),
+        left_foot=scale_rows(base.left_foot, stride, 1.0, raised, raised, turn),
+        right_foot=scale_rows(base.right_foot, stride, 1.0, 1.0, 1.0, turn),
     )
     brisk = replace(manner, wind_up=manner.wind_up * (0.6 + 0.4 * effort), follow=manner.follow * (0.7 + 0.3 * effort))
-    return ThrowStyle(*(_paced(getattr(style, field.name), brisk) for field in fields(style)))
+    return ThrowStyle(*(_scale_times(getattr(style, field.name), brisk) for field in fields(style)))
 
 
-def _paced(rows: tuple, manner: ThrowManner) -> tuple:
+def _scale_times(rows: tuple, manner: ThrowManner) -> tuple:
     """Scale the duration of the wind-up (before 0.35 s to release) and of the follow-through (after 0.2 s)."""
 
-    def later(time: float) -> float:
+    def scale_time(time: float) -> float:
         time = time if time > -0.35 else -0.35 + manner.wind_up * (time + 0.35)
         return time if time < 0.2 else 0.2 + manner.follow * (time - 0.2)
 
-    return tuple((later(row[0]), *row[1:]) for row in rows)
+    return tuple((scale_time(row[0]), *row[1:]) for row in rows)

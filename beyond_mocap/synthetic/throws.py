@@ -16,25 +16,25 @@ import numpy as np
 
 from ..base.errors import InputError
 from ..motion import quaternion
-from ..motion.humanoid import identify
+from ..motion.humanoid import identify_joints
 from ..motion.mirror import mirror
-from ..motion.motion import Motion, at_frames, forward_kinematics, place
-from ..motion.retargeting.adult import adult_skeleton
-from ..motion.retargeting.neutral import Neutral, neutral_stance
+from ..motion.motion import Motion, sample_frames, forward_kinematics, place_motion
+from ..motion.retargeting.adult import build_adult_skeleton
+from ..motion.retargeting.neutral import NeutralStance, build_neutral_stance
 from ..motion.retargeting.posture import Posture, to_motion
 from ..motion.skeleton import Skeleton
 from . import gait_tables as tables
 from .footsteps import lift_foot
-from .gestures import RIGHT, begin_plan, choose_style
+from .gestures import RIGHT, build_plan_parts, choose_style
 
 BEFORE, AFTER = 1.6, 1.2
 """Seconds of a hard throw before and after release; slower ones take longer."""
 SLOWEST, FASTEST = 3.0, 45.0  # m/s at release
-_PLAN = 480.0  # Hz at which a throw is planned
-_ROUND = 0.007  # s over which corners of the tables are rounded
+_PLAN_RATE = 480.0  # Hz at which a throw is planned
+_ROUNDING_SECONDS = 0.007  # s over which corners of the tables are rounded
 _EARLIEST, _LATEST = -0.022, 0.022  # s around the table's release within which the ball can leave
-_ROUNDS = 12  # rounds of aiming: instant, rate and turn depend on one another
-_AHEAD, _DOWN = 0.012, 0.105  # m of an adult whose hand hangs: toward the thumb, toward the fingertips
+_AIM_ROUNDS = 12  # rounds of aiming: instant, rate and turn depend on one another
+_GRIP_AHEAD, _GRIP_DOWN = 0.012, 0.105  # m of an adult whose hand hangs: toward the thumb, toward the fingertips
 USUAL_GRIP = 0.036
 """Metres from the palm's middle to the centre of a baseball; larger balls are further out by their radius."""
 
@@ -131,7 +131,7 @@ class Throw:
     grip: np.ndarray
 
 
-def throw(
+def build_throw(
     target: tuple[float, float, float] = (18.0, 0.0, 1.0), speed: float = 25.0, arm: str = "right",
     style: str | ThrowStyle = "overarm", skeleton: Skeleton | None = None, fps: float = 120.0,
 ) -> Throw:
@@ -149,103 +149,103 @@ def throw(
     Raises:
         InputError: for a target that cannot be reached at that speed, an unknown arm or style, or a body without hands.
     """
-    how = choose_style("throw", arm, "arm", style=style, styles=STYLES, speed=speed, speeds=(SLOWEST, FASTEST))
-    neutral = neutral_stance(skeleton or adult_skeleton())
-    swing = _Swing(to_motion(_posture(how, neutral), neutral), neutral, arm)
-    release, rate, turn = _aimed(swing, np.asarray(target, dtype=float), speed)
-    return swing.at_rate(release, rate, turn, fps)
+    chosen = choose_style("throw", arm, "arm", style=style, styles=STYLES, speed=speed, speeds=(SLOWEST, FASTEST))
+    neutral = build_neutral_stance(skeleton or build_adult_skeleton())
+    swing = _Swing(to_motion(_build_posture(chosen, neutral), neutral), neutral, arm)
+    release, rate, turn = _solve_aim(swing, np.asarray(target, dtype=float), speed)
+    return swing.build_throw_at(release, rate, turn, fps)
 
 
 class _Swing:
     """A hard throw along +X at the planning rate, with its ball; slower and turned ones are sampled from it."""
 
-    def __init__(self, motion: Motion, neutral: Neutral, arm: str):
-        body = identify(motion.skeleton)
+    def __init__(self, motion: Motion, neutral: NeutralStance, arm: str):
+        body = identify_joints(motion.skeleton)
         if body.right.hand is None or body.left.hand is None:
             raise InputError("throw", "a body without hands", "a skeleton with arms and hands")
         self.hand = body.left.hand if arm == "left" else body.right.hand
         self.arm = arm
         self.motion = mirror(motion) if arm == "left" else motion
-        self.grip = grip_in(neutral, arm)
+        self.grip = compute_grip(neutral, arm)
         places, turns = forward_kinematics(self.motion)
         self.ball = places[:, self.hand] + quaternion.rotate(turns[:, self.hand], self.grip)
-        self.velocity = np.gradient(self.ball, 1.0 / _PLAN, axis=0)
+        self.velocity = np.gradient(self.ball, 1.0 / _PLAN_RATE, axis=0)
 
-    def released(self, at: float) -> tuple[np.ndarray, np.ndarray]:
+    def find_release(self, at: float) -> tuple[np.ndarray, np.ndarray]:
         """Interpolate the place (3,) m and velocity (3,) m/s of the ball `at` seconds from the table's release."""
-        frame = np.clip((BEFORE + at) * _PLAN, 0, len(self.ball) - 2)
+        frame = np.clip((BEFORE + at) * _PLAN_RATE, 0, len(self.ball) - 2)
         low, share = int(frame), frame - int(frame)
-        both = [(1.0 - share) * rows[low] + share * rows[low + 1] for rows in (self.ball, self.velocity)]
-        return both[0], both[1]
+        place_and_velocity = [(1.0 - share) * rows[low] + share * rows[low + 1] for rows in (self.ball, self.velocity)]
+        return place_and_velocity[0], place_and_velocity[1]
 
-    def at_rate(self, at: float, rate: float, turn: float, fps: float) -> Throw:
+    def build_throw_at(self, at: float, rate: float, turn: float, fps: float) -> Throw:
         """Build the throw at playback rate `rate`, turned by `turn` rad, at `fps`."""
-        seconds = np.arange(int(np.floor((len(self.motion) - 1) / _PLAN / rate * fps)) + 1) / fps
-        root, rotations = at_frames(self.motion, seconds * rate * _PLAN)
-        motion = place(Motion(self.motion.skeleton, root, rotations, fps), turn)
-        spot, velocity = self.released(at)
-        turned = quaternion.rotate(quaternion.about_up(np.array(turn)), np.stack([spot, rate * velocity]))
-        return Throw(motion=motion, release=(BEFORE + at) / rate, arm=self.arm, position=turned[0], velocity=turned[1],
+        seconds = np.arange(int(np.floor((len(self.motion) - 1) / _PLAN_RATE / rate * fps)) + 1) / fps
+        root, rotations = sample_frames(self.motion, seconds * rate * _PLAN_RATE)
+        motion = place_motion(Motion(self.motion.skeleton, root, rotations, fps), turn)
+        spot, velocity = self.find_release(at)
+        rotated = quaternion.rotate(quaternion.from_up_angle(np.array(turn)), np.stack([spot, rate * velocity]))
+        return Throw(motion=motion, release=(BEFORE + at) / rate, arm=self.arm, position=rotated[0], velocity=rotated[1],
                      grip=self.grip)
 
 
-def _aimed(swing: _Swing, target: np.ndarray, speed: float) -> tuple[float, float, float]:
+def _solve_aim(swing: _Swing, target: np.ndarray, speed: float) -> tuple[float, float, float]:
     """Find when in the swing (s), at which rate and turned by how much (rad) a ball of `speed` hits the target."""
     instants = np.linspace(_EARLIEST, _LATEST, 89)
     turn = float(np.arctan2(target[1], target[0]))
     at, rate = 0.0, 1.0
-    for _ in range(_ROUNDS):
-        turned = quaternion.rotate(quaternion.about_up(np.array(-turn)), target)
-        off = []
+    for _ in range(_AIM_ROUNDS):
+        target_turned = quaternion.rotate(quaternion.from_up_angle(np.array(-turn)), target)
+        elevation_errors = []
         for instant in instants:
-            spot, velocity = swing.released(instant)
+            spot, velocity = swing.find_release(instant)
             rises = float(np.arctan2(velocity[2], np.hypot(velocity[0], velocity[1])))
-            off.append(rises - _wanted_elevation(turned - spot, speed))
-        at = _first_zero(instants, np.array(off), speed)
-        spot, velocity = swing.released(at)
+            elevation_errors.append(rises - _compute_elevation(target_turned - spot, speed))
+        at = _find_zero(instants, np.array(elevation_errors), speed)
+        spot, velocity = swing.find_release(at)
         rate = speed / float(np.linalg.norm(velocity))
-        way = turned - spot
-        turn += float(np.arctan2(way[1], way[0]) - np.arctan2(velocity[1], velocity[0]))
+        to_target = target_turned - spot
+        turn += float(np.arctan2(to_target[1], to_target[0]) - np.arctan2(velocity[1], velocity[0]))
     return at, rate, turn
 
 
-def _first_zero(instants: np.ndarray, off: np.ndarray, speed: float) -> float:
+def _find_zero(instants: np.ndarray, errors: np.ndarray, speed: float) -> float:
     """Find the instant at which the elevation error (N,) is zero, nearest to the table's own release."""
-    change = np.flatnonzero(np.sign(off[1:]) != np.sign(off[:-1]))
+    change = np.flatnonzero(np.sign(errors[1:]) != np.sign(errors[:-1]))
     if not len(change):
         raise InputError(
             "throw", "a target too high, too low or too far", f"one that {speed:g} m/s reach", "throw faster or nearer"
         )
-    zeros = instants[change] + (instants[1] - instants[0]) * off[change] / (off[change] - off[change + 1])
+    zeros = instants[change] + (instants[1] - instants[0]) * errors[change] / (errors[change] - errors[change + 1])
     return float(zeros[np.argmin(np.abs(zeros))])
 
 
-def _wanted_elevation(way: np.ndarray, speed: float) -> float:
+def _compute_elevation(to_target: np.ndarray, speed: float) -> float:
     """Compute the elevation (rad) of the flatter arc without air that covers `to_target` (3,) m.
 
     Raises:
         InputError: if there is none.
     """
-    level, up = float(np.hypot(way[0], way[1])), float(way[2])
+    level, up = float(np.hypot(to_target[0], to_target[1])), float(to_target[2])
     inside = speed**4 - tables.GRAVITY * (tables.GRAVITY * level**2 + 2.0 * up * speed**2)
     if level < 1e-6 or inside < 0.0:
         raise InputError("throw", "a target out of reach", f"one that {speed:g} m/s reach", "throw faster or nearer")
     return float(np.arctan2(speed**2 - np.sqrt(inside), tables.GRAVITY * level))
 
 
-def _posture(style: ThrowStyle, neutral: Neutral) -> Posture:
+def _build_posture(style: ThrowStyle, neutral: NeutralStance) -> Posture:
     """Build the throw's posture at the planning rate."""
-    times = np.arange(int(round((BEFORE + AFTER) * _PLAN)) + 1) / _PLAN - BEFORE
+    times = np.arange(int(round((BEFORE + AFTER) * _PLAN_RATE)) + 1) / _PLAN_RATE - BEFORE
     nothing = np.zeros_like(times)
-    curve, pelvis, spine, arms, height = begin_plan(style, neutral, times, _ROUND * _PLAN)
-    way = curve(style.hips) * (neutral.leg / tables.LEG)
+    curve, pelvis, spine, arms, height = build_plan_parts(style, neutral, times, _ROUNDING_SECONDS * _PLAN_RATE)
+    hips = curve(style.hips) * (neutral.leg / tables.LEG)
     forearm = np.radians(curve(style.forearm))
     arms[:, RIGHT, 4] = forearm[:, 0]
     feet = [lift_foot(curve(rows), neutral) for rows in (style.left_foot, style.right_foot)]
     look = np.clip(-(pelvis[:, 2] + spine[:, 2]), -1.2, 1.2)
     nod = -0.55 * (pelvis[:, 1] + spine[:, 1])
     return Posture(
-        fps=_PLAN, hips=np.stack([way[:, 0], nothing, height - way[:, 1]], axis=-1), heading=nothing, pelvis=pelvis,
+        fps=_PLAN_RATE, hips=np.stack([hips[:, 0], nothing, height - hips[:, 1]], axis=-1), heading=nothing, pelvis=pelvis,
         spine=spine, head=np.stack([-0.5 * spine[:, 0], nod, look], axis=-1), arms=arms,
         wrists=np.stack([nothing + 0.1, forearm[:, 1]], axis=-1),
         ankles=np.stack([foot[:, :3] for foot in feet], axis=1), feet=np.stack([foot[:, 3:] for foot in feet], axis=1),
@@ -254,7 +254,7 @@ def _posture(style: ThrowStyle, neutral: Neutral) -> Posture:
     )
 
 
-def grip_of(skeleton: Skeleton, side: str, radius: float = USUAL_GRIP) -> np.ndarray:
+def find_grip(skeleton: Skeleton, side: str, radius: float = USUAL_GRIP) -> np.ndarray:
     """Compute the centre of a held ball in the axes of the hand joint.
 
     Args:
@@ -266,10 +266,10 @@ def grip_of(skeleton: Skeleton, side: str, radius: float = USUAL_GRIP) -> np.nda
     Raises:
         InputError: if the body has no such hand.
     """
-    return grip_in(neutral_stance(skeleton), side, radius)
+    return compute_grip(build_neutral_stance(skeleton), side, radius)
 
 
-def grip_in(neutral: Neutral, side: str, out: float | None = None) -> np.ndarray:
+def compute_grip(neutral: NeutralStance, side: str, out: float | None = None) -> np.ndarray:
     """Compute the centre of a held ball, for a skeleton whose neutral stance is known.
 
     Args:
@@ -281,11 +281,11 @@ def grip_in(neutral: Neutral, side: str, out: float | None = None) -> np.ndarray
     Raises:
         InputError: if the body has no such hand.
     """
-    hand = getattr(identify(neutral.skeleton), side).hand
+    hand = getattr(identify_joints(neutral.skeleton), side).hand
     if hand is None:
         raise InputError("throw", f"a body without a {side} hand", "a skeleton with arms and hands")
     size, sign = neutral.leg / tables.LEG, 1.0 if side == "left" else -1.0
-    held = np.array([_AHEAD, -USUAL_GRIP * sign, -_DOWN]) * size
+    held = np.array([_GRIP_AHEAD, -USUAL_GRIP * sign, -_GRIP_DOWN]) * size
     if out is not None:
         held[1] = -sign * max(out, USUAL_GRIP * size)
     return quaternion.rotate(quaternion.inverse(neutral.rotations[hand]), held)

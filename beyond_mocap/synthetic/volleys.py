@@ -12,22 +12,22 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from ..motion.motion import Motion
-from ..motion.retargeting.adult import adult_skeleton
-from ..motion.retargeting.neutral import Neutral, neutral_stance
-from ..motion.retargeting.posture import Posture, hip_joints, to_motion
+from ..motion.retargeting.adult import build_adult_skeleton
+from ..motion.retargeting.neutral import NeutralStance, build_neutral_stance
+from ..motion.retargeting.posture import Posture, compute_hip_positions, to_motion
 from ..motion.skeleton import Skeleton
 from . import gait_tables as tables
-from .course import Course
-from .footsteps import Footsteps, lift_off_ground
-from .gait import ease_reach, thigh_shank, with_feet
-from .gestures import LEFT, RIGHT, Gesture, envelope, keyed, mixed
-from .moves import standing_posture, walked_steps
+from .course import GaitPlan
+from .footsteps import Footsteps, compute_ground_lift
+from .gait import ease_reach, measure_leg, plant_feet
+from .gestures import LEFT, RIGHT, Gesture, compute_envelope, interpolate_rows, blend_arrays
+from .moves import build_standing, build_steps
 
 BEFORE, AFTER = 1.6, 1.9
 """Seconds of the clip before and after the touch."""
 
-_BENT = 0.012  # m by which the hips are lower when ready for a ball than in standing
-_STRAIGHTEST, _EASE = 0.985, 0.06  # shares of a leg's length: longest reach, and range over which it is eased
+_READY_DROP = 0.012  # m by which the hips are lower when ready for a ball than in standing
+_LONGEST_REACH, _EASE_SHARE = 0.985, 0.06  # shares of a leg's length: longest reach, and range over which it is eased
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,7 +47,7 @@ class Volley:
         wrist: rows (time, right hand's flexion).
     """
 
-    words: str
+    labels: str
     span: tuple[float, float]
     hips: tuple
     pelvis: tuple
@@ -61,7 +61,7 @@ class Volley:
 
 VOLLEYS = {
     "toss": Volley(
-        words="kick right low top standing front toss",
+        labels="kick right low top standing front toss",
         span=(-0.75, 1.0),
         foot=(
             (-0.30, -0.06, -0.13, 0.15, 26, -10, 0), (-0.14, 0.14, -0.12, 0.22, 22, -12, 0),
@@ -79,7 +79,7 @@ VOLLEYS = {
         right_arm=((-0.6, 6, 14, 12, 22), (0.0, -6, 40, 10, 34), (0.3, 4, 30, 12, 30), (0.85, 2, 10, 12, 16)),
     ),
     "pass": Volley(
-        words="kick right low volley standing front pass",
+        labels="kick right low volley standing front pass",
         span=(-0.8, 1.0),
         foot=(
             (-0.40, -0.12, -0.13, 0.14, 30, -8, 0), (-0.22, -0.30, -0.14, 0.30, 62, -10, 0),
@@ -108,7 +108,7 @@ VOLLEYS = {
         ),
     ),
     "attack": Volley(
-        words="kick right high top standing front attack",
+        labels="kick right high top standing front attack",
         span=(-0.85, 1.1),
         foot=(
             (-0.44, -0.14, -0.15, 0.15, 30, -10, 0), (-0.24, -0.42, -0.24, 0.46, 80, -22, 0),
@@ -139,7 +139,7 @@ VOLLEYS = {
         ),
     ),
     "receive": Volley(
-        words="receive right foot low inside standing front",
+        labels="receive right foot low inside standing front",
         span=(-0.75, 0.95),
         foot=(
             (-0.28, 0.10, -0.13, 0.14, 4, -40, 0), (-0.10, 0.32, -0.13, 0.155, -6, -66, -6),
@@ -157,7 +157,7 @@ VOLLEYS = {
         right_arm=((-0.5, 8, 24, 12, 28), (0.0, -6, 40, 15, 38), (0.3, 4, 34, 15, 40), (0.95, 2, 10, 12, 16)),
     ),
     "head": Volley(
-        words="header standing front",
+        labels="header standing front",
         span=(-0.85, 0.95),
         hips=(
             (-0.85, 0, 0, 0), (-0.30, -0.03, 0, 0.07), (-0.1, -0.01, 0, 0.03), (0.0, 0.04, 0, 0.0),
@@ -176,7 +176,7 @@ VOLLEYS = {
         ),
     ),
     "chest": Volley(
-        words="receive body standing front", span=(-0.75, 0.95),
+        labels="receive body standing front", span=(-0.75, 0.95),
         hips=((-0.75, 0, 0, 0), (-0.25, 0.02, 0, 0.05), (0.0, 0.07, 0, 0.06), (0.2, 0.05, 0, 0.05), (0.95, 0, 0, 0)),
         pelvis=((-0.5, 0, 0, 0), (0.0, 0, -12, 0), (0.22, 0, -6, 0), (0.95, 0, 0, 0)),
         spine=((-0.5, 0, 0, 0), (-0.05, 0, -20, 0), (0.2, 0, -2, 0), (0.95, 0, 2, 0)),
@@ -185,7 +185,7 @@ VOLLEYS = {
         right_arm=((-0.5, 4, 20, 10, 24), (0.0, -10, 62, 0, 50), (0.25, 0, 50, 5, 46), (0.95, 2, 10, 12, 16)),
     ),
     "hand": Volley(
-        words="hand volley standing front",
+        labels="hand volley standing front",
         span=(-1.3, 1.2),
         hips=((-1.3, 0, 0, 0), (-0.25, -0.02, 0, 0.09), (0.0, 0.03, 0, 0.0), (0.25, 0.03, 0, 0.0), (1.0, 0, 0, 0)),
         pelvis=((-0.5, 0, 2, 0), (-0.2, 0, 4, -6), (0.0, 0, -2, 4), (0.25, 0, 0, 6), (1.0, 0, 0, 0)),
@@ -202,7 +202,7 @@ VOLLEYS = {
         wrist=((-0.5, 8), (-0.15, -40), (0.06, 10), (0.5, 8)),
     ),
     "racquet": Volley(
-        words="stroke right standing front",
+        labels="stroke right standing front",
         span=(-1.0, 1.2),
         hips=(
             (-1.0, 0, 0, 0), (-0.45, -0.04, -0.05, 0.05), (0.0, 0.04, 0.05, 0.05), (0.3, 0.05, 0.06, 0.03),
@@ -227,7 +227,7 @@ VOLLEYS = {
 }  # fmt: skip
 
 
-def volley(
+def build_volley(
     kind: str, skeleton: Skeleton | None = None, fps: float = 30.0, seed: int = 0, *, speed: float = 1.0,
     example: Motion | None = None,
 ) -> Gesture:
@@ -244,21 +244,21 @@ def volley(
         The move.
     """
     recipe = VOLLEYS[kind]
-    neutral = neutral_stance(skeleton or adult_skeleton(), example)
-    course, posture = _ready(neutral, BEFORE + AFTER, fps, seed)
-    times = (course.times - BEFORE) * speed
+    neutral = build_neutral_stance(skeleton or build_adult_skeleton(), example)
+    gait_plan, posture = _build_ready(neutral, BEFORE + AFTER, fps, seed)
+    times = (gait_plan.times - BEFORE) * speed
     begin, end = recipe.span
-    ease = envelope(times, begin, 0.6 * begin, 0.55 * end, end)
-    posture = _trunk_and_arms(posture, recipe, times, ease, neutral)
-    posture = with_feet(posture, course.times, _still(course, neutral), neutral)
+    ease = compute_envelope(times, begin, 0.6 * begin, 0.55 * end, end)
+    posture = _blend_recipe(posture, recipe, times, ease, neutral)
+    posture = plant_feet(posture, gait_plan.times, _build_still_steps(gait_plan, neutral), neutral)
     if recipe.foot is not None:
-        posture = _led_foot(posture, recipe.foot, times, neutral)
+        posture = _guide_foot(posture, recipe.foot, times, neutral)
     return Gesture(
-        to_motion(posture.frames(course.asked), neutral), BEFORE, BEFORE + begin / speed, BEFORE + end / speed
+        to_motion(posture.frames(gait_plan.requested), neutral), BEFORE, BEFORE + begin / speed, BEFORE + end / speed
     )
 
 
-def idle(duration: float, skeleton: Skeleton | None = None, fps: float = 30.0, seed: int = 0) -> Motion:
+def build_idle(duration: float, skeleton: Skeleton | None = None, fps: float = 30.0, seed: int = 0) -> Motion:
     """Build standing ready for a ball: knees slightly bent, the weight shifting from foot to foot, feet in place.
 
     Args:
@@ -269,52 +269,52 @@ def idle(duration: float, skeleton: Skeleton | None = None, fps: float = 30.0, s
     Returns:
         The motion.
     """
-    neutral = neutral_stance(skeleton or adult_skeleton())
-    course, posture = _ready(neutral, duration, fps, seed)
-    posture = with_feet(posture, course.times, _still(course, neutral), neutral)
-    return to_motion(posture.frames(course.asked), neutral)
+    neutral = build_neutral_stance(skeleton or build_adult_skeleton())
+    gait_plan, posture = _build_ready(neutral, duration, fps, seed)
+    posture = plant_feet(posture, gait_plan.times, _build_still_steps(gait_plan, neutral), neutral)
+    return to_motion(posture.frames(gait_plan.requested), neutral)
 
 
-def _ready(neutral: Neutral, duration: float, fps: float, seed: int) -> tuple[Course, Posture]:
+def _build_ready(neutral: NeutralStance, duration: float, fps: float, seed: int) -> tuple[GaitPlan, Posture]:
     """Build the plan and posture of standing with bent knees and shifting weight for `duration` seconds."""
-    course, _, posture = standing_posture(neutral, duration, fps, seed)
-    scale, times = neutral.leg / tables.LEG, course.times
+    gait_plan, _, posture = build_standing(neutral, duration, fps, seed)
+    scale, times = neutral.leg / tables.LEG, gait_plan.times
     phase = np.random.default_rng(seed).uniform(0.0, 2.0 * np.pi, 3)
     sway = 0.020 * np.sin(2.0 * np.pi * times / 4.3 + phase[0]) + 0.008 * np.sin(2.0 * np.pi * times / 1.9 + phase[1])
     turn = np.radians(3.0) * np.sin(2.0 * np.pi * times / 5.1 + phase[2])
     nothing = np.zeros_like(times)
-    hips = posture.hips + scale * np.stack([nothing, sway, nothing - _BENT], axis=-1)
+    hips = posture.hips + scale * np.stack([nothing, sway, nothing - _READY_DROP], axis=-1)
     lean = np.stack([-1.5 * sway, nothing + np.radians(4.0), turn], axis=-1)
     spine = posture.spine + np.stack([1.5 * sway, nothing + np.radians(5.0), -0.5 * turn], axis=-1)
     head = posture.head + np.stack([nothing, nothing - np.radians(7.0), -0.5 * turn], axis=-1)
-    return course, posture.changed(hips=hips, pelvis=posture.pelvis + lean, spine=spine, head=head)
+    return gait_plan, posture.replace_arrays(hips=hips, pelvis=posture.pelvis + lean, spine=spine, head=head)
 
 
-def _still(course: Course, neutral: Neutral) -> tuple[Footsteps, ...]:
+def _build_still_steps(gait_plan: GaitPlan, neutral: NeutralStance) -> tuple[Footsteps, ...]:
     """Build stances of both feet that stay on the ground."""
-    return tuple(walked_steps(course, neutral, side, 0.0, ()) for side in (LEFT, RIGHT))
+    return tuple(build_steps(gait_plan, neutral, side, 0.0, ()) for side in (LEFT, RIGHT))
 
 
-def _trunk_and_arms(posture: Posture, recipe: Volley, times, ease, neutral: Neutral) -> Posture:
+def _blend_recipe(posture: Posture, recipe: Volley, times, ease, neutral: NeutralStance) -> Posture:
     """Blend a recipe's trunk, head and arms over a posture by `ease` (T,), and move its hips."""
     scale = neutral.leg / tables.LEG
-    moved = scale * ease[:, None] * keyed(recipe.hips, times)
+    moved = scale * ease[:, None] * interpolate_rows(recipe.hips, times)
     hips = posture.hips + moved * [1.0, 1.0, -1.0]
     nothing = np.zeros_like(times)
-    nod = np.radians(keyed(recipe.head, times))
+    nod = np.radians(interpolate_rows(recipe.head, times))
     head = posture.head + ease[:, None] * np.stack([nothing, nod[:, 0], nod[:, 1]], axis=-1)
     lean = {
-        name: getattr(posture, name) + ease[:, None] * np.radians(keyed(getattr(recipe, name), times))
+        name: getattr(posture, name) + ease[:, None] * np.radians(interpolate_rows(getattr(recipe, name), times))
         for name in ("pelvis", "spine")
     }
     arms, wrists = posture.arms.copy(), posture.wrists.copy()
     for side, rows in enumerate((recipe.left_arm, recipe.right_arm)):
-        arms[:, side, :4] = mixed(arms[:, side, :4], np.radians(keyed(rows, times)), ease)
-    wrists[:, RIGHT] = mixed(wrists[:, RIGHT], np.radians(keyed(recipe.wrist, times))[:, 0], ease)
-    return posture.changed(hips=hips, head=head, arms=arms, wrists=wrists, **lean)
+        arms[:, side, :4] = blend_arrays(arms[:, side, :4], np.radians(interpolate_rows(rows, times)), ease)
+    wrists[:, RIGHT] = blend_arrays(wrists[:, RIGHT], np.radians(interpolate_rows(recipe.wrist, times))[:, 0], ease)
+    return posture.replace_arrays(hips=hips, head=head, arms=arms, wrists=wrists, **lean)
 
 
-def _led_foot(posture: Posture, rows: tuple, times: np.ndarray, neutral: Neutral) -> Posture:
+def _guide_foot(posture: Posture, rows: tuple, times: np.ndarray, neutral: NeutralStance) -> Posture:
     """Guide the right foot from its place through `rows` and back, never through the ground nor beyond the leg's reach.
     """
     scale, table = neutral.leg / tables.LEG, np.array(rows, dtype=float)
@@ -323,16 +323,16 @@ def _led_foot(posture: Posture, rows: tuple, times: np.ndarray, neutral: Neutral
     edges = [np.flatnonzero(inside)[0] - 1, np.flatnonzero(inside)[-1] + 1]
     rest = np.column_stack([posture.ankles[:, RIGHT], posture.feet[:, RIGHT]])
     middle = posture.hips[edges[0]] * [1.0, 1.0, 0.0]
-    led = np.column_stack([table[:, 1:4] * scale + middle, np.radians(table[:, [6, 4, 5]])])
-    through = np.concatenate([rest[edges[:1]], led, rest[edges[1:]]])
+    guided = np.column_stack([table[:, 1:4] * scale + middle, np.radians(table[:, [6, 4, 5]])])
+    through = np.concatenate([rest[edges[:1]], guided, rest[edges[1:]]])
     at = np.concatenate([times[edges[:1]], table[:, 0], times[edges[1:]]])
     path = CubicSpline(at, through, axis=0, bc_type="clamped")(times[inside])
     ankles, feet = posture.ankles.copy(), posture.feet.copy()
     raised = np.sqrt(np.maximum(np.sin(np.pi * (times[inside] - begin) / (land - begin)), 0.0))
-    path[:, 2] += raised * lift_off_ground(path[:, 2], path[:, 4], neutral)
-    hip = hip_joints(posture, neutral)[inside, RIGHT]
-    away, leg = path[:, :3] - hip, sum(thigh_shank(neutral, RIGHT))
-    share = ease_reach(np.linalg.norm(away, axis=1), (_STRAIGHTEST - _EASE) * leg, _EASE * leg)
-    ankles[inside, RIGHT] = hip + away * share[:, None]
+    path[:, 2] += raised * compute_ground_lift(path[:, 2], path[:, 4], neutral)
+    hip = compute_hip_positions(posture, neutral)[inside, RIGHT]
+    from_hip, leg = path[:, :3] - hip, sum(measure_leg(neutral, RIGHT))
+    share = ease_reach(np.linalg.norm(from_hip, axis=1), (_LONGEST_REACH - _EASE_SHARE) * leg, _EASE_SHARE * leg)
+    ankles[inside, RIGHT] = hip + from_hip * share[:, None]
     feet[inside, RIGHT] = path[:, 3:]
-    return posture.changed(ankles=ankles, feet=feet)
+    return posture.replace_arrays(ankles=ankles, feet=feet)

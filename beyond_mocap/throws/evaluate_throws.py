@@ -15,36 +15,36 @@ from dataclasses import asdict, dataclass, field
 
 import numpy as np
 
-from ..ball.flight import Launch, find_crossing, fly
+from ..ball.flight import Launch, find_crossing, simulate_flight
 from ..ball.physics import BASEBALL, Ball
-from ..base.errors import Cancelled, InputError
-from ..evaluation.paired_tests import kept
-from ..files.tables import plain
+from ..base.errors import UserCancelledError, InputError
+from ..evaluation.paired_tests import find_inliers
+from ..files.tables import to_plain
 from ..motion import quaternion
-from ..motion.hand import hand_of, usual_centre
-from ..motion.humanoid import identify
-from ..motion.motion import Motion, cubic_at, forward_kinematics, pose_kinematics
-from ..synthesis.quality.movement import jerk
-from .networks.chains import EFFECTORS, chains_of
-from .networks.description import scaled
-from .networks.example import Example, describe
-from .networks.generate import Generated, Options, generate
-from .networks.kinematics import matrices
+from ..motion.hand import build_hand, estimate_ball_centre
+from ..motion.humanoid import identify_joints
+from ..motion.motion import Motion, sample_frames_cubic, forward_kinematics, compute_pose
+from ..synthesis.quality.movement import compute_jerk
+from .networks.chains import EFFECTORS, find_chains
+from .networks.description import scale_description
+from .networks.example import Example, build_description
+from .networks.generate import GeneratedMotion, Options, generate_motion
+from .networks.kinematics import to_matrices
 from .networks.limits import JointLimits
 from .networks.model import ThrowModel
 
-RAW = Options(pose_iterations=0, ik=False, blend=False, limits=False)
+RAW_OPTIONS = Options(pose_iterations=0, ik=False, blend=False, limits=False)
 """Options of tables 8.1 to 8.4: the networks' output is fed back without corrections."""
-FULL = Options()
+FULL_OPTIONS = Options()
 """Options of tables 8.5 to 8.8: pose iterations, inverse kinematics, the blend of section 7.7.3."""
 _OTHERS = ("far_impact", "own_impact", "head", "head_share", "jerk", "bones", "beyond", "seconds", "duration")
-_WITHIN = 1e-3  # radians, tolerance of the joint limits
-LOST = 0.5
+_LIMIT_TOLERANCE = 1e-3  # radians, tolerance of the joint limits
+MAX_VALID_DEVIATION = 0.5
 """m: a motion with a hand or foot further off on average has failed and is excluded from all means."""
-WALL = 4.0
+WALL_DISTANCE = 4.0
 """m from the thrower to the target of all of Fredriksson's throws, a square of 3 m (section 8.2)."""
-_HALF = 0.02  # frames before and after the release between which the ball's velocity is measured
-_LONGEST = 8.0  # s, longest flight
+_HALF_STEP = 0.02  # frames before and after the release between which the ball's velocity is measured
+_MAX_FLIGHT = 8.0  # s, longest flight
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -89,7 +89,7 @@ class ThrowFigures:
 
 
 @dataclass(frozen=True, eq=False)
-class Evaluated:
+class ThrowEvaluation:
     """Evaluation of a model.
 
     Attributes:
@@ -103,43 +103,43 @@ class Evaluated:
     left_out: tuple[str, ...] = field(default=())
 
     @property
-    def deviation(self) -> np.ndarray:
+    def deviations(self) -> np.ndarray:
         """Deviations (N, 4) m of the final motions."""
         return np.array([one.deviation for one in self.motions]).reshape(-1, 4)
 
     @property
-    def network(self) -> np.ndarray:
+    def network_deviations(self) -> np.ndarray:
         """Deviations (N, 4) m before any correction."""
         return np.array([one.network for one in self.motions]).reshape(-1, 4)
 
     @property
-    def impact(self) -> np.ndarray:
+    def impacts(self) -> np.ndarray:
         """Impact errors (N,) m."""
         return np.array([one.impact for one in self.motions])
 
-    def report(self) -> dict:
+    def build_report(self) -> dict:
         """Collect all figures, as `files.tables` writes them; means are over finite values of valid motions."""
-        lost = find_lost(self.deviation)
-        whole = [one for one, gone in zip(self.motions, lost, strict=True) if not gone]
-        impact = self.impact[~lost]
-        inside = kept(impact)
+        has_failed = find_failed(self.deviations)
+        valid = [one for one, gone in zip(self.motions, has_failed, strict=True) if not gone]
+        impact = self.impacts[~has_failed]
+        inside = find_inliers(impact)
 
-        def means_of(name: str) -> dict[str, float]:
-            columns = np.array([getattr(one, name) for one in whole]).reshape(-1, 4).T
-            return dict(zip(EFFECTORS, map(_mean, columns), strict=True))
+        def compute_means(name: str) -> dict[str, float]:
+            columns = np.array([getattr(one, name) for one in valid]).reshape(-1, 4).T
+            return dict(zip(EFFECTORS, map(_compute_mean, columns), strict=True))
 
         return {
             "options": asdict(self.options), "left_out": list(self.left_out), "motions": len(self.motions),
-            "lost": int(lost.sum()), "subjects": sorted({one.subject for one in self.motions}),
-            "deviation_m": means_of("deviation"), "network_deviation_m": means_of("network"),
-            "body_deviation_m": means_of("body"), "impact_m": _mean(impact[inside]),
+            "lost": int(has_failed.sum()), "subjects": sorted({one.subject for one in self.motions}),
+            "deviation_m": compute_means("deviation"), "network_deviation_m": compute_means("network"),
+            "body_deviation_m": compute_means("body"), "impact_m": _compute_mean(impact[inside]),
             "impacts_culled": int(np.isfinite(impact).sum() - inside.sum()),
-            **{name: _mean([getattr(one, name) for one in whole]) for name in _OTHERS},
-            "each": [plain(vars(one)) for one in self.motions],
+            **{name: _compute_mean([getattr(one, name) for one in valid]) for name in _OTHERS},
+            "each": [to_plain(vars(one)) for one in self.motions],
         }  # fmt: skip
 
 
-def some_of_each(examples: Sequence[Example], motions: int | None) -> list[Example]:
+def select_of_each(examples: Sequence[Example], motions: int | None) -> list[Example]:
     """Select at most `motions` examples of each subject, evenly spaced; None for all."""
     if motions is None:
         return list(examples)
@@ -151,9 +151,9 @@ def some_of_each(examples: Sequence[Example], motions: int | None) -> list[Examp
 
 
 def evaluate_throws(
-    model: ThrowModel, examples: Sequence[Example], options: Options = FULL, *, by_height: bool = True,
+    model: ThrowModel, examples: Sequence[Example], options: Options = FULL_OPTIONS, *, by_height: bool = True,
     progress: Callable[[float, str], None] = lambda fraction, text: None, cancelled: Callable[[], bool] = lambda: False,
-) -> Evaluated:
+) -> ThrowEvaluation:
     """Evaluate a model on examples at its frame rate, on any skeletons.
 
     Args:
@@ -169,32 +169,32 @@ def evaluate_throws(
     found, left_out = [], []
     for order, example in enumerate(examples):
         if cancelled():
-            raise Cancelled("cancelled")
+            raise UserCancelledError("cancelled")
         progress(order / len(examples), example.name)
         try:
-            found.append(_measured(model, example, options, model.stature / example.stature if by_height else 1.0))
+            found.append(_measure_example(model, example, options, model.stature / example.stature if by_height else 1.0))
         except (ArithmeticError, np.linalg.LinAlgError, InputError) as error:
             left_out.append(f"{example.name}: {error}")
-    return Evaluated(tuple(found), options, tuple(left_out))
+    return ThrowEvaluation(tuple(found), options, tuple(left_out))
 
 
-def _measured(model: ThrowModel, example: Example, options: Options, ratio: float) -> ThrowFigures:
+def _measure_example(model: ThrowModel, example: Example, options: Options, ratio: float) -> ThrowFigures:
     """Generate one example and measure its figures."""
-    description = scaled(describe(example), ratio)
-    made = generate(model, description, options=options)
-    came = made.predicted if made.floating is not None and not options.ik else made.effectors
-    near, far, own = _impacts(made.motion, came - made.effectors, example, ratio, description.impact)
-    head, share = _head(made.motion, example.motion)
+    description = scale_description(build_description(example), ratio)
+    generated = generate_motion(model, description, options=options)
+    effectors = generated.predicted if generated.floating is not None and not options.ik else generated.effectors
+    near, far, own = _measure_impacts(generated.motion, effectors - generated.effectors, example, ratio, description.impact)
+    head, share = _measure_head(generated.motion, example.motion)
     return ThrowFigures(
-        name=example.name, subject=example.subject, deviation=deviations(came, description.effectors),
-        network=deviations(made.predicted, description.effectors),
-        body=deviations(made.effectors, description.effectors), impact=near, far_impact=far, own_impact=own, head=head,
-        head_share=share, jerk=_jerk(made.motion) / max(ratio * _jerk(example.motion), 1e-9), bones=_bones(model, made),
-        beyond=_beyond(model, made.motion), seconds=made.seconds, duration=example.motion.duration,
+        name=example.name, subject=example.subject, deviation=measure_deviations(effectors, description.effectors),
+        network=measure_deviations(generated.predicted, description.effectors),
+        body=measure_deviations(generated.effectors, description.effectors), impact=near, far_impact=far, own_impact=own, head=head,
+        head_share=share, jerk=_measure_jerk(generated.motion) / max(ratio * _measure_jerk(example.motion), 1e-9), bones=_measure_bones(model, generated),
+        beyond=_measure_limit_excess(model, generated.motion), seconds=generated.seconds, duration=example.motion.duration,
     )  # fmt: skip
 
 
-def _impacts(motion: Motion, shift: np.ndarray, example: Example, ratio: float, target) -> tuple[float, float, float]:
+def _measure_impacts(motion: Motion, shift: np.ndarray, example: Example, ratio: float, target) -> tuple[float, float, float]:
     """Measure the impact errors; NaN for kicks.
 
     The requested ball is the example's, scaled, in a hand as large as the model's.
@@ -211,88 +211,88 @@ def _impacts(motion: Motion, shift: np.ndarray, example: Example, ratio: float, 
     """
     if example.limb not in (0, 1):
         return np.nan, np.nan, np.nan
-    hand = hand_of(motion, ("left", "right")[example.limb])
-    grip = usual_centre(hand.finger, hand.reach)
-    mine, its = (chains_of(of.skeleton).effectors[example.limb] for of in (motion, example.motion))
-    came = let_go(motion, mine, grip, example.release, shift[:, example.limb])
-    place, speed = let_go(example.motion, its, grip / ratio, example.release)
-    wanted = ratio * place, ratio * speed
-    near, far = np.array([WALL, 0.0, target[2]]), np.asarray(target)
-    off = [np.linalg.norm(find_impact(*came, there) - find_impact(*wanted, there)) for there in (near, far)]
-    return float(off[0]), float(off[1]), float(np.linalg.norm(find_impact(*wanted, far) - far))
+    hand = build_hand(motion, ("left", "right")[example.limb])
+    grip = estimate_ball_centre(hand.finger, hand.reach)
+    own_hand, example_hand = (find_chains(of.skeleton).effectors[example.limb] for of in (motion, example.motion))
+    generated_ball = release_ball(motion, own_hand, grip, example.release, shift[:, example.limb])
+    place, speed = release_ball(example.motion, example_hand, grip / ratio, example.release)
+    requested_ball = ratio * place, ratio * speed
+    near, far = np.array([WALL_DISTANCE, 0.0, target[2]]), np.asarray(target)
+    errors = [np.linalg.norm(find_impact(*generated_ball, there) - find_impact(*requested_ball, there)) for there in (near, far)]
+    return float(errors[0]), float(errors[1]), float(np.linalg.norm(find_impact(*requested_ball, far) - far))
 
 
-def _head(motion: Motion, truth: Motion) -> tuple[float, float]:
+def _measure_head(motion: Motion, truth: Motion) -> tuple[float, float]:
     """Measure how the head's rotation differs from the true one; NaN for bodies without a head.
 
     Returns:
         Mean angle in degrees, and the head's total rotation relative to the chest divided by the true one.
     """
-    turns, against = [], []
+    head_rotations, relative_rotations = [], []
     for one in (motion, truth):
-        body = identify(one.skeleton)
+        body = identify_joints(one.skeleton)
         if body.head is None:
             return np.nan, np.nan
         rotations = forward_kinematics(one)[1]
-        turns.append(rotations[:, body.head])
-        own = quaternion.multiply(quaternion.inverse(rotations[:, body.chest]), turns[-1])
-        against.append(_angles(own[:-1], own[1:]).sum())
-    return float(np.degrees(_angles(*turns).mean())), float(against[0] / max(against[1], 1e-9))
+        head_rotations.append(rotations[:, body.head])
+        own = quaternion.multiply(quaternion.inverse(rotations[:, body.chest]), head_rotations[-1])
+        relative_rotations.append(_compute_angles(own[:-1], own[1:]).sum())
+    return float(np.degrees(_compute_angles(*head_rotations).mean())), float(relative_rotations[0] / max(relative_rotations[1], 1e-9))
 
 
-def _angles(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+def _compute_angles(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Compute the angles (N,) in radians between rotations (N, 4)."""
     return np.linalg.norm(quaternion.to_rotation_vector(quaternion.multiply(quaternion.inverse(a), b)), axis=-1)
 
 
-def _jerk(motion: Motion) -> float:
+def _measure_jerk(motion: Motion) -> float:
     """Measure the 99th percentile of the largest jerk (m/s^3) of any joint."""
-    return float(np.percentile(jerk(forward_kinematics(motion)[0], motion.fps), 99)) if len(motion) > 3 else np.nan
+    return float(np.percentile(compute_jerk(forward_kinematics(motion)[0], motion.fps), 99)) if len(motion) > 3 else np.nan
 
 
-def _bones(model: ThrowModel, made: Generated) -> float:
+def _measure_bones(model: ThrowModel, generated: GeneratedMotion) -> float:
     """Measure the largest change (m) of a bone's length: zero unless a single network's joints are inconsistent."""
-    if made.floating is None:
+    if generated.floating is None:
         return 0.0
-    joints, parents = chains_of(model.skeleton).joints, model.skeleton.parents
+    joints, parents = find_chains(model.skeleton).joints, model.skeleton.parents
     pairs = [(row, joints.index(parents[joint]), joint) for row, joint in enumerate(joints) if parents[joint] in joints]
     own, above, joint = (list(column) for column in zip(*pairs, strict=True))
-    lengths = np.linalg.norm(made.floating[:, own] - made.floating[:, above], axis=-1)
+    lengths = np.linalg.norm(generated.floating[:, own] - generated.floating[:, above], axis=-1)
     return float(np.abs(lengths - np.linalg.norm(model.skeleton.offsets[joint], axis=-1)).max())
 
 
-def _beyond(model: ThrowModel, motion: Motion) -> float:
+def _measure_limit_excess(model: ThrowModel, motion: Motion) -> float:
     """Measure the share of all rotations outside the joint limits."""
     if model.joint_limits is None:
         return np.nan
-    beyond = JointLimits(model.skeleton, model.joint_limits).beyond(matrices(motion))
-    return float(np.mean(beyond > _WITHIN))
+    beyond = JointLimits(model.skeleton, model.joint_limits).measure_excess(to_matrices(motion))
+    return float(np.mean(beyond > _LIMIT_TOLERANCE))
 
 
-def _mean(values) -> float:
+def _compute_mean(values) -> float:
     """Compute the mean of the finite values; NaN if there are none."""
     values = np.asarray(values, float)
     values = values[np.isfinite(values)]
     return float(values.mean()) if len(values) else np.nan
 
 
-def deviations(generated: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+def measure_deviations(generated: np.ndarray, requested: np.ndarray) -> np.ndarray:
     """Measure the mean distance (4,) m over the frames of one motion.
 
     Args:
         generated: (T, 4, 3) m, left hand, right hand, left foot, right foot.
         requested: (T, 4, 3) m, in the same frame of reference.
     """
-    return np.linalg.norm(np.asarray(generated, float) - np.asarray(wanted, float), axis=-1).mean(axis=0)
+    return np.linalg.norm(np.asarray(generated, float) - np.asarray(requested, float), axis=-1).mean(axis=0)
 
 
-def find_lost(deviations: np.ndarray) -> np.ndarray:
+def find_failed(deviations: np.ndarray) -> np.ndarray:
     """Find the motions (N,) bool of deviations (N, 4) m that failed."""
     deviations = np.asarray(deviations, float).reshape(-1, 4)
-    return ~np.all(deviations < LOST, axis=-1)
+    return ~np.all(deviations < MAX_VALID_DEVIATION, axis=-1)
 
 
-def let_go(
+def release_ball(
     motion: Motion, joint: int, grip: np.ndarray, release: float, shift: np.ndarray | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
     """Compute how a held ball leaves a hand at a fractional frame.
@@ -308,8 +308,8 @@ def let_go(
     """
     from scipy.interpolate import CubicSpline
 
-    frames = np.clip(release + np.array([-_HALF, 0.0, _HALF]), 0.0, len(motion) - 1)
-    places, turns = pose_kinematics(motion.skeleton, *cubic_at(motion, frames))
+    frames = np.clip(release + np.array([-_HALF_STEP, 0.0, _HALF_STEP]), 0.0, len(motion) - 1)
+    places, turns = compute_pose(motion.skeleton, *sample_frames_cubic(motion, frames))
     ball = places[:, joint] + quaternion.rotate(turns[:, joint], np.asarray(grip, float))
     if shift is not None:
         ball = ball + CubicSpline(np.arange(len(motion)), shift)(frames)
@@ -327,4 +327,4 @@ def find_impact(place: np.ndarray, velocity: np.ndarray, target: np.ndarray, bal
     Returns:
         (3,) m; NaN if the ball reaches neither.
     """
-    return find_crossing(fly(Launch(0.0, place, velocity), ball, _LONGEST), target)
+    return find_crossing(simulate_flight(Launch(0.0, place, velocity), ball, _MAX_FLIGHT), target)

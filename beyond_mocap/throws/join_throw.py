@@ -14,36 +14,36 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..base.errors import InputError, TimedLine
+from ..base.errors import InputError, TimedMessage
 from ..library.library import Library
 from ..motion import contacts, quaternion
-from ..motion.humanoid import heading_from_positions, identify
-from ..motion.motion import Motion, at_frames, forward_kinematics, place, pose_kinematics, resample, world_rotation
-from ..motion.retargeting.neutral import neutral_stance
+from ..motion.humanoid import compute_heading_from_positions, identify_joints
+from ..motion.motion import Motion, sample_frames, forward_kinematics, place_motion, compute_pose, resample, compute_world_rotation
+from ..motion.retargeting.neutral import build_neutral_stance
 from ..motion.skeleton import Skeleton
-from ..synthesis.construct.carry import Body, Resting, leg, limb_carried
-from ..synthesis.construct.hand_over import stepped_over
-from ..synthesis.construct.meeting import eased
-from ..synthesis.quality.movement import jerk, uncut_windows, windowed
+from ..synthesis.construct.carry import Body, LimbReference, leg_chain, move_limb
+from ..synthesis.construct.hand_over import step_over
+from ..synthesis.construct.meeting import ease_in_out
+from ..synthesis.quality.movement import compute_jerk, collect_uncut_windows, compute_window_maxima
 
 FADE = 0.5
 """Seconds of the blend between a throw and the surrounding motion, at either end."""
 
-LEAST_KEPT = 0.25
+MIN_UNBLENDED = 0.25
 """Seconds before and after the release that are never blended."""
 
-EASED = {"throw": 0.8, "kick": FADE}
+FADE_WITHOUT_LIBRARY = {"throw": 0.8, "kick": FADE}
 """Seconds of the blend without a library: time for a step of each foot, where the throw allows it."""
 
-TURNING = 2.0
+TURNING_SPEED = 2.0
 """Radians per second at which a body may rotate towards the heading of the throw; larger angles take longer."""
 
-_WAITS = 0.5  # m/s; all joints of a waiting body are slower
+_WAITING_SPEED = 0.5  # m/s; all joints of a waiting body are slower
 _PERCENT = 99.0
-_usual: weakref.WeakKeyDictionary[Library, dict] = weakref.WeakKeyDictionary()
-_STEPS_BELOW = 2.0  # m/s; faster bodies run and take no small steps
+_jerk_cache: weakref.WeakKeyDictionary[Library, dict] = weakref.WeakKeyDictionary()
+_MAX_STEPPING_SPEED = 2.0  # m/s; faster bodies run and take no small steps
 # rad and m above which a warning is reported; a throw begins sideways, so large angles are normal
-_FACES_TELLS, _TURNED_TELLS, _MOVED_TELLS = np.radians(100.0), np.radians(60.0), 0.05
+_WARN_HEADING, _WARN_ROTATION, _WARN_OFFSET = np.radians(100.0), np.radians(60.0), 0.05
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -67,9 +67,9 @@ class JoinedThrow:
     release: float
     first: int
     end: int
-    kept: tuple[int, int]
-    moved: np.ndarray
-    turned: float
+    unblended: tuple[int, int]
+    offset: np.ndarray
+    rotation: float
     warnings: tuple[str, ...] = ()
 
     @property
@@ -79,7 +79,7 @@ class JoinedThrow:
 
 
 def join_throw(
-    own: Motion, start: float, throw: Motion, release: float, *, at: float, goes_on: bool = False, fade: float = FADE
+    motion_around: Motion, start: float, throw: Motion, release: float, *, at: float, continues: bool = False, fade: float = FADE
 ) -> JoinedThrow:
     """Join a throw to the motion around it.
 
@@ -94,41 +94,41 @@ def join_throw(
     Raises:
         InputError: if the skeletons differ, or the throw is too short.
     """
-    if throw.skeleton.names != own.skeleton.names:
+    if throw.skeleton.names != motion_around.skeleton.names:
         raise InputError("throw", "a motion of a different skeleton", "a motion of the armature's own skeleton")
-    throw = resample(throw, own.fps)
+    throw = resample(throw, motion_around.fps)
     lead, follow = release, throw.duration - release
-    if min(lead, follow) < LEAST_KEPT:
+    if min(lead, follow) < MIN_UNBLENDED:
         raise InputError(
-            "throw", f"{lead:.2f} s before and {follow:.2f} s after the release", f"at least {LEAST_KEPT:g} s of both"
+            "throw", f"{lead:.2f} s before and {follow:.2f} s after the release", f"at least {MIN_UNBLENDED:g} s of both"
         )
-    fps = own.fps
+    fps = motion_around.fps
     first = int(round((at - release - start) * fps))
     end = first + len(throw)
-    own, start, first, end = hold_ends(own, start, first, end)
-    before = _heading_apart(own, first, throw, 0)
-    into = float(np.clip(max(fade, abs(before) / TURNING), 1.0 / fps, max(lead - LEAST_KEPT, 1.0 / fps)))
-    out = min(fade, follow - LEAST_KEPT)
-    kept = first + int(np.ceil(into * fps)), end - int(np.ceil(out * fps))
-    turned, moved = _continuation(own, throw, kept[1] - first, kept[1], end) if goes_on else (0.0, np.zeros(3))
-    old = _move_rest(own, kept[1], turned, moved)
-    new = own.root_positions.copy(), own.rotations.copy()
+    motion_around, start, first, end = hold_ends(motion_around, start, first, end)
+    before = _measure_heading_difference(motion_around, first, throw, 0)
+    fade_in = float(np.clip(max(fade, abs(before) / TURNING_SPEED), 1.0 / fps, max(lead - MIN_UNBLENDED, 1.0 / fps)))
+    fade_out = min(fade, follow - MIN_UNBLENDED)
+    unblended = first + int(np.ceil(fade_in * fps)), end - int(np.ceil(fade_out * fps))
+    rotation, offset = _compute_continuation(motion_around, throw, unblended[1] - first, unblended[1], end) if continues else (0.0, np.zeros(3))
+    old = _move_rest(motion_around, unblended[1], rotation, offset)
+    new = motion_around.root_positions.copy(), motion_around.rotations.copy()
     new[0][first:end], new[1][first:end] = throw.root_positions, throw.rotations
-    share = _old_share(len(own), first, kept, end)
-    pose = blend_bodies(own.skeleton, new, old, share)
-    if goes_on:
-        standing = contacts.points(own)
+    share = _compute_share(len(motion_around), first, unblended, end)
+    pose = blend_bodies(motion_around.skeleton, new, old, share)
+    if continues:
+        ground_contacts = contacts.detect_heel_toe_contacts(motion_around)
         inside = np.flatnonzero(share[first:end] < 0.5) + first
-        standing[inside] = contacts.points(throw)[inside - first]
-        for stretch in ((first, kept[0]), (kept[1], end)):
-            if _mean_speed(old[0], stretch, fps) <= _STEPS_BELOW:
-                pose = stepped_over(own.skeleton, pose, standing, stretch, fps)
-    motion = Motion(own.skeleton, *pose, fps)
-    away = old[0][kept[1]] - own.root_positions[kept[1]]
-    warnings = _turning_warnings(before, start + first / fps, turned, away, start + end / fps)
+        ground_contacts[inside] = contacts.detect_heel_toe_contacts(throw)[inside - first]
+        for stretch in ((first, unblended[0]), (unblended[1], end)):
+            if _mean_speed(old[0], stretch, fps) <= _MAX_STEPPING_SPEED:
+                pose = step_over(motion_around.skeleton, pose, ground_contacts, stretch, fps)
+    motion = Motion(motion_around.skeleton, *pose, fps)
+    total_offset = old[0][unblended[1]] - motion_around.root_positions[unblended[1]]
+    warnings = _describe_turning(before, start + first / fps, rotation, total_offset, start + end / fps)
     return JoinedThrow(
-        motion=motion, start=start, release=start + first / fps + release, first=first, end=end, kept=kept, moved=away,
-        turned=turned, warnings=warnings,
+        motion=motion, start=start, release=start + first / fps + release, first=first, end=end, unblended=unblended, offset=total_offset,
+        rotation=rotation, warnings=warnings,
     )
 
 
@@ -142,7 +142,7 @@ def hold_ends(own: Motion, start: float, first: int, end: int) -> tuple[Motion, 
         return own, start, first, end
     added = max(-first, 0)
     at = np.arange(-added, max(end, len(own)))
-    root, rotations = at_frames(own, at)
+    root, rotations = sample_frames(own, at)
     return Motion(own.skeleton, root, rotations, own.fps), start - added / own.fps, first + added, end + added
 
 
@@ -158,15 +158,15 @@ def blend_bodies(skeleton: Skeleton, new, old, share: np.ndarray) -> tuple[np.nd
         Root (T, 3) m and rotations (T, J, 4).
     """
     root = new[0] + share[:, None] * (old[0] - new[0])
-    rotations = quaternion.slerp(new[1], quaternion.signed_like(old[1], new[1]), share[:, None])
-    body, legs = Body.posed(skeleton, root, rotations), identify(skeleton)
-    ours, theirs = pose_kinematics(skeleton, *new), pose_kinematics(skeleton, *old)
+    rotations = quaternion.slerp(new[1], quaternion.match_signs(old[1], new[1]), share[:, None])
+    body, legs = Body.from_pose(skeleton, root, rotations), identify_joints(skeleton)
+    new_transforms, old_transforms = compute_pose(skeleton, *new), compute_pose(skeleton, *old)
     for limb in (legs.left, legs.right):
-        place, there = ours[0][:, limb.foot], theirs[0][:, limb.foot]
-        away = place + share[:, None] * (there - place) - body.places[:, limb.foot]
-        rotations = limb_carried(body, Resting.of(body, leg(limb)), away, rotations=rotations)
-        turned = quaternion.slerp(ours[1][:, limb.foot], theirs[1][:, limb.foot], share)
-        above = quaternion.inverse(world_rotation(skeleton, rotations, skeleton.parents[limb.foot]))
+        place, there = new_transforms[0][:, limb.foot], old_transforms[0][:, limb.foot]
+        displacement = place + share[:, None] * (there - place) - body.places[:, limb.foot]
+        rotations = move_limb(body, LimbReference.from_body(body, leg_chain(limb)), displacement, rotations=rotations)
+        turned = quaternion.slerp(new_transforms[1][:, limb.foot], old_transforms[1][:, limb.foot], share)
+        above = quaternion.inverse(compute_world_rotation(skeleton, rotations, skeleton.parents[limb.foot]))
         rotations[:, limb.foot] = quaternion.multiply(above, turned)
     for end, (places, turns) in ((0.0, new), (1.0, old)):
         same = share == end
@@ -174,28 +174,28 @@ def blend_bodies(skeleton: Skeleton, new, old, share: np.ndarray) -> tuple[np.nd
     return root, rotations
 
 
-def _heading_apart(own: Motion, frame: int, throw: Motion, shown: int) -> float:
+def _measure_heading_difference(own: Motion, frame: int, throw: Motion, throw_frame: int) -> float:
     """Measure the angle (rad) from the heading of `own` at its frame to that of the throw at its frame."""
     angles = []
-    for motion, at in ((own, frame), (throw, shown)):
-        places, _ = pose_kinematics(motion.skeleton, motion.root_positions[at], motion.rotations[at])
-        angles.append(float(heading_from_positions(motion.skeleton, places)))
-    return float(quaternion.wrapped(angles[1] - angles[0]))
+    for motion, at in ((own, frame), (throw, throw_frame)):
+        places, _ = compute_pose(motion.skeleton, motion.root_positions[at], motion.rotations[at])
+        angles.append(float(compute_heading_from_positions(motion.skeleton, places)))
+    return float(quaternion.wrap_angle(angles[1] - angles[0]))
 
 
-def _continuation(own: Motion, throw: Motion, shown: int, frame: int, end: int) -> tuple[float, np.ndarray]:
+def _compute_continuation(own: Motion, throw: Motion, throw_frame: int, frame: int, end: int) -> tuple[float, np.ndarray]:
     """Compute rotation (rad) and offset (3,) m that move `own` to the throw in the middle of the blend."""
     middle = (end - frame) // 2
-    at, there = min(frame + middle, len(own) - 1), min(shown + middle, len(throw) - 1)
-    turn = _heading_apart(own, at, throw, there)
-    moved = quaternion.rotate(quaternion.about_up(np.array(turn)), own.root_positions[at])
+    at, there = min(frame + middle, len(own) - 1), min(throw_frame + middle, len(throw) - 1)
+    turn = _measure_heading_difference(own, at, throw, there)
+    moved = quaternion.rotate(quaternion.from_up_angle(np.array(turn)), own.root_positions[at])
     away = throw.root_positions[there] - moved
     return turn, np.array([away[0], away[1], 0.0])
 
 
 def _move_rest(own: Motion, frame: int, turn: float, offset: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Rotate and move everything of `own` from `frame` on; return root and rotations."""
-    moved = place(own, turn, offset)
+    moved = place_motion(own, turn, offset)
     behind = np.arange(len(own)) >= frame
     return (
         np.where(behind[:, None], moved.root_positions, own.root_positions),
@@ -209,36 +209,36 @@ def _mean_speed(root: np.ndarray, stretch: tuple[int, int], fps: float) -> float
     return float(np.linalg.norm(np.diff(part, axis=0), axis=1).mean() * fps) if len(part) > 1 else 0.0
 
 
-def _old_share(count: int, first: int, kept: tuple[int, int], end: int) -> np.ndarray:
+def _compute_share(count: int, first: int, kept: tuple[int, int], end: int) -> np.ndarray:
     """Compute the weight (count,) of the surrounding motion.
 
     It is 0 within `kept`, 1 before the throw's first frame and from its end.
     """
     at = np.arange(count)
     before, behind = (kept[0] - at) / (kept[0] - first + 1.0), (at - kept[1] + 1) / (end - kept[1] + 1.0)
-    return eased(np.maximum(before, behind), np.ones(count))
+    return ease_in_out(np.maximum(before, behind), np.ones(count))
 
 
-def _turning_warnings(before: float, begin: float, turned: float, moved: np.ndarray, end: float) -> tuple[str, ...]:
+def _describe_turning(before: float, begin: float, rotation: float, offset: np.ndarray, end: float) -> tuple[str, ...]:
     """Describe large rotations and displacements of the body."""
-    told = []
-    if abs(before) > _FACES_TELLS:
-        told.append(TimedLine(
+    warnings = []
+    if abs(before) > _WARN_HEADING:
+        warnings.append(TimedMessage(
             f"{begin:.1f} s: the body turns {abs(np.degrees(before)):.0f} degrees to the start of the throw; let it "
             "face the target before, or choose a library for the run-up", (begin, begin),
         ))  # fmt: skip
-    if np.linalg.norm(moved[:2]) > _MOVED_TELLS or abs(turned) > _TURNED_TELLS:
-        told.append(TimedLine(
+    if np.linalg.norm(offset[:2]) > _WARN_OFFSET or abs(rotation) > _WARN_ROTATION:
+        warnings.append(TimedMessage(
             f"{end:.1f} s: the following motion continues from the end of the throw, rotated by "
-            f"{np.degrees(turned):.0f} degrees",
+            f"{np.degrees(rotation):.0f} degrees",
             (end, end),
         ))  # fmt: skip
-    return tuple(told)
+    return tuple(warnings)
 
 
-def stand_still(skeleton: Skeleton, seconds: float, fps: float, spot=(0.0, 0.0), facing: float = 0.0) -> Motion:
+def build_standing_motion(skeleton: Skeleton, seconds: float, fps: float, spot=(0.0, 0.0), facing: float = 0.0) -> Motion:
     """Build a motion of a body that stands upright at `spot` (2,) m with heading `facing` rad for `seconds` s."""
-    stance = neutral_stance(skeleton)
+    stance = build_neutral_stance(skeleton)
     local = stance.rotations.copy()
     for joint, parent in enumerate(skeleton.parents):
         if parent >= 0:
@@ -247,10 +247,10 @@ def stand_still(skeleton: Skeleton, seconds: float, fps: float, spot=(0.0, 0.0),
     count = max(int(round(seconds * fps)) + 1, 2)
     root = np.tile(stance.positions[0], (count, 1))
     motion = Motion(skeleton, root, np.tile(local, (count, 1, 1)), fps)
-    return place(motion, facing, (spot[0], spot[1], 0.0))
+    return place_motion(motion, facing, (spot[0], spot[1], 0.0))
 
 
-def trim_waiting(throw: Motion, release: float, keeps: float = FADE) -> tuple[Motion, float]:
+def trim_waiting(throw: Motion, release: float, margin_s: float = FADE) -> tuple[Motion, float]:
     """Cut the time in which the body only stands from both ends of a throw.
 
     Args:
@@ -262,36 +262,36 @@ def trim_waiting(throw: Motion, release: float, keeps: float = FADE) -> tuple[Mo
     """
     fps = throw.fps
     speed = np.linalg.norm(np.diff(forward_kinematics(throw)[0], axis=0), axis=-1).max(axis=1) * fps
-    moves = np.flatnonzero(speed > _WAITS)
+    moves = np.flatnonzero(speed > _WAITING_SPEED)
     if not len(moves):
         return throw, release
-    least, margin = int(np.ceil(2.0 * LEAST_KEPT * fps)), int(round(keeps * fps))
+    least, margin = int(np.ceil(2.0 * MIN_UNBLENDED * fps)), int(round(margin_s * fps))
     at = release * fps
     first = int(np.clip(moves[0] - margin, 0, max(at - least, 0)))
     end = int(np.clip(moves[-1] + 2 + margin, min(at + least + 1, len(throw)), len(throw)))
     return throw.frames(first, end), release - first / fps
 
 
-def transition_jerk(joined: JoinedThrow) -> np.ndarray:
+def measure_transition_jerk(joined: JoinedThrow) -> np.ndarray:
     """Measure the jerk (2,) m/s^3 of the transitions into and out of the throw.
 
     The largest third difference of any joint within 8 frames of the middle of each blend.
     """
-    values = windowed(jerk(forward_kinematics(joined.motion)[0], joined.motion.fps))
-    at = 0.5 * np.array([joined.first + joined.kept[0], joined.kept[1] + joined.end])
+    values = compute_window_maxima(compute_jerk(forward_kinematics(joined.motion)[0], joined.motion.fps))
+    at = 0.5 * np.array([joined.first + joined.unblended[0], joined.unblended[1] + joined.end])
     return values[np.clip(np.round(at).astype(int) - 2, 0, len(values) - 1)]
 
 
-def library_jerk(library: Library, fps: float, percent: float = _PERCENT) -> float:
+def measure_library_jerk(library: Library, fps: float, percent: float = _PERCENT) -> float:
     """Measure the jerk (m/s^3) that a share of the library's recordings does not exceed.
 
     `percent` of all windows of 17 frames of uncut recordings, at `fps`; computed once per library.
     """
-    known = _usual.setdefault(library, {})
-    if (fps, percent) not in known:
-        recorded = [clip.recording for clip in library.clips if not clip.mirrored and not clip.made]
+    cached = _jerk_cache.setdefault(library, {})
+    if (fps, percent) not in cached:
+        recorded = [clip.recording for clip in library.clips if not clip.mirrored and not clip.is_synthetic]
         places = [forward_kinematics(resample(motion, fps))[0] for motion in recorded]
-        found = [uncut_windows(jerk(one, fps), np.zeros(len(one)))[0] for one in places]
+        found = [collect_uncut_windows(compute_jerk(one, fps), np.zeros(len(one)))[0] for one in places]
         values = np.concatenate(found) if found else np.zeros(0)
-        known[fps, percent] = float(np.percentile(values, percent)) if len(values) else np.nan
-    return known[fps, percent]
+        cached[fps, percent] = float(np.percentile(values, percent)) if len(values) else np.nan
+    return cached[fps, percent]

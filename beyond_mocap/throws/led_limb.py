@@ -12,15 +12,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..motion.motion import Motion
-from ..synthesis.construct.carry import Body, Resting, limb_carried
-from .letting_go import AtFoot, InHand, carried
+from ..synthesis.construct.carry import Body, LimbReference, move_limb
+from .letting_go import AtFoot, InHand, sample_points_and_velocities
 
-Hold = Callable[[np.ndarray, np.ndarray], np.ndarray]
+LimitRotations = Callable[[np.ndarray, np.ndarray], np.ndarray]
 """Function that limits rotations: from local rotations (W, C, 4) of a limb's joints and the original ones to allowed
 ones.
 """
 _NUDGE = np.array([0.005, 0.005, 0.005, 0.2, 0.2, 0.2])  # m and m/s, steps of numerical derivatives
-SOFT = 0.05
+SHIFT_TIME = 0.05
 """s: time scale of a shift; shorter ones are smaller and more sudden."""
 
 
@@ -38,32 +38,32 @@ class Shifts:
     rows: np.ndarray
     cost: np.ndarray
 
-    def of(self, place: np.ndarray, velocity: np.ndarray) -> np.ndarray:
+    def compute_shift(self, place: np.ndarray, velocity: np.ndarray) -> np.ndarray:
         """Compute the shifts (N, 3) m for an offset of the position (3,) m and of the velocity (3,) m/s."""
         return self.rows @ np.stack([place, velocity])
 
 
-def shifts_about(at: float, first: int, last: int, fps: float) -> Shifts:
+def solve_shifts(at: float, first: int, last: int, fps: float) -> Shifts:
     """Compute the shifts about the fractional frame `at`, zero before frame `first` and after frame `last`."""
     from scipy.interpolate import CubicSpline
 
     frames = np.arange(first, last + 1)
     count = len(frames)
     # second differences of the frames, with two zero frames on either side
-    second = np.diff(np.eye(count + 4), 2, axis=0)[:, 2:-2] * fps**2
-    usual = 2.0 * np.sqrt(2.0) * SOFT * fps  # normalisation: a position offset alone costs its square
-    energy = (np.eye(count) + SOFT**4 * second.T @ second) / usual
+    second_differences = np.diff(np.eye(count + 4), 2, axis=0)[:, 2:-2] * fps**2
+    normalization = 2.0 * np.sqrt(2.0) * SHIFT_TIME * fps  # normalisation: a position offset alone costs its square
+    energy = (np.eye(count) + SHIFT_TIME**4 * second_differences.T @ second_differences) / normalization
     padded = np.arange(first - 2, last + 3)
     spline = CubicSpline(padded, np.eye(len(padded)))
     # rows that evaluate the shift's spline and its derivative at `at`; the optimum satisfies both as constraints
-    tells = np.stack([spline(at), fps * spline(at, 1)])[:, 2:-2]
-    spread = np.linalg.solve(energy, tells.T)
-    cost = np.linalg.inv(tells @ spread)
-    return Shifts(frames, spread @ cost, cost)
+    constraints = np.stack([spline(at), fps * spline(at, 1)])[:, 2:-2]
+    response = np.linalg.solve(energy, constraints.T)
+    cost = np.linalg.inv(constraints @ response)
+    return Shifts(frames, response @ cost, cost)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class LedLimb:
+class ShiftedLimb:
     """A motion whose limb follows shifted paths.
 
     Attributes:
@@ -79,30 +79,30 @@ class LedLimb:
     part: InHand | AtFoot
     shifts: Shifts
     window: Body
-    limb: Resting
-    hold: Hold | None = None
+    limb: LimbReference
+    limit_rotations: LimitRotations | None = None
 
     @classmethod
-    def of(cls, motion: Motion, part: InHand | AtFoot, shifts: Shifts, hold: Hold | None = None) -> LedLimb:
+    def from_motion(cls, motion: Motion, part: InHand | AtFoot, shifts: Shifts, limit_rotations: LimitRotations | None = None) -> ShiftedLimb:
         """Build the limb of a motion."""
         first, last = shifts.frames[0], shifts.frames[-1] + 1
-        body = Body.posed(motion.skeleton, motion.root_positions[first:last], motion.rotations[first:last])
-        return cls(motion=motion, part=part, shifts=shifts, window=body, limb=Resting.of(body, part.chain(motion)),
-                   hold=hold)
+        body = Body.from_pose(motion.skeleton, motion.root_positions[first:last], motion.rotations[first:last])
+        return cls(motion=motion, part=part, shifts=shifts, window=body, limb=LimbReference.from_body(body, part.list_joints(motion)),
+                   limit_rotations=limit_rotations)
 
-    def shifted(self, change: np.ndarray) -> Motion:
+    def shift_motion(self, change: np.ndarray) -> Motion:
         """Shift the limb by a change (6,) of position (m) and velocity (m/s) at the release; return the motion."""
         if not np.any(change):
             return self.motion
         rotations = self.motion.rotations.copy()
-        moves, chain = self.shifts.of(change[:3], change[3:]), list(self.limb.chain)
-        led = limb_carried(self.window, self.limb, moves)
-        if self.hold is not None:
-            led[:, chain] = self.hold(led[:, chain], self.window.rotations[:, chain])
-        rotations[self.shifts.frames] = led
+        shifts, chain = self.shifts.compute_shift(change[:3], change[3:]), list(self.limb.chain)
+        shifted_rotations = move_limb(self.window, self.limb, shifts)
+        if self.limit_rotations is not None:
+            shifted_rotations[:, chain] = self.limit_rotations(shifted_rotations[:, chain], self.window.rotations[:, chain])
+        rotations[self.shifts.frames] = shifted_rotations
         return replace(self.motion, rotations=rotations)
 
-    def follows(self, change: np.ndarray, frame: float, points, velocities) -> tuple[np.ndarray, np.ndarray]:
+    def measure_response(self, change: np.ndarray, frame: float, points, velocities) -> tuple[np.ndarray, np.ndarray]:
         """Measure how the limb really responds to requested changes.
 
         Args:
@@ -115,12 +115,12 @@ class LedLimb:
         """
         found = []
         for number, nudge in enumerate(np.diag(_NUDGE)):
-            near = carried(self.part, self.shifted(change + nudge), np.array([frame]))
+            near = sample_points_and_velocities(self.part, self.shift_motion(change + nudge), np.array([frame]))
             found.append([(new - old)[0] / _NUDGE[number] for new, old in zip(near, (points, velocities))])
         return tuple(np.swapaxes(np.array(found), 0, 1))
 
 
-def at_once(count: int) -> tuple[np.ndarray, np.ndarray]:
+def build_exact_response(count: int) -> tuple[np.ndarray, np.ndarray]:
     """Return the derivatives of `ShiftedLimb.measure_response` for K points that follow exactly."""
     both = np.repeat(np.eye(6)[:, None, :], count, axis=1)
     return both[..., :3], both[..., 3:]

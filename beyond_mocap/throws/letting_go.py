@@ -17,20 +17,20 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ..annotation.striking import FOOT_RADIUS
-from ..ball.contact import striking_surface
+from ..ball.contact import find_striking_surface
 from ..ball.physics import Ball
 from ..base.errors import InputError
 from ..base.vectors import unit_vector
 from ..motion import quaternion
-from ..motion.humanoid import identify
-from ..motion.motion import Motion, cubic_at, forward_kinematics, pose_kinematics
-from ..synthesis.construct.carry import arm, leg
+from ..motion.humanoid import identify_joints
+from ..motion.motion import Motion, sample_frames_cubic, forward_kinematics, compute_pose
+from ..synthesis.construct.carry import arm_chain, leg_chain
 
 BEFORE, AFTER = 0.4, 0.4
 """Seconds before and after the release within which a wrist or ankle may be moved."""
-_ASHORE = 0.8  # m/s; a slower foot is in contact with the ground
+_CONTACT_SPEED = 0.8  # m/s; a slower foot is in contact with the ground
 _STEP = 1e-3  # frames, step of numerical derivatives
-RATIO = 1.2
+SPEED_RATIO = 1.2
 """Speed of the ball divided by that of the foot, along the line between them."""
 FRICTION = 0.4
 """Coulomb friction coefficient of shoe on ball: 0.3 to 0.5 (Asai et al. 2002)."""
@@ -49,29 +49,29 @@ class InHand:
     side: str
     grip: np.ndarray
     spin: np.ndarray = field(default_factory=lambda: np.zeros(3))
-    free = 0
+    free_coordinates = 0
 
-    def chain(self, motion: Motion) -> tuple[int, int, int]:
+    def list_joints(self, motion: Motion) -> tuple[int, int, int]:
         """Return shoulder, elbow and wrist joint; InputError if the body lacks one."""
-        joints = arm(getattr(identify(motion.skeleton), self.side))
+        joints = arm_chain(getattr(identify_joints(motion.skeleton), self.side))
         if None in joints:
             raise InputError("throw", f"a skeleton without a {self.side} arm or hand", "a skeleton with arms and hands")
         return joints
 
-    def points(self, motion: Motion, places: np.ndarray, turns: np.ndarray) -> np.ndarray:
+    def compute_points(self, motion: Motion, places: np.ndarray, turns: np.ndarray) -> np.ndarray:
         """Compute the ball positions (N, 1, 3) m from joint positions and rotations."""
-        hand = self.chain(motion)[2]
+        hand = self.list_joints(motion)[2]
         return (places[:, hand] + quaternion.rotate(turns[:, hand], self.grip))[:, None]
 
-    def leaves(self, points, velocities, rest, ball: Ball):
+    def compute_launch(self, points, velocities, rest, ball: Ball):
         """Return position, velocity and spin (N, 3) of the ball, and the gap (N, 0)."""
         return points[:, 0], velocities[:, 0], np.broadcast_to(self.spin, points[:, 0].shape), points[:, 0, :0]
 
-    def span(self, motion: Motion, frame: float) -> tuple[int, int]:
+    def find_frame_range(self, motion: Motion, frame: float) -> tuple[int, int]:
         """Return the first and last frame in which the wrist may be moved."""
         return int(np.ceil(frame - BEFORE * motion.fps)), int(np.floor(frame + AFTER * motion.fps))
 
-    def rest(self, motion: Motion, frame: float, target: np.ndarray, ball: Ball) -> np.ndarray:
+    def find_rest_position(self, motion: Motion, frame: float, target: np.ndarray, ball: Ball) -> np.ndarray:
         """Return zero: a held ball has no position at rest."""
         return np.zeros(3)
 
@@ -86,47 +86,47 @@ class AtFoot:
     """
 
     side: str
-    place: np.ndarray | None = None
+    position: np.ndarray | None = None
 
     @property
-    def free(self) -> int:
+    def free_coordinates(self) -> int:
         """Number of coordinates of the ball's position that may be chosen."""
-        return 2 if self.place is None else 0
+        return 2 if self.position is None else 0
 
-    def chain(self, motion: Motion) -> tuple[int, int, int]:
+    def list_joints(self, motion: Motion) -> tuple[int, int, int]:
         """Return hip, knee and ankle joint."""
-        return leg(getattr(identify(motion.skeleton), self.side))
+        return leg_chain(getattr(identify_joints(motion.skeleton), self.side))
 
-    def surface(self, motion: Motion):
+    def find_surface(self, motion: Motion):
         """Return the striking surface of the foot."""
-        return striking_surface(motion.skeleton, "foot", self.side)
+        return find_striking_surface(motion.skeleton, "foot", self.side)
 
-    def points(self, motion: Motion, places: np.ndarray, turns: np.ndarray) -> np.ndarray:
+    def compute_points(self, motion: Motion, places: np.ndarray, turns: np.ndarray) -> np.ndarray:
         """Compute both ends (N, 2, 3) m of the foot's line from joint positions and rotations."""
-        return np.stack(self.surface(motion).line(places, turns), axis=1)
+        return np.stack(self.find_surface(motion).compute_line(places, turns), axis=1)
 
-    def leaves(self, points, velocities, rest, ball: Ball):
+    def compute_launch(self, points, velocities, rest, ball: Ball):
         """Return position, velocity and spin (N, 3) of the ball, and the gap (N, 1) m."""
         found = strike_ball(points, velocities, FOOT_RADIUS, rest, ball)
         return rest, found.velocity, found.spin, found.gap[:, None]
 
-    def span(self, motion: Motion, frame: float) -> tuple[int, int]:
+    def find_frame_range(self, motion: Motion, frame: float) -> tuple[int, int]:
         """Return the first and last frame of the foot's swing, at most BEFORE and AFTER seconds around `frame`."""
         first = max(int(np.ceil(frame - BEFORE * motion.fps)), 0)
         last = min(int(np.floor(frame + AFTER * motion.fps)), len(motion) - 1)
         near = replace(motion, root_positions=motion.root_positions[first : last + 1],
                        rotations=motion.rotations[first : last + 1])  # fmt: skip
-        middle = self.points(near, *forward_kinematics(near)).mean(axis=1)
-        slow = np.linalg.norm(np.gradient(middle, 1.0 / motion.fps, axis=0), axis=-1) < _ASHORE
+        middle = self.compute_points(near, *forward_kinematics(near)).mean(axis=1)
+        slow = np.linalg.norm(np.gradient(middle, 1.0 / motion.fps, axis=0), axis=-1) < _CONTACT_SPEED
         before, after = np.flatnonzero(slow[: int(frame) - first]), np.flatnonzero(slow[int(frame) + 2 - first :])
         return (first + int(before[-1]) + 1 if len(before) else first,
                 int(frame) + 1 + int(after[0]) if len(after) else last)  # fmt: skip
 
-    def rest(self, motion: Motion, frame: float, target: np.ndarray, ball: Ball) -> np.ndarray:
+    def find_rest_position(self, motion: Motion, frame: float, target: np.ndarray, ball: Ball) -> np.ndarray:
         """Choose the initial position (3,) m of the ball: the given one, or in contact with the foot."""
-        if self.place is not None:
-            return np.asarray(self.place, float)
-        points, velocities = carried(self, motion, np.array([frame]))
+        if self.position is not None:
+            return np.asarray(self.position, float)
+        points, velocities = sample_points_and_velocities(self, motion, np.array([frame]))
         middle = points[0].mean(axis=0)
         ahead = (target - middle) * [1.0, 1.0, 0.0]
         ahead = unit_vector(ahead)
@@ -135,7 +135,7 @@ class AtFoot:
         return np.array([level[0], level[1], ball.radius])
 
 
-def leaving(
+def compute_launch(
     motion: Motion, part: InHand | AtFoot, frame: float, target: np.ndarray, ball: Ball
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Compute how the ball leaves a motion at a fractional frame.
@@ -149,26 +149,26 @@ def leaving(
     Returns:
         Position (3,) m, velocity (3,) m/s and spin (3,) rad/s.
     """
-    points, velocities = carried(part, motion, np.array([frame]))
-    rest = part.rest(motion, frame, np.asarray(target, float), ball)
-    return tuple(value[0] for value in part.leaves(points, velocities, rest[None], ball)[:3])
+    points, velocities = sample_points_and_velocities(part, motion, np.array([frame]))
+    rest = part.find_rest_position(motion, frame, np.asarray(target, float), ball)
+    return tuple(value[0] for value in part.compute_launch(points, velocities, rest[None], ball)[:3])
 
 
-def grip_point(motion: Motion, part: InHand | AtFoot, frames: np.ndarray) -> np.ndarray:
+def sample_points(motion: Motion, part: InHand | AtFoot, frames: np.ndarray) -> np.ndarray:
     """Compute the ball in the hand, or the ends of the foot's line, (N, K, 3) m, at fractional frames (N,)."""
-    root, local = cubic_at(motion, frames)
-    return part.points(motion, *pose_kinematics(motion.skeleton, root, local))
+    root, local = sample_frames_cubic(motion, frames)
+    return part.compute_points(motion, *compute_pose(motion.skeleton, root, local))
 
 
-def carried(part: InHand | AtFoot, motion: Motion, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def sample_points_and_velocities(part: InHand | AtFoot, motion: Motion, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Compute the points (N, K, 3) m of hand or foot and their velocities (N, K, 3) m/s at fractional frames (N,)."""
     count = len(frames)
-    found = grip_point(motion, part, np.concatenate([frames, frames - _STEP, frames + _STEP]))
+    found = sample_points(motion, part, np.concatenate([frames, frames - _STEP, frames + _STEP]))
     return found[:count], (found[2 * count :] - found[count : 2 * count]) * (0.5 * motion.fps / _STEP)
 
 
 @dataclass(frozen=True, eq=False)
-class Struck:
+class StruckBall:
     """How N balls leave a foot.
 
     Attributes:
@@ -184,7 +184,7 @@ class Struck:
     share: np.ndarray
 
 
-def strike_ball(ends: np.ndarray, velocities: np.ndarray, radius: float, centre: np.ndarray, ball: Ball) -> Struck:
+def strike_ball(ends: np.ndarray, velocities: np.ndarray, radius: float, centre: np.ndarray, ball: Ball) -> StruckBall:
     """Compute how balls leave a foot that strikes them.
 
     Args:
@@ -197,16 +197,16 @@ def strike_ball(ends: np.ndarray, velocities: np.ndarray, radius: float, centre:
     along = ends[:, 1] - ends[:, 0]
     share = np.sum((centre - ends[:, 0]) * along, axis=-1) / np.maximum(np.sum(along * along, axis=-1), 1e-12)
     share = np.clip(share, 0.0, 1.0)
-    way = centre - ends[:, 0] - share[:, None] * along
-    far = np.maximum(np.linalg.norm(way, axis=-1), 1e-9)
-    normal = way / far[:, None]
+    to_centre = centre - ends[:, 0] - share[:, None] * along
+    distance = np.maximum(np.linalg.norm(to_centre, axis=-1), 1e-9)
+    normal = to_centre / distance[:, None]
     foot = velocities[:, 0] + share[:, None] * (velocities[:, 1] - velocities[:, 0])
     # along the normal: elastic push; across it: rolling contact, limited by friction
     into = np.sum(foot * normal, axis=-1)
-    push = RATIO * into[:, None] * normal
+    push = SPEED_RATIO * into[:, None] * normal
     across = foot - into[:, None] * normal
     wanted = across * ball.inertia / (1.0 + ball.inertia)
-    most = FRICTION * RATIO * np.maximum(into, 0.0) / np.maximum(np.linalg.norm(wanted, axis=-1), 1e-12)
+    most = FRICTION * SPEED_RATIO * np.maximum(into, 0.0) / np.maximum(np.linalg.norm(wanted, axis=-1), 1e-12)
     drag = wanted * np.minimum(1.0, most)[:, None]
     spin = np.cross(-normal, drag) / (ball.inertia * ball.radius)
-    return Struck(push + drag, spin, far - radius - ball.radius, share)
+    return StruckBall(push + drag, spin, distance - radius - ball.radius, share)

@@ -15,9 +15,9 @@ from pathlib import Path
 import numpy as np
 
 from ..base.errors import InputError
-from ..files.content import content
-from ..files.json_values import check_names, entries, number, numbers, object_of, shown, text, whole_number
-from ..files.plain_npz import HEADER, header_text, plain_arrays
+from ..files.content import read_bytes
+from ..files.json_values import check_names, check_list, check_number, check_numbers, parse_json, describe_value, check_text, check_whole_number
+from ..files.plain_npz import HEADER, take_header_text, read_plain_arrays
 from ..files.whole import atomic_write
 from ..motion.motion import Motion
 from ..motion.skeleton import Skeleton
@@ -30,18 +30,18 @@ WEIGHTS = Path(__file__).parent / "networks" / "weights"
 """Folder of the weights that are part of the project, one file per action."""
 VERSION = 1
 FORMAT = "Beyond Mocap throw model"
-LARGEST = 300_000_000
+MAX_FILE_SIZE = 300_000_000
 """Largest size of a file, bytes."""
-UNPACKED = 1_000_000_000
+MAX_UNPACKED_SIZE = 1_000_000_000
 """Largest size of all arrays together, bytes."""
 _KIND = "a file of weights (.npz)"
 _PAGE = "docs/throws/throws-training.md"
 _SCALES = ("input_mean", "input_scale", "output_mean", "output_scale")
-_BEYOND = ("before", "after")
-_OTHERS = {"told": "the checkpoint of a training"}  # array that identifies another kind of file
+_CONTEXT_NAMES = ("before", "after")
+_OTHER_KINDS = {"told": "the checkpoint of a training"}  # array that identifies another kind of file
 _FLOATS = tuple(np.dtype(name) for name in ("<f2", "<f4", "<f8"))
-_ROWS = ("format", "version", "settings", "skeleton", "stature", "leg_reach", "trained_on", "notes", "examples")
-_EXAMPLE = ("name", "subject", "limb", "release", "impact", "launch", "stature")
+_HEADER_KEYS = ("format", "version", "settings", "skeleton", "stature", "leg_reach", "trained_on", "notes", "examples")
+_EXAMPLE_KEYS = ("name", "subject", "limb", "release", "impact", "launch", "stature")
 
 
 def read_model(path: str | os.PathLike) -> ThrowModel:
@@ -51,17 +51,17 @@ def read_model(path: str | os.PathLike) -> ThrowModel:
         InputError: one line that begins with the file's name, for every fault: missing, truncated, another kind of
             file, NaN or infinite values, shapes that do not match.
     """
-    data = content(path, _KIND, LARGEST)
+    data = read_bytes(path, _KIND, MAX_FILE_SIZE)
     try:
-        arrays = plain_arrays(data, _KIND, _FLOATS, UNPACKED, _OTHERS)
+        arrays = read_plain_arrays(data, _KIND, _FLOATS, MAX_UNPACKED_SIZE, _OTHER_KINDS)
         half = np.dtype("<f2")
-        return _model({name: one.astype(np.float32) if one.dtype == half else one for name, one in arrays.items()})
+        return _build_model({name: one.astype(np.float32) if one.dtype == half else one for name, one in arrays.items()})
     except InputError as error:
         raise InputError(path, str(error)) from None
 
 
 @lru_cache(maxsize=4)
-def shipped_model(action: str) -> ThrowModel:
+def read_shipped_model(action: str) -> ThrowModel:
     """Read the model of "throw" or "kick" that is part of the project; InputError if it is missing."""
     path = WEIGHTS / f"{action}.npz"
     if not path.is_file():
@@ -81,18 +81,18 @@ def write_model(model: ThrowModel, path: str | os.PathLike, half: bool = False) 
     Raises:
         InputError: if the file cannot be written, or a weight is too large for float16.
     """
-    arrays = {HEADER: np.frombuffer(json.dumps(_header(model), allow_nan=False).encode(), np.uint8)}
+    arrays = {HEADER: np.frombuffer(json.dumps(_build_header(model), allow_nan=False).encode(), np.uint8)}
     arrays |= {"offsets": model.skeleton.offsets, "end_offsets": model.skeleton.end_offsets}
     arrays |= {name: one for name in ("joint_limits", "reference") if (one := getattr(model, name)) is not None}
-    arrays |= _networks_out(model) | _examples_out(model)
+    arrays |= _collect_network_arrays(model) | _collect_example_arrays(model)
     if half:
-        arrays = {name: one if name == HEADER else _halved(name, one) for name, one in arrays.items()}
+        arrays = {name: one if name == HEADER else _reduce_precision(name, one) for name, one in arrays.items()}
     whole = io.BytesIO()
     np.savez_compressed(whole, **arrays)
     atomic_write(path, whole.getvalue())
 
 
-def _header(model: ThrowModel) -> dict:
+def _build_header(model: ThrowModel) -> dict:
     """Build the JSON header of a model."""
     skeleton = model.skeleton
     return {
@@ -101,11 +101,11 @@ def _header(model: ThrowModel) -> dict:
                      "end_parents": list(skeleton.end_parents)},
         "stature": float(model.stature), "leg_reach": {side: list(pair) for side, pair in model.leg_reach.items()},
         "trained_on": model.trained_on, "notes": list(model.notes),
-        "examples": [_example_out(example) for example in model.examples],
+        "examples": [_format_example(example) for example in model.examples],
     }  # fmt: skip
 
 
-def _example_out(example: Example) -> dict:
+def _format_example(example: Example) -> dict:
     """Convert the values of an example to JSON."""
     return {
         "name": example.name, "subject": example.subject, "limb": int(example.limb), "release": float(example.release),
@@ -115,7 +115,7 @@ def _example_out(example: Example) -> dict:
     }  # fmt: skip
 
 
-def _networks_out(model: ThrowModel) -> dict:
+def _collect_network_arrays(model: ThrowModel) -> dict:
     """Collect the arrays of all networks by name."""
     out = {}
     for name, network in model.networks.items():
@@ -125,17 +125,17 @@ def _networks_out(model: ThrowModel) -> dict:
     return out
 
 
-def _examples_out(model: ThrowModel) -> dict:
+def _collect_example_arrays(model: ThrowModel) -> dict:
     """Collect the arrays of all examples by name."""
     out = {}
     for i, example in enumerate(model.examples):
         out |= {f"examples/{i}/root": example.motion.root_positions, f"examples/{i}/turns": example.motion.rotations}
-        beyond = {side: getattr(example, side) for side in _BEYOND}
+        beyond = {side: getattr(example, side) for side in _CONTEXT_NAMES}
         out |= {f"examples/{i}/{side}": places for side, places in beyond.items() if places is not None}
     return out
 
 
-def _halved(name: str, values: np.ndarray) -> np.ndarray:
+def _reduce_precision(name: str, values: np.ndarray) -> np.ndarray:
     """Convert to float16 where the last digits do not matter, otherwise to float32."""
     if not ("/weights/" in name or name.endswith("/turns")):
         return values.astype(np.float32)
@@ -145,85 +145,85 @@ def _halved(name: str, values: np.ndarray) -> np.ndarray:
     return values.astype(np.float16)
 
 
-def _model(arrays: dict[str, np.ndarray]) -> ThrowModel:
+def _build_model(arrays: dict[str, np.ndarray]) -> ThrowModel:
     """Build the model from arrays; every array is used once, none is left over."""
-    header = object_of(header_text(arrays, _PAGE), HEADER, _PAGE)
+    header = parse_json(take_header_text(arrays, _PAGE), HEADER, _PAGE)
     if not isinstance(header, dict) or header.get("format") != FORMAT:
         raise InputError(HEADER, "not a throw model", _KIND, "choose another file")
     if header.get("version") != VERSION:
-        raise InputError("version", shown(header.get("version")), str(VERSION),
+        raise InputError("version", describe_value(header.get("version")), str(VERSION),
                          "use the Beyond Mocap version that wrote it")  # fmt: skip
-    check_names(header, HEADER, _ROWS, _ROWS)
+    check_names(header, HEADER, _HEADER_KEYS, _HEADER_KEYS)
     names = [field.name for field in fields(ModelSettings)]
     check_names(header["settings"], "settings", names, [name for name in names if name not in ("guided", "carried")])
     settings = ModelSettings(**header["settings"])
-    skeleton = _skeleton(header["skeleton"], arrays)
-    networks = {name: _network(name, settings.layers + 1, arrays) for name in settings.networks}
-    rows = entries(header["examples"], "examples")
-    model = ThrowModel(settings=settings, skeleton=skeleton, networks=networks, leg_reach=_reach(header["leg_reach"]),
-                       examples=tuple(_example(i, row, skeleton, settings.fps, arrays) for i, row in enumerate(rows)),
-                       stature=number(header["stature"], "stature"), joint_limits=arrays.pop("joint_limits", None),
-                       reference=arrays.pop("reference", None), trained_on=text(header["trained_on"], "trained_on"),
-                       notes=tuple(text(one, "notes") for one in entries(header["notes"], "notes")))  # fmt: skip
+    skeleton = _build_skeleton(header["skeleton"], arrays)
+    networks = {name: _build_network(name, settings.layers + 1, arrays) for name in settings.networks}
+    rows = check_list(header["examples"], "examples")
+    model = ThrowModel(settings=settings, skeleton=skeleton, networks=networks, leg_reach=_parse_reach(header["leg_reach"]),
+                       examples=tuple(_build_example(i, row, skeleton, settings.fps, arrays) for i, row in enumerate(rows)),
+                       stature=check_number(header["stature"], "stature"), joint_limits=arrays.pop("joint_limits", None),
+                       reference=arrays.pop("reference", None), trained_on=check_text(header["trained_on"], "trained_on"),
+                       notes=tuple(check_text(one, "notes") for one in check_list(header["notes"], "notes")))  # fmt: skip
     if arrays:
         raise InputError("the arrays", f"an unknown array {next(iter(arrays))[:40]!r}", f"the arrays of {_PAGE}")
     return model
 
 
-def _skeleton(row, arrays: dict[str, np.ndarray]) -> Skeleton:
+def _build_skeleton(row, arrays: dict[str, np.ndarray]) -> Skeleton:
     """Build the skeleton from its JSON row and arrays."""
     known = ("names", "parents", "end_parents")
     check_names(row, "skeleton", known, known)
-    names = [text(one, "skeleton: names") for one in entries(row["names"], "skeleton: names")]
-    parents = [whole_number(one, "skeleton: parents") for one in entries(row["parents"], "skeleton: parents")]
-    ends = [whole_number(one, "skeleton: end_parents") for one in entries(row["end_parents"], "skeleton: end_parents")]
+    names = [check_text(one, "skeleton: names") for one in check_list(row["names"], "skeleton: names")]
+    parents = [check_whole_number(one, "skeleton: parents") for one in check_list(row["parents"], "skeleton: parents")]
+    ends = [check_whole_number(one, "skeleton: end_parents") for one in check_list(row["end_parents"], "skeleton: end_parents")]
     if not all(0 <= end < len(names) for end in ends):
-        raise InputError("skeleton: end_parents", shown(ends), f"joints 0 to {len(names) - 1}")
-    offsets, end_offsets = _taken(arrays, "offsets", (len(names), 3)), _taken(arrays, "end_offsets", (len(ends), 3))
+        raise InputError("skeleton: end_parents", describe_value(ends), f"joints 0 to {len(names) - 1}")
+    offsets, end_offsets = _take_array(arrays, "offsets", (len(names), 3)), _take_array(arrays, "end_offsets", (len(ends), 3))
     return Skeleton(tuple(names), tuple(parents), offsets, tuple(ends), end_offsets)
 
 
-def _reach(row) -> dict[str, tuple]:
+def _parse_reach(row) -> dict[str, tuple]:
     """Parse the leg reach of both legs."""
     check_names(row, "leg_reach", ("left", "right"), ("left", "right"))
-    return {side: numbers(pair, f"leg_reach: {side}", 2, "[shortest, longest] metres") for side, pair in row.items()}
+    return {side: check_numbers(pair, f"leg_reach: {side}", 2, "[shortest, longest] metres") for side, pair in row.items()}
 
 
-def _network(name: str, layers: int, arrays: dict[str, np.ndarray]) -> PhaseNetwork:
+def _build_network(name: str, layers: int, arrays: dict[str, np.ndarray]) -> PhaseNetwork:
     """Build a network from its arrays."""
-    weights = tuple(_taken(arrays, f"{name}/weights/{layer}") for layer in range(layers))
-    biases = tuple(_taken(arrays, f"{name}/biases/{layer}") for layer in range(layers))
+    weights = tuple(_take_array(arrays, f"{name}/weights/{layer}") for layer in range(layers))
+    biases = tuple(_take_array(arrays, f"{name}/biases/{layer}") for layer in range(layers))
     try:
-        return PhaseNetwork(weights, biases, *(_taken(arrays, f"{name}/{scale}") for scale in _SCALES))
+        return PhaseNetwork(weights, biases, *(_take_array(arrays, f"{name}/{scale}") for scale in _SCALES))
     except InputError as error:
         raise InputError(name, str(error)) from None
 
 
-def _example(i: int, row, skeleton: Skeleton, fps: float, arrays: dict[str, np.ndarray]) -> Example:
+def _build_example(i: int, row, skeleton: Skeleton, fps: float, arrays: dict[str, np.ndarray]) -> Example:
     """Build example `i` from its JSON row and arrays."""
     where = f"example {i + 1}"
-    check_names(row, where, _EXAMPLE, _EXAMPLE)
-    root, turns = _taken(arrays, f"examples/{i}/root"), _taken(arrays, f"examples/{i}/turns")
-    limb = whole_number(row["limb"], f"{where}: limb")
+    check_names(row, where, _EXAMPLE_KEYS, _EXAMPLE_KEYS)
+    root, turns = _take_array(arrays, f"examples/{i}/root"), _take_array(arrays, f"examples/{i}/turns")
+    limb = check_whole_number(row["limb"], f"{where}: limb")
     if not 0 <= limb < len(EFFECTORS):
         raise InputError(f"{where}: limb", str(limb)[:40], "0 to 3")
     if turns.ndim != 3 or turns.shape[2] != 4 or not len(turns) or np.any(np.sum(np.square(turns), axis=-1) < 0.5):
         raise InputError(f"{where}: turns", f"shape {turns.shape}", "(T, J, 4) unit quaternions")
-    beyond = {side: arrays.pop(f"examples/{i}/{side}", None) for side in _BEYOND}
+    beyond = {side: arrays.pop(f"examples/{i}/{side}", None) for side in _CONTEXT_NAMES}
     for side, places in beyond.items():
         if places is not None and (places.ndim != 3 or places.shape[1:] != (4, 3)):
             raise InputError(f"{where}: {side}", f"shape {places.shape}", "(N, 4, 3)")
     launch = row["launch"]
     return Example(
-        name=text(row["name"], f"{where}: name"), subject=text(row["subject"], f"{where}: subject"),
-        motion=Motion(skeleton, root, turns, fps), limb=limb, release=number(row["release"], f"{where}: release"),
-        impact=np.array(numbers(row["impact"], f"{where}: impact", 3, "[x, y, z] in metres")),
-        launch=None if launch is None else np.array(numbers(launch, f"{where}: launch", 3, "[x, y, z] in m/s or null")),
-        stature=number(row["stature"], f"{where}: stature"), **beyond,
+        name=check_text(row["name"], f"{where}: name"), subject=check_text(row["subject"], f"{where}: subject"),
+        motion=Motion(skeleton, root, turns, fps), limb=limb, release=check_number(row["release"], f"{where}: release"),
+        impact=np.array(check_numbers(row["impact"], f"{where}: impact", 3, "[x, y, z] in metres")),
+        launch=None if launch is None else np.array(check_numbers(launch, f"{where}: launch", 3, "[x, y, z] in m/s or null")),
+        stature=check_number(row["stature"], f"{where}: stature"), **beyond,
     )  # fmt: skip
 
 
-def _taken(arrays: dict[str, np.ndarray], name: str, shape: tuple[int, ...] | None = None) -> np.ndarray:
+def _take_array(arrays: dict[str, np.ndarray], name: str, shape: tuple[int, ...] | None = None) -> np.ndarray:
     """Remove an array from those that are left and return it; InputError if it is missing or has another shape."""
     array = arrays.pop(name, None)
     if array is None:

@@ -15,44 +15,44 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..annotation import ClipAnnotation, KeyMoment, Span, Timeline, labels
-from ..base.easing import quintic_between
-from ..base.errors import InputError, TimedLine, told_time
+from ..base.easing import interpolate_quintic
+from ..base.errors import InputError, TimedMessage, format_seconds
 from ..library.clip import Clip
-from ..library.features import describe_clips
-from ..library.features import joined as joined_frames
+from ..library.features import build_frames
+from ..library.features import join_frames as joined_frames
 from ..library.library import Library
 from ..motion import contacts
-from ..motion.humanoid import heading
+from ..motion.humanoid import compute_heading
 from ..motion.motion import Motion, resample
 from ..motion.retargeting.retarget import Retargeter
-from ..motion.track import SampledTrack, Track, zero_phase_hann
-from ..synthesis.construct.construction import Construction, find_touches, key_results
-from ..synthesis.known_touches import solve_touches
+from ..motion.track import SampledTrack, Track, smooth_zero_phase_hann
+from ..synthesis.construct.construction import Construction, find_touches, build_key_results
+from ..synthesis.known_touches import resolve_touches
 from ..synthesis.plan import Plan, ResolvedPlan
 from ..synthesis.resolve_plan import resolve_plan
 from ..synthesis.search.edit_list import EditList
-from ..synthesis.search.footage import Footage, fetch, output_index
-from ..synthesis.search.path_costs import balanced
+from ..synthesis.search.footage import SourceMotion, fetch_motion, output_index
+from ..synthesis.search.path_costs import balance_weights
 from ..synthesis.search.path_search import PathSearch
-from ..synthesis.search.wanted import Wanted, build_order
-from ..synthesis.search_library import search_library
+from ..synthesis.search.wanted import SearchRequest, build_request
+from ..synthesis.search_library import extend_library
 
-OWN_WORD = "generated"
+OWN_LABEL = "generated"
 """The label that only the generated clip has."""
 
 ACTIONS = {action: labels.list_labels(action=action, is_root=True)[:1] for action in labels.ACTIONS}
 """Action of a model -> label of the key moment in which it happens."""
 
-SMOOTH = 0.7
+SMOOTHING_WINDOW = 0.7
 """Seconds of the window that removes the sway from a body's own path."""
 
 EDGE = 0.1
 """Seconds at either end of the generated clip that are used for its transitions."""
 
 _CLIP = "generated throw"
-_ENDS = 0.5  # s at either end of a stretch with the heading of the surrounding motion
+_END_SECONDS = 0.5  # s at either end of a stretch with the heading of the surrounding motion
 _CATCH_UP = 0.8  # m/s, speed difference to the track on the detour to the throw
-_LEADS = (1.0, 4.0)  # s, shortest and longest duration of the detour to the throw and back
+_DETOUR_RANGE = (1.0, 4.0)  # s, shortest and longest duration of the detour to the throw and back
 
 Progress = Callable[[float, str], None]
 
@@ -70,7 +70,7 @@ class RunUpResult:
 
     motion: Motion
     start: float
-    seams: np.ndarray
+    transitions: np.ndarray
     warnings: tuple[str, ...] = ()
 
 
@@ -96,33 +96,33 @@ def construct_run_up(
     """
     from threadpoolctl import threadpool_limits
 
-    _check(plan, throw, at - release)
+    _check_times(plan, throw, at - release)
     with threadpool_limits(limits=1):
-        known = solve_touches(plan)
-    led, warnings = _plan_with_throw(known, throw, release, at, action)
-    resolved = resolve_plan(led, library, touches_solved=True)
+        resolved_plan = resolve_touches(plan)
+    plan_with_throw, warnings = _insert_in_plan(resolved_plan, throw, release, at, action)
+    resolved = resolve_plan(plan_with_throw, library, are_touches_resolved=True)
     size = resolved.size
-    bones = library.skeleton.scaled(size)
-    same = throw.skeleton.same_bones(bones, 1e-5)
-    own = throw if same else Retargeter(throw, bones, keeps_travel=True).carry(throw)
-    own = Motion(library.skeleton, own.root_positions / size, own.rotations, own.fps)
+    skeleton = library.skeleton.scale(size)
+    has_same_bones = throw.skeleton.has_same_bones(skeleton, 1e-5)
+    throw_clip = throw if has_same_bones else Retargeter(throw, skeleton, keeps_travel=True).retarget(throw)
+    throw_clip = Motion(library.skeleton, throw_clip.root_positions / size, throw_clip.rotations, throw_clip.fps)
     report = progress or (lambda done, text: None)
-    more = add_throw_clip(search_library(library, resolved, report), own, release, action)
+    library_with_throw = add_throw_clip(extend_library(library, resolved, report), throw_clip, release, action)
     with threadpool_limits(limits=1):
-        order = _order(more, resolved)
-        search = PathSearch(more, order, balanced(plan.alpha), lambda done, text: report(0.8 * done, text), cancelled)
+        order = _build_search_request(library_with_throw, resolved)
+        search = PathSearch(library_with_throw, order, balance_weights(plan.alpha), lambda done, text: report(0.8 * done, text), cancelled)
         edit = search.run()
         report(0.8, "Constructing")
-        construction = _construction(more, resolved, order, edit, _heading_of(own, at - release, between))
-        planted, _ = construction.lay_out()
-    motion = Motion(bones, planted.root * size, planted.rotations, plan.fps)
-    if not same:
-        motion = Retargeter(motion, throw.skeleton, example=throw, keeps_travel=True).carry(motion)
-    start, seams = float(resolved.track.times[0]), construction.source.seams
-    return RunUpResult(motion=motion, start=start, seams=seams, warnings=(*warnings, *order.warnings))
+        construction = _build_construction(library_with_throw, resolved, order, edit, _build_heading_function(throw_clip, at - release, between))
+        planted, _ = construction.construct_body()
+    motion = Motion(skeleton, planted.root * size, planted.rotations, plan.fps)
+    if not has_same_bones:
+        motion = Retargeter(motion, throw.skeleton, example=throw, keeps_travel=True).retarget(motion)
+    start, seams = float(resolved.track.times[0]), construction.source.transitions
+    return RunUpResult(motion=motion, start=start, transitions=seams, warnings=(*warnings, *order.warnings))
 
 
-def _check(plan: Plan, throw: Motion, begin: float) -> None:
+def _check_times(plan: Plan, throw: Motion, begin: float) -> None:
     """Raise InputError if the throw lies outside the track."""
     finish, times = begin + throw.duration, plan.track.times
     if begin < times[0] - 0.5 / plan.fps or finish > times[-1] + 0.5 / plan.fps:
@@ -132,46 +132,46 @@ def _check(plan: Plan, throw: Motion, begin: float) -> None:
         )
 
 
-def _order(library: Library, plan: ResolvedPlan) -> Wanted:
+def _build_search_request(library: Library, plan: ResolvedPlan) -> SearchRequest:
     """Build the search request; the generated clip is played at its own rate only."""
-    order = build_order(library, plan)
-    keys = tuple(replace(key, rates=(1.0,)) if OWN_WORD in key.asked.words else key for key in order.keys)
+    order = build_request(library, plan)
+    keys = tuple(replace(key, rates=(1.0,)) if OWN_LABEL in key.requested.words else key for key in order.keys)
     return replace(order, keys=keys)
 
 
-def _construction(
-    library: Library, plan: ResolvedPlan, order: Wanted, edit: EditList, heading_of: Callable
+def _build_construction(
+    library: Library, plan: ResolvedPlan, order: SearchRequest, edit: EditList, heading_of: Callable
 ) -> Construction:
     """Build the construction of the motion that the search found."""
-    track = plan.sampled(plan.fps)
+    track = plan.sample_track(plan.fps)
     index = output_index(len(track.times), library, plan.fps, len(edit))
-    source = fetch(library, edit, index, plan.fps)
-    touches = find_touches(library, plan.fps, edit, key_results(library, plan.fps, order, edit, source))
-    heading_given = heading_of(track, source, len(library.clips) - 1)
+    source = fetch_motion(library, edit, index, plan.fps)
+    touches = find_touches(library, plan.fps, edit, build_key_results(library, plan.fps, order, edit, source))
+    requested_heading = heading_of(track, source, len(library.clips) - 1)
     return Construction(
-        library=library, plan=plan, track=track, source=source, touches=touches, heading=heading_given,
-        faces_ball=False,
+        library=library, plan=plan, track=track, source=source, touches=touches, heading=requested_heading,
+        turns_to_ball=False,
     )
 
 
-def _heading_of(throw: Motion, begin: float, between: Motion | None) -> Callable:
+def _build_heading_function(throw: Motion, begin: float, between: Motion | None) -> Callable:
     """Build a function heading(track, source, clip) -> (T,) rad, NaN where the heading is free.
 
     The heading is that of the throw, which is that clip and begins at second `begin`, while it is played, and that
     of `between` at both ends.
     """
-    def given(track: SampledTrack, source: Footage, clip: int) -> np.ndarray:
+    def sample_heading(track: SampledTrack, source: SourceMotion, clip: int) -> np.ndarray:
         kept = np.full(len(track.times), np.nan)
         is_throw = source.clip == clip
         seconds = track.times[is_throw] - begin
-        kept[is_throw] = np.interp(seconds, np.arange(len(throw)) / throw.fps, heading(throw))
+        kept[is_throw] = np.interp(seconds, np.arange(len(throw)) / throw.fps, compute_heading(throw))
         if between is not None:
-            faces, count = heading(between), int(_ENDS * track.fps)
+            faces, count = compute_heading(between), int(_END_SECONDS * track.fps)
             for end in (slice(None, count), slice(-count, None)):
                 kept[end] = np.where(np.isnan(kept[end]), faces[end], kept[end])
         return kept
 
-    return given
+    return sample_heading
 
 
 def add_throw_clip(library: Library, motion: Motion, release: float, action: str = "throw") -> Library:
@@ -184,39 +184,39 @@ def add_throw_clip(library: Library, motion: Motion, release: float, action: str
         action: one of ACTIONS.
     """
     edge = int(EDGE * motion.fps)
-    words = (*ACTIONS[action], OWN_WORD)
+    words = (*ACTIONS[action], OWN_LABEL)
     key = float(np.clip(release * motion.fps, edge, len(motion) - 1 - edge))
     row = ClipAnnotation(edge, len(motion) - 1 - edge, key, words)
-    clip = Clip(path=_CLIP, mirrored=False, motion=motion, annotations=(row,), standing=contacts.points(motion))
-    frames = joined_frames(library.frames, describe_clips([clip], library.frames))
-    return replace(library, clips=(*library.clips, clip), frames=frames, clusters={}, kept=None)
+    clip = Clip(path=_CLIP, mirrored=False, motion=motion, annotations=(row,), heel_toe_contacts=contacts.detect_heel_toe_contacts(motion))
+    frames = joined_frames(library.frames, build_frames([clip], library.frames))
+    return replace(library, clips=(*library.clips, clip), frames=frames, clusters={}, cache_location=None)
 
 
-def _plan_with_throw(plan: Plan, throw: Motion, release: float, at: float, action: str) -> tuple[Plan, list[str]]:
+def _insert_in_plan(plan: Plan, throw: Motion, release: float, at: float, action: str) -> tuple[Plan, list[str]]:
     """Insert the throw into the track and timeline of a plan; also return warnings about what is left out."""
     begin = at - release
-    asked, told = _timeline_with_throw(plan.timeline, begin, begin + throw.duration, at, ACTIONS[action])
+    timeline, warnings = _insert_in_timeline(plan.timeline, begin, begin + throw.duration, at, ACTIONS[action])
     if plan.pins:
-        told.append("the plan's pinned clips are ignored, because the plan contains a throw")
+        warnings.append("the plan's pinned clips are ignored, because the plan contains a throw")
     track = _lead_through(plan, throw, release, at)
-    return replace(plan, track=track, timeline=asked, pins=(), method="path"), told
+    return replace(plan, track=track, timeline=timeline, pins=(), method="path"), warnings
 
 
-def _timeline_with_throw(
+def _insert_in_timeline(
     timeline: Timeline, begin: float, finish: float, at: float, words: tuple[str, ...]
 ) -> tuple[Timeline, list[str]]:
     """Insert the throw's key moment into a timeline, without key moments that overlap it; also return warnings."""
-    kept = [key for key in timeline.keys if not begin < key.in_force < finish]
-    told: list[str] = [
-        TimedLine(f"{told_time(key.time)} s: '{' '.join(key.words)}' overlaps the throw and is left out",
+    kept = [key for key in timeline.keys if not begin < key.resolved_time < finish]
+    warnings: list[str] = [
+        TimedMessage(f"{format_seconds(key.time)} s: '{' '.join(key.words)}' overlaps the throw and is left out",
                   (key.time, key.time))
         for key in timeline.keys if key not in kept
     ]  # fmt: skip
-    spans = [part for span in timeline.spans for part in _outside(span, begin, finish)]
-    return Timeline(tuple(spans), (*kept, KeyMoment(at, (*words, OWN_WORD)))), told
+    spans = [part for span in timeline.spans for part in _cut_span(span, begin, finish)]
+    return Timeline(tuple(spans), (*kept, KeyMoment(at, (*words, OWN_LABEL)))), warnings
 
 
-def _outside(span: Span, begin: float, finish: float) -> list[Span]:
+def _cut_span(span: Span, begin: float, finish: float) -> list[Span]:
     """Return the parts of a span outside the throw."""
     if span.end <= begin or span.start >= finish:
         return [span]
@@ -230,40 +230,40 @@ def _lead_through(plan: Plan, throw: Motion, release: float, at: float) -> Track
     Before and after it the track makes a detour at a feasible pace.
     """
     fps = plan.fps
-    track = plan.sampled(fps)
+    track = plan.sample_track(fps)
     own = resample(throw, fps)
-    path = zero_phase_hann(own.root_positions[:, :2], fps, SMOOTH)
+    path = smooth_zero_phase_hann(own.root_positions[:, :2], fps, SMOOTHING_WINDOW)
     begin = at - release
     seconds = begin + np.arange(len(path)) / fps
     places, times = track.raw.copy(), track.times
     inside = (times >= seconds[0]) & (times <= seconds[-1])
     for axis in (0, 1):
         places[inside, axis] = np.interp(times[inside], seconds, path[:, axis])
-    for way, edge in ((-1, 0), (1, -1)):
-        there = float(seconds[edge]), path[edge], _velocity(path, edge, fps)
-        places = _bridge(places, times, track, there, way)
+    for side, edge in ((-1, 0), (1, -1)):
+        there = float(seconds[edge]), path[edge], _measure_velocity(path, edge, fps)
+        places = _insert_detour(places, times, track, there, side)
     ball = None if plan.track.ball is None else track.ball
     return Track(times, places, ball)
 
 
-def _bridge(places: np.ndarray, times: np.ndarray, track: SampledTrack, there: tuple, way: int) -> np.ndarray:
+def _insert_detour(places: np.ndarray, times: np.ndarray, track: SampledTrack, there: tuple, side: int) -> np.ndarray:
     """Insert a path from the track to the throw (way -1) or back to the track (1) into the positions (T, 2) m."""
     edge = there[0]
     off = np.linalg.norm([np.interp(edge, times, track.positions[:, axis]) - there[1][axis] for axis in (0, 1)])
-    seconds = float(np.clip(2.0 * off / _CATCH_UP, *_LEADS))
-    far = float(np.clip(edge + way * seconds, times[0], times[-1]))
+    seconds = float(np.clip(2.0 * off / _CATCH_UP, *_DETOUR_RANGE))
+    far = float(np.clip(edge + side * seconds, times[0], times[-1]))
     if abs(far - edge) < 2.0 / track.fps:
         return places
     here = far, *(np.array([np.interp(far, times, column) for column in values.T])
                   for values in (track.positions, track.velocity))  # fmt: skip
-    low, high = (here, there) if way < 0 else (there, here)
+    low, high = (here, there) if side < 0 else (there, here)
     between = (times > low[0]) & (times < high[0])
     out = places.copy()
-    out[between] = quintic_between(times[between], low, high)
+    out[between] = interpolate_quintic(times[between], low, high)
     return out
 
 
-def _velocity(path: np.ndarray, edge: int, fps: float) -> np.ndarray:
+def _measure_velocity(path: np.ndarray, edge: int, fps: float) -> np.ndarray:
     """Measure the velocity (2,) m/s of a path at its first (edge 0) or last frames."""
     few = path[:4] if edge == 0 else path[-4:]
     return (few[-1] - few[0]) / (len(few) - 1) * fps

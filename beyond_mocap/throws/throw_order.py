@@ -6,19 +6,19 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ..ball.flight import Flight, Launch, fly
-from ..ball.physics import BALLS, THROWN, Ball
+from ..ball.flight import Flight, Launch, simulate_flight
+from ..ball.physics import BALLS, THROWN_BALLS, Ball
 from ..base.errors import InputError
 from ..motion import quaternion
 from ..motion.motion import Motion
 from ..motion.skeleton import Skeleton
 from ..motion.track.ball_path import BallPath
-from ..synthetic.throws import grip_of
+from ..synthetic.throws import find_grip
 from .correction import Freedom
-from .letting_go import AtFoot, InHand, grip_point
+from .letting_go import AtFoot, InHand, sample_points
 from .networks.chains import EFFECTORS
 
-KINDS: dict[str, Ball] = {**BALLS, **THROWN}
+KINDS: dict[str, Ball] = {**BALLS, **THROWN_BALLS}
 """Kinds of balls by name."""
 RATES = (10.0, 480.0)
 """Frame rates, frames per second, at which a throw can be generated: the ball's velocity is that of the hand between
@@ -27,7 +27,7 @@ frames.
 
 
 @dataclass(frozen=True)
-class Order:
+class ThrowRequest:
     """Request for a throw or kick.
 
     At most one of start, over and ball_place positions it on the ground; without any it starts at the origin. The
@@ -83,7 +83,7 @@ class Order:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Thrown:
+class ThrowResult:
     """A generated throw or kick that hits the target as well as physics allows.
 
     Attributes:
@@ -125,16 +125,16 @@ class Thrown:
     flight: Flight
     target: np.ndarray
     impact: np.ndarray
-    moved: float
+    displacement: float
     shift: np.ndarray
-    turned: float
+    rotation: float
     pace: float
-    later: float
-    elsewhere: float
-    slowest: float
-    asked_speed: float
-    raw_deviation: float
-    beyond: float
+    release_delay: float
+    start_offset: float
+    min_speed: float
+    requested_speed: float
+    network_deviation: float
+    limit_excess: float
     examples: tuple[tuple[str, float], ...]
     warnings: tuple[str, ...] = ()
 
@@ -154,7 +154,7 @@ class Thrown:
         """Time (s) of the release on the caller's clock."""
         return self.start_time + self.release
 
-    def report(self) -> dict:
+    def build_report(self) -> dict:
         """Collect all figures for a JSON report."""
         frames = np.flatnonzero(np.any(self.shift != 0.0, axis=1))
         return {
@@ -162,17 +162,17 @@ class Thrown:
             "duration_s": self.motion.duration, "release_time_s": self.release_time,
             "release_frame": self.release * self.motion.fps, "release_position_m": self.launch.position,
             "velocity_m_s": self.launch.velocity, "spin_rad_s": self.launch.spin, "speed_m_s": self.speed,
-            "asked_speed_m_s": self.asked_speed, "slowest_m_s": self.slowest, "target_m": self.target,
-            "impact_m": self.impact, "impact_error_m": self.impact_error, "moved_m": self.moved,
+            "asked_speed_m_s": self.requested_speed, "slowest_m_s": self.min_speed, "target_m": self.target,
+            "impact_m": self.impact, "impact_error_m": self.impact_error, "moved_m": self.displacement,
             "corrected_frames": [int(frames[0]), int(frames[-1])] if len(frames) else [],
-            "turned_deg": np.degrees(self.turned), "pace": self.pace, "release_later_s": self.later,
-            "begins_elsewhere_m": self.elsewhere,
-            "raw_deviation_m": self.raw_deviation, "joint_beyond_deg": np.degrees(self.beyond),
+            "turned_deg": np.degrees(self.rotation), "pace": self.pace, "release_later_s": self.release_delay,
+            "begins_elsewhere_m": self.start_offset,
+            "raw_deviation_m": self.network_deviation, "joint_beyond_deg": np.degrees(self.limit_excess),
             "examples": {name: weight for name, weight in self.examples}, "warnings": list(self.warnings),
         }  # fmt: skip
 
 
-def part_of(skeleton: Skeleton, limb: int, ball: Ball, lies: np.ndarray | None = None) -> InHand | AtFoot:
+def build_release_part(skeleton: Skeleton, limb: int, ball: Ball, rest_position: np.ndarray | None = None) -> InHand | AtFoot:
     """Build the hand or foot that releases the ball.
 
     Args:
@@ -182,10 +182,10 @@ def part_of(skeleton: Skeleton, limb: int, ball: Ball, lies: np.ndarray | None =
         rest_position: (3,) m of a kicked ball, None: to be chosen.
     """
     side, what = EFFECTORS[limb].split("_")
-    return AtFoot(side, lies) if what == "foot" else InHand(side, grip_of(skeleton, side, ball.radius))
+    return AtFoot(side, rest_position) if what == "foot" else InHand(side, find_grip(skeleton, side, ball.radius))
 
 
-def within(thrown: Thrown, motion: Motion, start: float, release: float, first: int) -> Thrown:
+def place_in_motion(thrown: ThrowResult, motion: Motion, start: float, release: float, first: int) -> ThrowResult:
     """Convert a throw to a part of a longer motion, as built by `throws.join_throw`.
 
     The ball is held, or at rest, all the time before.
@@ -198,18 +198,18 @@ def within(thrown: Thrown, motion: Motion, start: float, release: float, first: 
         first: frame of the longer motion with the first frame of the throw.
     """
     launch = replace(thrown.launch, time=release)
-    flight = fly(launch, thrown.ball, thrown.flight.end - thrown.launch.time + motion.duration)
+    flight = simulate_flight(launch, thrown.ball, thrown.flight.end - thrown.launch.time + motion.duration)
     shift = np.zeros((len(motion), 3))
     shift[first : first + len(thrown.shift)] = thrown.shift[: len(motion) - first]
-    part = part_of(motion.skeleton, EFFECTORS.index(thrown.limb), thrown.ball)
+    part = build_release_part(motion.skeleton, EFFECTORS.index(thrown.limb), thrown.ball)
     seconds = thrown.path.times[-1] - thrown.launch.time
     return replace(
         thrown, motion=motion, start_time=start, release=release - start, shift=shift, launch=launch, flight=flight,
-        path=ball_path(motion, part, flight, start, seconds),
+        path=build_ball_path(motion, part, flight, start, seconds),
     )
 
 
-def ball_path(motion: Motion, part: InHand | AtFoot, flight: Flight, start: float, seconds: float) -> BallPath:
+def build_ball_path(motion: Motion, part: InHand | AtFoot, flight: Flight, start: float, seconds: float) -> BallPath:
     """Build the ball's path at the motion's rate.
 
     Args:
@@ -220,14 +220,14 @@ def ball_path(motion: Motion, part: InHand | AtFoot, flight: Flight, start: floa
         seconds: s of flight to include; the path lasts at least as long as the motion.
     """
     fps = motion.fps
-    left = flight.launch.time
-    last = max(len(motion) - 1, int(np.ceil((left - start + seconds) * fps)))
+    release_time = flight.launch.time
+    last = max(len(motion) - 1, int(np.ceil((release_time - start + seconds) * fps)))
     frames = np.arange(last + 1)
     times = start + frames / fps
-    flies = times > left
-    positions = flight.at(np.maximum(times, left))
+    in_flight = times > release_time
+    positions = flight.at(np.maximum(times, release_time))
     if isinstance(part, InHand):
-        held = frames[~flies]
-        positions[held] = grip_point(motion, part, held.astype(float))[:, 0]
+        held = frames[~in_flight]
+        positions[held] = sample_points(motion, part, held.astype(float))[:, 0]
     rotations = quaternion.identity(len(times)) if not np.any(flight.launch.spin) else flight.rotations(times)
     return BallPath(times, positions, np.zeros(len(times), bool), rotations)

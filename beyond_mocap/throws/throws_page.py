@@ -18,12 +18,12 @@ from ..evaluation.html_page import (
     build_section,
     build_table,
     build_title,
-    element,
-    fragment,
+    build_element,
+    join_html,
 )
-from .evaluate_throws import LOST
+from .evaluate_throws import MAX_VALID_DEVIATION
 
-AIM = 0.03
+TARGET_DEVIATION = 0.03
 """Metres: target for the deviation of the networks alone (Fredriksson: 1.6 to 8 cm)."""
 EFFECTOR_NAMES = ("left arm", "right arm", "left leg", "right leg")
 """Names of the effectors in Fredriksson's tables; they are wrists and toes."""
@@ -58,71 +58,71 @@ _MOST_MARKS = 9
 _COLOURS = {"network": "#c2571a", "deviation": "#1f6fb2"}
 
 
-def throws_page(report: Mapping) -> str:
+def build_throws_page(report: Mapping) -> str:
     """Build the page, as text, from a report that `throw evaluate` writes."""
     model = str(report.get("model", ""))
     title = PurePath(model or "Throws").name
-    left_out = [element("p", str(line)) for line in report["left_out"]]
+    left_out = [build_element("p", str(line)) for line in report["left_out"]]
     return build_page(
-        title, element("h1", title), element("p", f"{model}: {report.get('trained_on', '')}", class_="quiet"),
-        *_said(report), build_section("Distance of hands and feet from their targets, cm",
-                                      _deviations(report), _picture(report)),
-        build_section("All figures", _figures(report)), build_section("All motions", _motions(report)),
+        title, build_element("h1", title), build_element("p", f"{model}: {report.get('trained_on', '')}", class_="quiet"),
+        *_describe_report(report), build_section("Distance of hands and feet from their targets, cm",
+                                      _build_deviation_table(report), _build_plot(report)),
+        build_section("All figures", _build_figures_table(report)), build_section("All motions", _build_motions_table(report)),
         build_section("Left out", *left_out) if left_out else "",
     )  # fmt: skip
 
 
-def _said(report: Mapping) -> list[Html]:
+def _describe_report(report: Mapping) -> list[Html]:
     """Describe what was measured, and how."""
     lost, people = report["lost"], ", ".join(map(str, report["subjects"]))
     of = f" of {report['examples']}" if report.get("examples") else ""
-    who = f"{report['motions']} motions{of}, by {people}." if people else "No motions."
-    how = "with inverse kinematics, limits and pose iterations" if _corrected(report) else "by the networks alone"
-    gone = f"{lost} failed (a hand or foot {LOST:g} m off on average) and are excluded from all means" if lost else \
+    motions_text = f"{report['motions']} motions{of}, by {people}." if people else "No motions."
+    method_text = "with inverse kinematics, limits and pose iterations" if _is_corrected(report) else "by the networks alone"
+    failures_text = f"{lost} failed (a hand or foot {MAX_VALID_DEVIATION:g} m off on average) and are excluded from all means" if lost else \
         "none failed"
-    return [element("p", who), element("p", f"Generated {how}; {gone}.")]
+    return [build_element("p", motions_text), build_element("p", f"Generated {method_text}; {failures_text}.")]
 
 
-def _corrected(report: Mapping) -> bool:
+def _is_corrected(report: Mapping) -> bool:
     """Return whether the motions were corrected by inverse kinematics."""
     return bool(report.get("options", {}).get("ik", True))
 
 
-def _rows(report: Mapping) -> list[tuple[str, str]]:
+def _list_rows(report: Mapping) -> list[tuple[str, str]]:
     """List titles of the compared motions and their keys; only one if nothing was corrected."""
     alone = ("the networks alone", "network")
-    return [alone, ("final motion", "deviation")] if _corrected(report) else [alone]
+    return [alone, ("final motion", "deviation")] if _is_corrected(report) else [alone]
 
 
-def _deviations(report: Mapping) -> Html:
+def _build_deviation_table(report: Mapping) -> Html:
     """Build the table of deviations, as table 8.6 in one row; Fredriksson's mean below."""
     rows = []
-    for title, key in _rows(report):
-        aim = 100.0 * AIM if key == "network" else None
+    for title, key in _list_rows(report):
+        aim = 100.0 * TARGET_DEVIATION if key == "network" else None
         values = report[{"network": "network_deviation_m", "deviation": "deviation_m"}[key]].values()
-        rows.append(build_row(title, *(_cell(value, aim) for value in values)))
-    his = [build_number_cell(value, 2, 100.0) for value in _PRINTED.mean(axis=0)]
-    rows.append(build_row("Fredriksson, table 8.6, final motion", *his, class_="quiet"))
-    told = f"Green: within the target of {100 * AIM:g} cm for the networks alone; red: above it."
+        rows.append(build_row(title, *(_build_cell(value, aim) for value in values)))
+    printed = [build_number_cell(value, 2, 100.0) for value in _PRINTED.mean(axis=0)]
+    rows.append(build_row("Fredriksson, table 8.6, final motion", *printed, class_="quiet"))
+    legend = f"Green: within the target of {100 * TARGET_DEVIATION:g} cm for the networks alone; red: above it."
     table = build_table(("mean", *map(build_title, EFFECTOR_NAMES)), rows)
-    return fragment(table, element("p", told, class_="quiet"))
+    return join_html(table, build_element("p", legend, class_="quiet"))
 
 
-def _picture(report: Mapping) -> Html:
+def _build_plot(report: Mapping) -> Html:
     """Build the dot plot: every motion is a dot, one line for each hand and foot."""
     rows = []
     for order, effector in enumerate(EFFECTOR_NAMES):
-        for title, key in _rows(report):
+        for title, key in _list_rows(report):
             dots = [
                 (100.0 * one[key][order], str(one["name"])) for one in report["each"] if one[key][order] is not None
             ]
             rows.append((f"{effector}, {title}", key, dots))
     if not any(dots for _, _, dots in rows):
         return Html()
-    return draw_strip(rows, 100.0 * AIM, "cm; each dot is a motion, the line is the target for the networks alone")
+    return draw_strip(rows, 100.0 * TARGET_DEVIATION, "cm; each dot is a motion, the line is the target for the networks alone")
 
 
-def _figures(report: Mapping) -> Html:
+def _build_figures_table(report: Mapping) -> Html:
     """Build the table of means; without those of the ball if no ball was measured."""
     ball = report.get("impact_m") is not None or report.get("far_impact") is not None
     lines = [line for line in _FIGURES if ball or line[0] not in _OF_BALL]
@@ -132,9 +132,9 @@ def _figures(report: Mapping) -> Html:
     ])  # fmt: skip
 
 
-def _motions(report: Mapping) -> Html:
+def _build_motions_table(report: Mapping) -> Html:
     """Build the table of motions; columns without any value are left out."""
-    columns = [one for one in _COLUMNS if any(_known(each[one[0]]) for each in report["each"])]
+    columns = [one for one in _COLUMNS if any(_is_known(each[one[0]]) for each in report["each"])]
     titles = [(name, "cm") for name in EFFECTOR_NAMES] + [one[3:] for one in columns]
     rows = []
     for one in report["each"]:
@@ -142,17 +142,17 @@ def _motions(report: Mapping) -> Html:
         name = str(one["name"]).removeprefix(subject + "/")
         cells = [build_number_cell(value, 2, 100.0) for value in one["deviation"]]
         cells += [build_number_cell(one[key], digits, scale) for key, scale, digits, *_ in columns]
-        rows.append(build_row(element("td", subject, class_="name"), element("td", name, class_="name"), *cells))
+        rows.append(build_row(build_element("td", subject, class_="name"), build_element("td", name, class_="name"), *cells))
     return build_table(("subject", "motion", *(build_title(*title) for title in titles)), rows)
 
 
-def _known(value: float | None) -> bool:
+def _is_known(value: float | None) -> bool:
     return value is not None and value == value
 
 
-def _cell(value: float | None, aim: float | None) -> Html:
+def _build_cell(value: float | None, aim: float | None) -> Html:
     """Build a cell in centimetres from a value in metres, green up to the target, which is in centimetres."""
-    status = "" if aim is None or not _known(value) else "met" if 100.0 * value <= aim else "missed"
+    status = "" if aim is None or not _is_known(value) else "met" if 100.0 * value <= aim else "missed"
     return build_number_cell(value, 2, 100.0, status)
 
 
@@ -165,31 +165,31 @@ def draw_strip(rows: Sequence[tuple[str, str, Sequence[tuple[float, str]]]], aim
         unit: label of the axis.
     """
     values = [value for _, _, dots in rows for value, _ in dots]
-    step, end = _axis(max([1.2 * aim, *values]))
+    step, end = _choose_axis(max([1.2 * aim, *values]))
     bottom = _TOP + _LINE * len(rows)
 
-    def at(value: float) -> float:
+    def to_x(value: float) -> float:
         return _LABEL + _WIDTH * min(value, end) / end
 
-    parts = [_mark(at(value), bottom, f"{value:g}") for value in np.arange(0.0, end + 0.5 * step, step).round(6)]
-    parts.append(element("line", x1=f"{at(aim):.1f}", x2=f"{at(aim):.1f}", y1=_TOP, y2=bottom, stroke="#23703a",
+    parts = [_draw_mark(to_x(value), bottom, f"{value:g}") for value in np.arange(0.0, end + 0.5 * step, step).round(6)]
+    parts.append(build_element("line", x1=f"{to_x(aim):.1f}", x2=f"{to_x(aim):.1f}", y1=_TOP, y2=bottom, stroke="#23703a",
                          stroke_dasharray="4 3"))  # fmt: skip
     for order, (title, kind, dots) in enumerate(rows):
         y = _TOP + _LINE * (order + 0.5)
-        parts.append(element("text", title, x=_LABEL - 10, y=y + 4, text_anchor="end", fill="#444"))
-        parts += [element("circle", element("title", f"{what}: {value:.2f}"), cx=f"{at(value):.1f}", cy=y, r=4.5,
+        parts.append(build_element("text", title, x=_LABEL - 10, y=y + 4, text_anchor="end", fill="#444"))
+        parts += [build_element("circle", build_element("title", f"{what}: {value:.2f}"), cx=f"{to_x(value):.1f}", cy=y, r=4.5,
                           fill=_COLOURS[kind], fill_opacity=".45") for value, what in dots]  # fmt: skip
-    parts.append(element("text", unit, x=_LABEL, y=bottom + 34, fill="#666"))
+    parts.append(build_element("text", unit, x=_LABEL, y=bottom + 34, fill="#666"))
     width, height = _LABEL + _WIDTH + _RIGHT, bottom + 42
-    return element("svg", *parts, viewBox=f"0 0 {width} {height}", width=width, height=height, role="img")
+    return build_element("svg", *parts, viewBox=f"0 0 {width} {height}", width=width, height=height, role="img")
 
 
-def _axis(most: float) -> tuple[float, float]:
+def _choose_axis(most: float) -> tuple[float, float]:
     """Choose the distance between the marks and the last mark of an axis that includes `most`."""
     step = next((one for one in _STEPS if most / one <= _MOST_MARKS), _STEPS[-1])
     return step, step * min(np.ceil(most / step), _MOST_MARKS)
 
 
-def _mark(x: float, bottom: float, text: str) -> Html:
-    line = element("line", x1=f"{x:.1f}", x2=f"{x:.1f}", y1=_TOP, y2=bottom, stroke="#e6e6e6")
-    return fragment(line, element("text", text, x=f"{x:.1f}", y=bottom + 16, text_anchor="middle", fill="#666"))
+def _draw_mark(x: float, bottom: float, text: str) -> Html:
+    line = build_element("line", x1=f"{x:.1f}", x2=f"{x:.1f}", y1=_TOP, y2=bottom, stroke="#e6e6e6")
+    return join_html(line, build_element("text", text, x=f"{x:.1f}", y=bottom + 16, text_anchor="middle", fill="#666"))

@@ -18,16 +18,16 @@ from ..core import channels
 from ..core.measure import frames_per_second, units_per_metre
 
 GROUND = "Ball Ground"
-SIZE, THICK = 300.0, 2.0  # m, side and thickness of the slab under the ball
-OURS = "beyond_mocap_physics"  # custom property of objects created by a handover
-ROLLS_OUT = 0.4  # angular damping; without it Blender's balls roll for ever
-CHOSEN = ("selected_objects", "selected_editable_objects")
-SPAN = ("frame_start", "frame_end")
-STRONGEST = 200.0  # limit of the gravity weight; Blender's gravity is in units/s^2, whatever a unit is
-FINE = {"substeps_per_frame": 20, "solver_iterations": 20}
+SIZE, THICKNESS = 300.0, 2.0  # m, side and thickness of the slab under the ball
+PHYSICS_MARK = "beyond_mocap_physics"  # custom property of objects created by a handover
+ANGULAR_DAMPING = 0.4  # angular damping; without it Blender's balls roll for ever
+SELECTION = ("selected_objects", "selected_editable_objects")
+CACHE_RANGE = ("frame_start", "frame_end")
+MAX_GRAVITY_WEIGHT = 200.0  # limit of the gravity weight; Blender's gravity is in units/s^2, whatever a unit is
+WORLD_QUALITY = {"substeps_per_frame": 20, "solver_iterations": 20}
 
 
-def hand_over(
+def start_physics(
     scene: bpy.types.Scene, ball: bpy.types.Object, frame: int, kind: str, solid: list[bpy.types.Object]
 ) -> None:
     """Let Blender's rigid bodies move the ball from a frame on, over a slab whose top is the ground.
@@ -43,21 +43,21 @@ def hand_over(
     """
     from ...beyond_mocap.ball.physics import BALLS
 
-    _check(ball, frame)
-    curves = channels.curves(*channels.playing(ball))
+    _check_ball(ball, frame)
+    curves = channels.collect_curves(*channels.find_playing_action(ball))
     fps = frames_per_second(scene)
-    velocity = _velocity(curves, frame, fps)
-    shifted = _shift(curves, frame, velocity, fps)
+    velocity = _measure_velocity(curves, frame, fps)
+    old_keys = _shift_keys(curves, frame, velocity, fps)
     others = any(thing.beyond_mocap_aim.handed for thing in scene.objects)
-    kept = {"world": scene.rigidbody_world is not None, "others": others, "solid": [], "keys": shifted}
-    _world(scene, frame, kept)
-    _solids(scene, solid, kept)
-    _ball(scene, ball, frame, BALLS[kind], np.linalg.norm(velocity) / units_per_metre(scene))
+    stored = {"world": scene.rigidbody_world is not None, "others": others, "solid": [], "keys": old_keys}
+    _create_world(scene, frame, stored)
+    _create_solids(scene, solid, stored)
+    _add_ball_body(scene, ball, frame, BALLS[kind], np.linalg.norm(velocity) / units_per_metre(scene))
     aim = ball.beyond_mocap_aim
-    aim.handed, aim.handover, aim.handed_before = True, frame, json.dumps(kept)
+    aim.handed, aim.handover, aim.handed_before = True, frame, json.dumps(stored)
 
 
-def take_back(scene: bpy.types.Scene, ball: bpy.types.Object) -> None:
+def stop_physics(scene: bpy.types.Scene, ball: bpy.types.Object) -> None:
     """Return the ball to its keys and remove what the handover created, unless another ball needs it.
 
     Args:
@@ -65,122 +65,122 @@ def take_back(scene: bpy.types.Scene, ball: bpy.types.Object) -> None:
         ball: the ball.
     """
     channels.check_local(ball)
-    _refuse_hidden(ball)
+    _check_visible(ball)
     aim = ball.beyond_mocap_aim
-    kept = json.loads(aim.handed_before or "{}")
+    stored = json.loads(aim.handed_before or "{}")
     if ball.rigid_body is not None:
-        _remove(ball)
-    action, slot = channels.playing(ball)
+        _remove_rigid_body(ball)
+    action, slot = channels.find_playing_action(ball)
     if action is not None:
-        curves = channels.curves(action, slot)
-        for path, index, at, value in kept.get("keys", ()):
-            _move(curves.get((path, index)), at, value)
+        curves = channels.collect_curves(action, slot)
+        for path, index, at, value in stored.get("keys", ()):
+            _set_key(curves.get((path, index)), at, value)
         kinematic = curves.get(("rigid_body.kinematic", 0))
         if kinematic is not None:
             channels.remove_curve(action, slot, kinematic)
     for name in ("handed", "handed_before"):
         aim.property_unset(name)
-    heir = next((thing for thing in scene.objects if thing.beyond_mocap_aim.handed), None)
-    if heir is not None:
-        _bequeath(heir, kept)
+    other_ball = next((thing for thing in scene.objects if thing.beyond_mocap_aim.handed), None)
+    if other_ball is not None:
+        _transfer_stored(other_ball, stored)
         return
-    _remove_solids(scene, kept)
-    _restore_world(scene, kept)
+    _remove_solids(scene, stored)
+    _restore_world(scene, stored)
 
 
-def _bequeath(heir: bpy.types.Object, kept: dict) -> None:
+def _transfer_stored(other_ball: bpy.types.Object, stored: dict) -> None:
     """Transfer the stored values to another ball that is handed over, which restores them when it is the last one."""
-    theirs = json.loads(heir.beyond_mocap_aim.handed_before or "{}")
-    if not kept.get("others"):
-        theirs.update({name: kept[name] for name in ("world", "gravity", *FINE, *SPAN) if name in kept}, others=False)
-    theirs["solid"] = [*kept.get("solid", ()), *theirs.get("solid", ())]
-    heir.beyond_mocap_aim.handed_before = json.dumps(theirs)
+    other_stored = json.loads(other_ball.beyond_mocap_aim.handed_before or "{}")
+    if not stored.get("others"):
+        other_stored.update({name: stored[name] for name in ("world", "gravity", *WORLD_QUALITY, *CACHE_RANGE) if name in stored}, others=False)
+    other_stored["solid"] = [*stored.get("solid", ()), *other_stored.get("solid", ())]
+    other_ball.beyond_mocap_aim.handed_before = json.dumps(other_stored)
 
 
-def _remove_solids(scene: bpy.types.Scene, kept: dict) -> None:
+def _remove_solids(scene: bpy.types.Scene, stored: dict) -> None:
     """Remove the rigid bodies of objects that were made solid, and the added ground."""
-    for name in kept.get("solid", ()):
+    for name in stored.get("solid", ()):
         thing = scene.objects.get(name)
         if thing is not None and thing.rigid_body is not None and thing.visible_get():
-            _remove(thing)
+            _remove_rigid_body(thing)
     slab = scene.objects.get(GROUND)
-    if slab is not None and slab.get(OURS):
+    if slab is not None and slab.get(PHYSICS_MARK):
         mesh = slab.data
         bpy.data.objects.remove(slab)
         bpy.data.meshes.remove(mesh)
 
 
-def _restore_world(scene: bpy.types.Scene, kept: dict) -> None:
+def _restore_world(scene: bpy.types.Scene, stored: dict) -> None:
     """Restore the rigid-body world, or remove it if there was none."""
     world = scene.rigidbody_world
-    if world is not None and not kept.get("world", True):
+    if world is not None and not stored.get("world", True):
         with bpy.context.temp_override(scene=scene):
             bpy.ops.rigidbody.world_remove()
     elif world is not None:
-        for name in FINE:
-            setattr(world, name, kept.get(name, getattr(world, name)))
-        world.effector_weights.gravity = kept.get("gravity", world.effector_weights.gravity)
-        for name in SPAN if not world.point_cache.is_baked else ():
-            setattr(world.point_cache, name, kept.get(name, getattr(world.point_cache, name)))
+        for name in WORLD_QUALITY:
+            setattr(world, name, stored.get(name, getattr(world, name)))
+        world.effector_weights.gravity = stored.get("gravity", world.effector_weights.gravity)
+        for name in CACHE_RANGE if not world.point_cache.is_baked else ():
+            setattr(world.point_cache, name, stored.get(name, getattr(world.point_cache, name)))
 
 
-def _check(ball: bpy.types.Object, frame: int) -> None:
+def _check_ball(ball: bpy.types.Object, frame: int) -> None:
     """Check that a ball can be handed over on a frame; InputError otherwise."""
     channels.check_local(ball)
-    channels.check_free(ball)
+    channels.check_editable(ball)
     if ball.type != "MESH":
         raise InputError(f"object {ball.name}", f"of type {ball.type.lower()}", "a mesh", "select the ball")
-    _refuse_hidden(ball)
+    _check_visible(ball)
     if ball.beyond_mocap_aim.handed or ball.rigid_body is not None:
         step = "press Ball from Physics first"
         raise InputError(f"ball {ball.name}", "already a rigid body", "a ball with keys only", step)
     if ball.parent is not None or any(constraint.influence for constraint in ball.constraints):
         found = "it has a parent or a constraint"
         raise InputError(f"ball {ball.name}", found, "a ball moved by its keys only", "free the ball first")
-    action, slot = channels.playing(ball)
-    ends = channels.keyed_range(channels.curves(action, slot)) if action is not None else None
+    action, slot = channels.find_playing_action(ball)
+    ends = channels.find_key_range(channels.collect_curves(action, slot)) if action is not None else None
     if ends is None or not ends[0] + 2 <= frame <= ends[1]:
         found = "no keys" if ends is None else f"keys on frames {ends[0]} to {ends[1]}"
         expected = f"keys from two frames before the handover on frame {frame} up to it"
         raise InputError(f"ball {ball.name}", found, expected, "choose another frame")
-    if any(("location", axis) not in channels.curves(action, slot) for axis in range(3)):
+    if any(("location", axis) not in channels.collect_curves(action, slot) for axis in range(3)):
         raise InputError(f"ball {ball.name}", "a coordinate without keys", "keys of all three", "key its location")
     channels.check_local(action)
 
 
-def _refuse_hidden(ball: bpy.types.Object) -> None:
+def _check_visible(ball: bpy.types.Object) -> None:
     """Check that a ball is visible, because Blender does not change hidden rigid bodies; InputError otherwise."""
     if not ball.visible_get():
         step = "show it with Alt-H, or its collection"
         raise InputError(f"ball {ball.name}", "it is hidden", "a visible ball", step)
 
 
-def _velocity(curves: dict, frame: int, fps: float) -> np.ndarray:
+def _measure_velocity(curves: dict, frame: int, fps: float) -> np.ndarray:
     """Measure the ball's velocity (3,) on a frame, units per second, from the keys on either side; at a bounce from
     those before.
     """
     at = np.array([frame - 2, frame - 1, frame, frame + 1], float)
-    places = np.stack([channels.sample(curves["location", axis], at) for axis in range(3)], axis=1)
+    places = np.stack([channels.sample_curve(curves["location", axis], at) for axis in range(3)], axis=1)
     before, last = places[2] - places[1], 1.5 * places[2] - 2.0 * places[1] + 0.5 * places[0]
     ahead = places[3] - places[2]
     smooth = np.linalg.norm(ahead - before) < 0.2 * np.linalg.norm(before) + 1e-6
     return (0.5 * (ahead + before) if smooth else last) * fps
 
 
-def _shift(curves: dict, frame: int, velocity: np.ndarray, fps: float) -> list:
+def _shift_keys(curves: dict, frame: int, velocity: np.ndarray, fps: float) -> list:
     """Move the key before the handover so that the last step has the ball's velocity; return (path, index, frame,
     old value).
     """
-    kept = []
+    old_keys = []
     for axis in range(3):
         curve = curves["location", axis]
-        now, old = (float(value) for value in channels.sample(curve, np.array([frame, frame - 1.0])))
-        if _move(curve, frame - 1.0, now - float(velocity[axis]) / fps):
-            kept.append(("location", axis, frame - 1.0, old))
-    return kept
+        now, old = (float(value) for value in channels.sample_curve(curve, np.array([frame, frame - 1.0])))
+        if _set_key(curve, frame - 1.0, now - float(velocity[axis]) / fps):
+            old_keys.append(("location", axis, frame - 1.0, old))
+    return old_keys
 
 
-def _move(curve, frame: float, value: float) -> bool:
+def _set_key(curve, frame: float, value: float) -> bool:
     """Set a curve's key on a frame to another value; return whether there is one."""
     for key in curve.keyframe_points if curve is not None else ():
         if abs(key.co.x - frame) < 0.005:
@@ -190,26 +190,26 @@ def _move(curve, frame: float, value: float) -> bool:
     return False
 
 
-def _world(scene, frame: int, kept: dict) -> None:
+def _create_world(scene, frame: int, stored: dict) -> None:
     """Create or adapt the rigid-body world, and store its values."""
     if scene.rigidbody_world is None:
         with bpy.context.temp_override(scene=scene):
             bpy.ops.rigidbody.world_add()
     world = scene.rigidbody_world
-    for name, value in FINE.items():
-        kept[name] = getattr(world, name)
+    for name, value in WORLD_QUALITY.items():
+        stored[name] = getattr(world, name)
         setattr(world, name, max(value, getattr(world, name)))
-    kept["gravity"] = world.effector_weights.gravity
-    if not kept["others"]:
-        world.effector_weights.gravity = min(kept["gravity"] * units_per_metre(scene), STRONGEST)
+    stored["gravity"] = world.effector_weights.gravity
+    if not stored["others"]:
+        world.effector_weights.gravity = min(stored["gravity"] * units_per_metre(scene), MAX_GRAVITY_WEIGHT)
     cache = world.point_cache
-    kept.update({name: getattr(cache, name) for name in SPAN})
+    stored.update({name: getattr(cache, name) for name in CACHE_RANGE})
     if not cache.is_baked:
-        cache.frame_start = min(cache.frame_start, frame - 2) if kept["world"] else frame - 2
+        cache.frame_start = min(cache.frame_start, frame - 2) if stored["world"] else frame - 2
         cache.frame_end = max(cache.frame_end, scene.frame_end, frame + int(5 * frames_per_second(scene)))
 
 
-def _solids(scene, solid: list, kept: dict) -> None:
+def _create_solids(scene, solid: list, stored: dict) -> None:
     """Create the ground, and make it and the given objects solid."""
     slab = scene.objects.get(GROUND)
     if slab is None:
@@ -218,45 +218,45 @@ def _solids(scene, solid: list, kept: dict) -> None:
         bmesh.ops.create_cube(shape, size=1.0)
         for corner in shape.verts:
             corner.co.x, corner.co.y = corner.co.x * SIZE * units, corner.co.y * SIZE * units
-            corner.co.z = (corner.co.z - 0.5) * THICK * units
+            corner.co.z = (corner.co.z - 0.5) * THICKNESS * units
         shape.to_mesh(mesh)
         shape.free()
         slab = bpy.data.objects.new(GROUND, mesh)
-        slab[OURS] = True
+        slab[PHYSICS_MARK] = True
         slab.hide_render = slab.hide_select = True
         slab.display_type = "BOUNDS"
         scene.collection.objects.link(slab)
     for thing in (slab, *solid):
         if thing.rigid_body is None:
-            _add(thing, "PASSIVE")
+            _add_rigid_body(thing, "PASSIVE")
             thing.rigid_body.collision_shape = "BOX" if thing is slab else "MESH"
             thing.rigid_body.restitution = thing.rigid_body.friction = 1.0  # Blender multiplies those of both
             thing.rigid_body.use_margin, thing.rigid_body.collision_margin = True, 0.0
             if thing is slab:
                 thing.hide_set(True)
             else:
-                kept["solid"].append(thing.name)
+                stored["solid"].append(thing.name)
 
 
-def _ball(scene, ball: bpy.types.Object, frame: int, kind, speed: float) -> None:
+def _add_ball_body(scene, ball: bpy.types.Object, frame: int, kind, speed: float) -> None:
     """Add the ball's rigid body with its physical values, and key when it takes over."""
-    _add(ball, "ACTIVE")
+    _add_rigid_body(ball, "ACTIVE")
     body = ball.rigid_body
     body.collision_shape, body.mass = "SPHERE", kind.mass
     body.restitution, body.friction = kind.restitution, kind.friction or 0.2
     body.linear_damping = float(-np.expm1(-(kind.linear_drag + kind.drag * speed)))
-    body.angular_damping = ROLLS_OUT
+    body.angular_damping = ANGULAR_DAMPING
     body.use_margin, body.collision_margin, body.use_deactivation = True, 0.0, True
     for at, keyed in ((frame, True), (frame + 1, False)):
         body.kinematic = keyed
         ball.keyframe_insert("rigid_body.kinematic", frame=at)
 
 
-def _add(thing: bpy.types.Object, kind: str) -> None:
-    with bpy.context.temp_override(object=thing, active_object=thing, **dict.fromkeys(CHOSEN, [thing])):
+def _add_rigid_body(thing: bpy.types.Object, kind: str) -> None:
+    with bpy.context.temp_override(object=thing, active_object=thing, **dict.fromkeys(SELECTION, [thing])):
         bpy.ops.rigidbody.object_add(type=kind)
 
 
-def _remove(thing: bpy.types.Object) -> None:
-    with bpy.context.temp_override(object=thing, active_object=thing, **dict.fromkeys(CHOSEN, [thing])):
+def _remove_rigid_body(thing: bpy.types.Object) -> None:
+    with bpy.context.temp_override(object=thing, active_object=thing, **dict.fromkeys(SELECTION, [thing])):
         bpy.ops.rigidbody.object_remove()

@@ -10,66 +10,66 @@ from __future__ import annotations
 import bpy
 
 from ..core import channels, window
-from ..core.live import Watcher, attempt
+from ..core.live import Watcher, call_or_describe
 from . import shots
-from .settings import MARK, aimed
+from .settings import MARK, list_aimed_balls
 
 
-def follow(scene: bpy.types.Scene) -> int:
+def update_balls(scene: bpy.types.Scene) -> int:
     """Update all live balls of a scene; return how many changed."""
     count = 0
-    for ball in aimed(scene):
+    for ball in list_aimed_balls(scene):
         aim = ball.beyond_mocap_aim
         if aim.live and not aim.handed and ball.library is None:
-            failed = f"{ball.name}: aiming failed"
-            count += attempt(lambda: renew(scene, ball), lambda text: tell(ball, text), failed)
+            message = f"{ball.name}: aiming failed"
+            count += call_or_describe(lambda: update_ball(scene, ball), lambda text: report_problem(ball, text), message)
     if count:
-        window.redraw()
+        window.redraw_editors()
     return count
 
 
-def renew(scene: bpy.types.Scene, ball: bpy.types.Object) -> bool:
+def update_ball(scene: bpy.types.Scene, ball: bpy.types.Object) -> bool:
     """Update a ball if what its trajectory was computed from has changed; return whether it had."""
-    wish, known = shots.wish_of(scene, ball), shots.solved_of(ball)
-    made_of = shots.digest(wish, shots.strikes_of(scene, wish))
-    played = channels.playing(ball)[0]
+    request, stored = shots.build_request(scene, ball), shots.find_solved(ball)
+    digest = shots.compute_digest(request, shots.find_strikes(scene, request))
+    played = channels.find_playing_action(ball)[0]
     written = played.get(MARK) if played is not None else None
-    if known is not None and known.digest == made_of == written:
-        return tell(ball, "")
-    solved = shots.solve(scene, wish, ball.name)
-    if made_of == written:  # written by another session: only the overlay is missing
-        shots.remember(ball, solved)
+    if stored is not None and stored.digest == digest == written:
+        return report_problem(ball, "")
+    solved = shots.solve_request(scene, request, ball.name)
+    if digest == written:  # written by another session: only the overlay is missing
+        shots.store_solved(ball, solved)
         return False
-    shots.write(scene, ball, solved)
+    shots.write_shot(scene, ball, solved)
     return True
 
 
-def tell(ball: bpy.types.Object, text: str) -> bool:
+def report_problem(ball: bpy.types.Object, text: str) -> bool:
     """Show a problem at the ball; return whether it is new."""
-    new = ball.beyond_mocap_aim.told != text
-    if new:
+    is_new = ball.beyond_mocap_aim.told != text
+    if is_new:
         ball.beyond_mocap_aim.told = text
-    return new
+    return is_new
 
 
-def look_at(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+def detect_changes(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     """Detect which keys may have changed, and whether a ball may need an update."""
-    if not shots.anything():
+    if not shots.has_solved_shots():
         return
-    bodies = {ball.beyond_mocap_aim.body for ball in aimed(scene)}
+    bodies = {ball.beyond_mocap_aim.body for ball in list_aimed_balls(scene)}
     for update in depsgraph.updates:
         thing = update.id.original
         if isinstance(thing, bpy.types.Action):
             if not thing.get(MARK):
-                shots.unsure()
-                WATCHER.mark()
+                shots.clear_strikes()
+                WATCHER.mark_dirty()
         elif isinstance(thing, bpy.types.Object):
             if thing in bodies:
-                shots.unsure(thing)
-            WATCHER.mark()
+                shots.clear_strikes(thing)
+            WATCHER.mark_dirty()
         elif isinstance(thing, (bpy.types.Armature, bpy.types.Scene)):
-            WATCHER.mark()
+            WATCHER.mark_dirty()
 
 
-WATCHER = Watcher(name="Aimed balls", changed=look_at, follow=follow, restored=shots.unsure, loaded=shots.forget,
-                  ends=shots.forget)
+WATCHER = Watcher(name="Aimed balls", changed=detect_changes, follow=update_balls, restored=shots.clear_strikes, loaded=shots.clear_all,
+                  ends=shots.clear_all)

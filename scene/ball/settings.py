@@ -17,12 +17,12 @@ MARK = "beyond_mocap_shot"
 name of the property group on objects: before Blender 5.0 both would share one place."""
 
 
-def changed(_settings, _context) -> None:
+def mark_changed(_settings, _context) -> None:
     """Mark that an aimed ball may need an update."""
-    live.mark("Aimed balls")
+    live.mark_watcher("Aimed balls")
 
 
-@with_settings("aim", update=changed)
+@with_settings("aim", update=mark_changed)
 @with_settings("aim.handover")
 class BeyondMocapAim(bpy.types.PropertyGroup):
     """How a ball is struck, by what and towards what."""
@@ -31,14 +31,14 @@ class BeyondMocapAim(bpy.types.PropertyGroup):
 
     on: BoolProperty(name="Aimed", description="This ball is aimed at a target")
     body: PointerProperty(name="Body", type=bpy.types.Object, poll=lambda _own, thing: thing.type == "ARMATURE",
-                          update=changed,
+                          update=mark_changed,
                           description="Armature that strikes the ball; none: it leaves from its place")
     place: FloatVectorProperty(name="From", size=3, options={"HIDDEN"},
                                description="Position of the ball without a body, in metres")
-    target: PointerProperty(name="Target", type=bpy.types.Object, update=changed,
+    target: PointerProperty(name="Target", type=bpy.types.Object, update=mark_changed,
                             description="Where the ball arrives; drag it with G")
     curve: PointerProperty(name="Trajectory", type=bpy.types.Object, description="Curve along the ball's trajectory")
-    told: StringProperty(name="Messages", options={"HIDDEN"}, description="Status and warnings")
+    messages: StringProperty(name="Messages", options={"HIDDEN"}, description="Status and warnings")
     figures: StringProperty(name="Figures", options={"HIDDEN"}, description="Figures of the shot")
     strike: IntProperty(name="Strike", options={"HIDDEN"}, description="Scene frame on which the ball is struck")
     arrived: FloatProperty(name="Arrived", options={"HIDDEN"}, description="Scene frame on which it is at the target")
@@ -49,45 +49,45 @@ class BeyondMocapAim(bpy.types.PropertyGroup):
                                   description="Values to restore after the handover, as JSON")
 
 
-def aimed(scene: bpy.types.Scene) -> list[bpy.types.Object]:
+def list_aimed_balls(scene: bpy.types.Scene) -> list[bpy.types.Object]:
     """List the aimed balls of a scene."""
     return [thing for thing in scene.objects if thing.beyond_mocap_aim.on]
 
 
-def aimed_ball(context: bpy.types.Context) -> bpy.types.Object | None:
+def find_aimed_ball(context: bpy.types.Context) -> bpy.types.Object | None:
     """Find the aimed ball that is active, has the active target, is selected, or is the only one."""
     active = context.view_layer.objects.active
-    balls = aimed(context.scene)
-    meant = [ball for ball in balls if ball == active]
-    meant += [ball for ball in balls if active is not None and ball.beyond_mocap_aim.target == active]
-    meant += [ball for ball in balls if ball.select_get()]
-    meant += balls if len(balls) == 1 else []
-    return meant[0] if meant else None
+    balls = list_aimed_balls(context.scene)
+    candidates = [ball for ball in balls if ball == active]
+    candidates += [ball for ball in balls if active is not None and ball.beyond_mocap_aim.target == active]
+    candidates += [ball for ball in balls if ball.select_get()]
+    candidates += balls if len(balls) == 1 else []
+    return candidates[0] if candidates else None
 
 
-def ball_meant(context: bpy.types.Context) -> bpy.types.Object | None:
+def find_selected_ball(context: bpy.types.Context) -> bpy.types.Object | None:
     """Find the selected ball by mark or name; an aimed one that is active, or whose target or body is; or the only
     mesh.
     """
-    chosen = [thing for thing in context.selected_objects if thing.type == "MESH"]
-    marked = [thing for thing in chosen if thing.beyond_mocap_aim.on or thing.get(KEPT) or "ball" in thing.name.lower()]
+    selected = [thing for thing in context.selected_objects if thing.type == "MESH"]
+    marked = [thing for thing in selected if thing.beyond_mocap_aim.on or thing.get(KEPT) or "ball" in thing.name.lower()]
     if marked:
         return marked[0]
     active = context.view_layer.objects.active
-    aimed = aimed_ball(context)
+    aimed = find_aimed_ball(context)
     if aimed is not None and active in (aimed, aimed.beyond_mocap_aim.target, aimed.beyond_mocap_aim.body):
         return aimed
-    loose = [thing for thing in chosen if thing.parent is None]
-    return loose[0] if len(loose) == 1 and len(context.selected_objects) == 1 else None
+    unparented = [thing for thing in selected if thing.parent is None]
+    return unparented[0] if len(unparented) == 1 and len(context.selected_objects) == 1 else None
 
 
-def body_meant(context: bpy.types.Context) -> bpy.types.Object | None:
+def find_selected_body(context: bpy.types.Context) -> bpy.types.Object | None:
     """Find the armature that strikes: the active one, or a selected one."""
     active = context.view_layer.objects.active
     found = [thing for thing in (active, *context.selected_objects) if thing is not None and thing.type == "ARMATURE"]
     return found[0] if found else None
 
 
-def target_meant(context: bpy.types.Context) -> bpy.types.Object | None:
+def find_selected_target(context: bpy.types.Context) -> bpy.types.Object | None:
     """Find a selected Empty."""
     return next((thing for thing in context.selected_objects if thing.type == "EMPTY"), None)

@@ -12,10 +12,10 @@ import numpy as np
 from ...beyond_mocap.base.errors import InputError
 from ...beyond_mocap.motion import quaternion
 from ..core import channels
-from ..core.material import colour
+from ..core.material import get_material
 from ..core.measure import frames_per_second, units_per_metre
-from ..core.set_aside import bring_back, put_aside
-from ..passes.hits_shown import motion_of
+from ..core.set_aside import restore_playback, save_playback
+from ..passes.hits_shown import read_motion
 from ..passes.possession import curves_before, sample_property
 from ..passes.settings import KEPT
 from ..path_editing.curve import remove_curve
@@ -25,13 +25,13 @@ if TYPE_CHECKING:
     from ...beyond_mocap.ball.flight import Flight
     from ...beyond_mocap.ball.shot import Shot, Strikes
 
-CLOSEST = 0.02  # frames, least distance of two keys; Blender merges keys within 0.01
-STROKES = 40  # points of a drawn candidate trajectory
+MIN_KEY_DISTANCE = 0.02  # frames, least distance of two keys; Blender merges keys within 0.01
+CANDIDATE_POINTS = 40  # points of a drawn candidate trajectory
 CURVE_STEP = 0.04  # s between points of the curve
 
 
 @dataclass(frozen=True, eq=False)
-class Wish:
+class ShotRequest:
     """What is requested: the values of `BeyondMocapAim`. `body` is an object, so a request is only valid within one
     event.
 
@@ -75,20 +75,20 @@ class Wish:
     human: bool = True
     follow: float = 3.0
 
-    def key(self) -> tuple:
+    def build_key(self) -> tuple:
         """Build plain values that distinguish requests, except for the body's motion; Blender keeps seven digits."""
         values = (getattr(self, field.name) for field in fields(self))
-        return tuple(value.session_uid if isinstance(value, bpy.types.Object) else _rounded(value) for value in values)
+        return tuple(value.session_uid if isinstance(value, bpy.types.Object) else _round_values(value) for value in values)
 
 
-def _rounded(value):
+def _round_values(value):
     if isinstance(value, tuple):
-        return tuple(_rounded(part) for part in value)
+        return tuple(_round_values(part) for part in value)
     return round(value, 4) if isinstance(value, float) else value
 
 
 @dataclass(frozen=True, eq=False)
-class Solved:
+class SolvedShot:
     """A solved shot in a scene.
 
     Attributes:
@@ -109,41 +109,41 @@ class Solved:
     strike: int
     fps: float
     target: tuple[float, float, float]
-    candidates: np.ndarray
+    candidate_trajectories: np.ndarray
 
 
 _strikes: dict[tuple, "Strikes"] = {}
-_solved: dict[int, Solved] = {}
+_solved: dict[int, SolvedShot] = {}
 
 
-def solved_of(ball: bpy.types.Object) -> Solved | None:
+def find_solved(ball: bpy.types.Object) -> SolvedShot | None:
     """Find the last solved shot of a ball in this session."""
     return _solved.get(ball.session_uid)
 
 
-def anything() -> bool:
+def has_solved_shots() -> bool:
     """Say whether any ball has been aimed in this session."""
     return bool(_solved)
 
 
-def remember(ball: bpy.types.Object, solved: Solved) -> None:
+def store_solved(ball: bpy.types.Object, solved: SolvedShot) -> None:
     """Store the shot that a ball's keys already show."""
     _solved[ball.session_uid] = solved
 
 
-def unsure(body: bpy.types.Object | None = None) -> None:
+def clear_strikes(body: bpy.types.Object | None = None) -> None:
     """Clear the stored strikes of a body, or of all: its motion may have changed."""
     for key in [key for key in _strikes if body is None or key[0] == body.session_uid]:
         del _strikes[key]
 
 
-def forget() -> None:
+def clear_all() -> None:
     """Clear everything stored, when another file is opened or the extension is disabled."""
     _strikes.clear()
     _solved.clear()
 
 
-def wish_of(scene: bpy.types.Scene, ball: bpy.types.Object) -> Wish:
+def build_request(scene: bpy.types.Scene, ball: bpy.types.Object) -> ShotRequest:
     """Build the request of an aimed ball from its settings; InputError if something is missing."""
     aim = ball.beyond_mocap_aim
     if aim.target is None or aim.target.name not in scene.objects:
@@ -155,16 +155,16 @@ def wish_of(scene: bpy.types.Scene, ball: bpy.types.Object) -> Wish:
     if aim.body is None and ball.get(KEPT):
         step = "pick a body, or press Revert Aim"  # a ball created for a strike has no own position
         raise InputError(f"ball {ball.name}", "no body strikes it", "a body", step)
-    same = {field.name: getattr(aim, field.name) for field in fields(Wish) if field.name not in ("target", "place")}
-    return Wish(**same, target=place_of(scene, aim.target), place=tuple(aim.place))
+    same = {field.name: getattr(aim, field.name) for field in fields(ShotRequest) if field.name not in ("target", "place")}
+    return ShotRequest(**same, target=measure_position(scene, aim.target), place=tuple(aim.place))
 
 
-def place_of(scene: bpy.types.Scene, thing: bpy.types.Object) -> tuple[float, float, float]:
+def measure_position(scene: bpy.types.Scene, thing: bpy.types.Object) -> tuple[float, float, float]:
     """Measure an object's position, m."""
     return tuple(float(value) / units_per_metre(scene) for value in thing.matrix_world.translation)
 
 
-def strikes_of(scene: bpy.types.Scene, wish: Wish) -> "Strikes":
+def find_strikes(scene: bpy.types.Scene, request: ShotRequest) -> "Strikes":
     """Find where the part can strike; without a body, where the ball lies.
 
     Args:
@@ -175,35 +175,35 @@ def strikes_of(scene: bpy.types.Scene, wish: Wish) -> "Strikes":
     Raises:
         InputError: if the body does not move on these frames, or its pose is invalid.
     """
-    from ...beyond_mocap.ball.contact import striking_surface
+    from ...beyond_mocap.ball.contact import find_striking_surface
     from ...beyond_mocap.ball.physics import BALLS
     from ...beyond_mocap.ball.shot import Strikes
 
-    if wish.last < wish.first:
-        found = f"frames {wish.first} to {wish.last}"
+    if request.last < request.first:
+        found = f"frames {request.first} to {request.last}"
         raise InputError("aim", found, "a last frame not before the first", "set From and To")
-    frames = np.arange(wish.first, wish.last + 1)
-    if wish.body is None:
-        there = np.array([wish.place])
-        return Strikes(frames=frames[:1], start=there, end=there, radius=-BALLS[wish.ball].radius,
+    frames = np.arange(request.first, request.last + 1)
+    if request.body is None:
+        position = np.array([request.place])
+        return Strikes(frames=frames[:1], start=position, end=position, radius=-BALLS[request.ball].radius,
                        velocity=np.zeros((1, 3)))
-    key = (wish.body.session_uid, wish.part, wish.side, wish.bone, wish.first, wish.last, frames_per_second(scene))
+    key = (request.body.session_uid, request.part, request.side, request.bone, request.first, request.last, frames_per_second(scene))
     if key not in _strikes:
-        motion, first = motion_of(scene, wish.body)
+        motion, first = read_motion(scene, request.body)
         last = first + len(motion) - 1
         inside = frames[(frames >= first) & (frames <= last)]
         if not len(inside):
-            found = f"frames {wish.first} to {wish.last}, but its motion is on {first} to {last}"
-            raise InputError(f"armature {wish.body.name}", found, "frames of its motion", "set From and To")
-        surface = striking_surface(motion.skeleton, wish.bone or wish.part, wish.side)
-        found = Strikes.of(motion, surface, inside - first, inside)
+            found = f"frames {request.first} to {request.last}, but its motion is on {first} to {last}"
+            raise InputError(f"armature {request.body.name}", found, "frames of its motion", "set From and To")
+        surface = find_striking_surface(motion.skeleton, request.bone or request.part, request.side)
+        found = Strikes.from_motion(motion, surface, inside - first, inside)
         if not (np.isfinite(found.start).all() and np.isfinite(found.velocity).all()):
-            raise InputError(f"armature {wish.body.name}", "NaN values in its pose", "a valid pose", "check its keys")
+            raise InputError(f"armature {request.body.name}", "NaN values in its pose", "a valid pose", "check its keys")
         _strikes[key] = found
     return _strikes[key]
 
 
-def solve(scene: bpy.types.Scene, wish: Wish, name: str) -> Solved:
+def solve_request(scene: bpy.types.Scene, request: ShotRequest, name: str) -> SolvedShot:
     """Solve a shot; the same request gives the same shot.
 
     Args:
@@ -215,50 +215,50 @@ def solve(scene: bpy.types.Scene, wish: Wish, name: str) -> Solved:
     Raises:
         InputError: as for `ball.shot.solve_shot`.
     """
-    from ...beyond_mocap.ball.batch import courses
-    from ...beyond_mocap.ball.flight import Launch, fly
-    from ...beyond_mocap.ball.physics import BALLS, FASTEST
-    from ...beyond_mocap.ball.shot import shoot
+    from ...beyond_mocap.ball.batch import simulate_trajectories
+    from ...beyond_mocap.ball.flight import Launch, simulate_flight
+    from ...beyond_mocap.ball.physics import BALLS, HUMAN_BALL_SPEEDS
+    from ...beyond_mocap.ball.shot import solve_shot
 
-    strikes, kind, fps = strikes_of(scene, wish), BALLS[wish.ball], frames_per_second(scene)
-    made_of = digest(wish, strikes)
-    strikes, seconds = _timed(strikes, wish, fps)
-    target = np.array(wish.target)
+    strikes, kind, fps = find_strikes(scene, request), BALLS[request.ball], frames_per_second(scene)
+    shot_digest = compute_digest(request, strikes)
+    strikes, seconds = _select_timely_strikes(strikes, request, fps)
+    target = np.array(request.target)
     target[2] = max(target[2], kind.radius)
-    fastest = FASTEST.get("foot" if wish.bone else wish.part, np.inf) if wish.human else np.inf
-    shot = shoot(strikes, target, kind, seconds=seconds, bounces=wish.bounces, turns=(wish.back, wish.left),
-                 ground=wish.way == "GROUND", fastest=fastest, what=f"ball {name}")
-    spin = shot.aimed.spin[shot.chosen]
-    flight = fly(Launch(0.0, shot.start, shot.velocity, spin), kind, shot.seconds + wish.follow)
-    can = np.flatnonzero(shot.aimed.possible)
-    times = np.linspace(0.0, shot.seconds, STROKES)
-    ways, _ = courses(shot.starts[can], shot.aimed.velocity[can], shot.aimed.spin[can], kind, times)
-    return Solved(made_of, shot, strikes, flight=flight, strike=int(strikes.frames[shot.chosen]), fps=fps,
-                  target=tuple(target), candidates=ways)
+    fastest = HUMAN_BALL_SPEEDS.get("foot" if request.bone else request.part, np.inf) if request.human else np.inf
+    shot = solve_shot(strikes, target, kind, seconds=seconds, bounces=request.bounces, spin_turns=(request.back, request.left),
+                 ground=request.way == "GROUND", fastest=fastest, subject=f"ball {name}")
+    spin = shot.launches.spin[shot.chosen_index]
+    flight = simulate_flight(Launch(0.0, shot.start, shot.velocity, spin), kind, shot.seconds + request.follow)
+    possible = np.flatnonzero(shot.launches.possible)
+    times = np.linspace(0.0, shot.seconds, CANDIDATE_POINTS)
+    trajectories, _ = simulate_trajectories(shot.starts[possible], shot.launches.velocity[possible], shot.launches.spin[possible], kind, times)
+    return SolvedShot(shot_digest, shot, strikes, flight=flight, strike=int(strikes.frames[shot.chosen_index]), fps=fps,
+                  target=tuple(target), candidate_trajectories=trajectories)
 
 
-def digest(wish: Wish, strikes: "Strikes") -> str:
+def compute_digest(request: ShotRequest, strikes: "Strikes") -> str:
     """Compute a short digest of what a shot is computed from."""
-    made = hashlib.sha1(repr(wish.key()[1:]).encode())
+    hashed = hashlib.sha1(repr(request.build_key()[1:]).encode())
     for values in (strikes.frames, strikes.start, strikes.end, strikes.velocity):
-        made.update(np.round(np.asarray(values, float), 5).tobytes())
-    return made.hexdigest()[:16]
+        hashed.update(np.round(np.asarray(values, float), 5).tobytes())
+    return hashed.hexdigest()[:16]
 
 
-def _timed(strikes: "Strikes", wish: Wish, fps: float) -> tuple["Strikes", np.ndarray | float | None]:
+def _select_timely_strikes(strikes: "Strikes", request: ShotRequest, fps: float) -> tuple["Strikes", np.ndarray | float | None]:
     """Select the strikes that are early enough, and the seconds from each to the target."""
-    if wish.timing != "FRAME":
-        return strikes, wish.seconds if wish.timing == "SECONDS" else None
-    seconds = (wish.arrival - strikes.frames) / fps
-    early = seconds > 0.05
-    if not early.any():
+    if request.timing != "FRAME":
+        return strikes, request.seconds if request.timing == "SECONDS" else None
+    seconds = (request.arrival - strikes.frames) / fps
+    in_time = seconds > 0.05
+    if not in_time.any():
         expected = f"a frame after the strike ({strikes.frames[0]})"
-        raise InputError("aim", f"arrival on frame {wish.arrival}", expected, "set Frame")
-    kept = {name: getattr(strikes, name)[early] for name in ("frames", "start", "end", "velocity")}
-    return replace(strikes, **kept), seconds[early]
+        raise InputError("aim", f"arrival on frame {request.arrival}", expected, "set Frame")
+    arrays = {name: getattr(strikes, name)[in_time] for name in ("frames", "start", "end", "velocity")}
+    return replace(strikes, **arrays), seconds[in_time]
 
 
-def write(scene: bpy.types.Scene, ball: bpy.types.Object, solved: Solved) -> None:
+def write_shot(scene: bpy.types.Scene, ball: bpy.types.Object, solved: SolvedShot) -> None:
     """Write a shot to the ball: keys on every frame, and where it bounces and arrives.
 
     Before the strike the ball keeps its earlier animation. Keys of an earlier shot are replaced in place.
@@ -270,29 +270,29 @@ def write(scene: bpy.types.Scene, ball: bpy.types.Object, solved: Solved) -> Non
     """
     aim = ball.beyond_mocap_aim
     if not aim.before.kept:
-        put_aside(aim.before, ball)
+        save_playback(aim.before, ball)
     ball.rotation_mode = "QUATERNION"
-    frames, places, turns = keys(scene, ball, solved)
+    frames, places, turns = build_keys(scene, ball, solved)
     curves = {"location": places, "rotation_quaternion": turns}
-    now, _ = channels.playing(ball)
-    if now is not None and now.get(MARK):
-        channels.rewrite(ball, frames, curves)
+    action, _ = channels.find_playing_action(ball)
+    if action is not None and action.get(MARK):
+        channels.replace_keys(ball, frames, curves)
     else:
         named = {path: ("Object Transforms", values) for path, values in curves.items()}
-        now = channels.animate(ball, f"{ball.name} aimed", frames, named)
-    now[MARK] = solved.digest
-    remember(ball, solved)
+        action = channels.create_action(ball, f"{ball.name} aimed", frames, named)
+    action[MARK] = solved.digest
+    store_solved(ball, solved)
     aim.strike, aim.arrived = solved.strike, solved.strike + solved.shot.seconds * solved.fps
-    aim.figures, aim.told = "\n".join(lines(solved)), ""
-    aim.curve = trajectory(scene, aim.curve, ball, solved.flight)
+    aim.figures, aim.told = "\n".join(describe_shot(solved)), ""
+    aim.curve = update_trajectory_curve(scene, aim.curve, ball, solved.flight)
 
 
-def set_up(ball: bpy.types.Object, wish: Wish, target: bpy.types.Object) -> None:
+def apply_request(ball: bpy.types.Object, request: ShotRequest, target: bpy.types.Object) -> None:
     """Apply a request to a ball's settings, and aim it at `target`."""
     aim = ball.beyond_mocap_aim
-    for field in fields(Wish):
+    for field in fields(ShotRequest):
         if field.name != "target":
-            setattr(aim, field.name, getattr(wish, field.name))
+            setattr(aim, field.name, getattr(request, field.name))
     aim.target, aim.on = target, True
 
 
@@ -300,7 +300,7 @@ def check_ball(ball: bpy.types.Object | None) -> None:
     """Check that nothing else moves a ball; InputError otherwise."""
     if ball is None:
         return
-    channels.check_free(ball)
+    channels.check_editable(ball)
     if ball.parent is not None or len(ball.beyond_mocap_ball.holds) or any(one.influence for one in ball.constraints):
         found = "it has a parent, a constraint or is carried"
         raise InputError(f"ball {ball.name}", found, "a free ball", "free the ball first")
@@ -309,7 +309,7 @@ def check_ball(ball: bpy.types.Object | None) -> None:
         raise InputError(f"ball {ball.name}", found, "a free ball", "remove its rigid body")
 
 
-def ahead(strikes: "Strikes", far: float) -> tuple[float, float, float]:
+def find_place_ahead(strikes: "Strikes", far: float) -> tuple[float, float, float]:
     """Find a place (3,) m on the ground, `far` m in the direction in which the part moves fastest, or along X."""
     from ...beyond_mocap.ball.physics import FOOTBALL
 
@@ -320,13 +320,13 @@ def ahead(strikes: "Strikes", far: float) -> tuple[float, float, float]:
     return float(x), float(y), FOOTBALL.radius
 
 
-def stretch_of(scene: bpy.types.Scene, body: bpy.types.Object, part: str, side: str) -> tuple[int, int]:
+def find_strike_frames(scene: bpy.types.Scene, body: bpy.types.Object, part: str, side: str) -> tuple[int, int]:
     """Find the scene frames of the strike nearest to the current frame; that frame if there is none."""
-    from ...beyond_mocap.passes.hits import analyse
+    from ...beyond_mocap.passes.hits import detect_hits
 
-    motion, first = motion_of(scene, body)
+    motion, first = read_motion(scene, body)
     now = min(max(scene.frame_current, first), first + len(motion) - 1)
-    motions = analyse(motion, part, side).motions
+    motions = detect_hits(motion, part, side).motions
     if not motions:
         return now, now
     nearest = min(motions, key=lambda one: abs(first + one.key - scene.frame_current))
@@ -334,14 +334,14 @@ def stretch_of(scene: bpy.types.Scene, body: bpy.types.Object, part: str, side: 
     return int(first + low), int(first + high)
 
 
-def radius_of(wish: Wish) -> float:
+def find_radius(request: ShotRequest) -> float:
     """Find the radius of the requested ball, m."""
     from ...beyond_mocap.ball.physics import BALLS
 
-    return BALLS[wish.ball].radius
+    return BALLS[request.ball].radius
 
 
-def keys(scene: bpy.types.Scene, ball: bpy.types.Object, solved: Solved) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def build_keys(scene: bpy.types.Scene, ball: bpy.types.Object, solved: SolvedShot) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Build the keys of an aimed ball.
 
     Args:
@@ -357,30 +357,30 @@ def keys(scene: bpy.types.Scene, ball: bpy.types.Object, solved: Solved) -> tupl
     whole = np.arange(strike, last + 1, dtype=float)
     # Bounces and the arrival get keys on fractional frames, unless a whole frame is close.
     exact = strike + fps * np.append(flight.bounces, solved.shot.seconds)
-    exact = exact[(exact < last) & (np.abs(exact - np.round(exact)) > CLOSEST)]
+    exact = exact[(exact < last) & (np.abs(exact - np.round(exact)) > MIN_KEY_DISTANCE)]
     frames = np.sort(np.append(whole, exact))
-    frames = frames[np.append(True, np.diff(frames) > CLOSEST)]
+    frames = frames[np.append(True, np.diff(frames) > MIN_KEY_DISTANCE)]
     seconds = (frames - strike) / fps
     places, turns = flight.at(seconds) * units_per_metre(scene), flight.rotations(seconds)
-    earlier = _earlier(ball, strike)
+    earlier = _sample_earlier_keys(ball, strike)
     if earlier is not None:
         frames = np.concatenate([earlier[0], frames])
         places, turns = np.concatenate([earlier[1], places]), np.concatenate([earlier[2], turns])
     return frames, places, turns
 
 
-def _earlier(ball: bpy.types.Object, strike: int) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
+def _sample_earlier_keys(ball: bpy.types.Object, strike: int) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
     """Sample the ball's earlier animation up to the frame before the strike; None if there is none."""
     curves = curves_before(ball.beyond_mocap_aim.before)
-    ends = channels.keyed_range(curves)
+    ends = channels.find_key_range(curves)
     if ends is None or ends[0] >= strike or ("location", 0) not in curves:
         return None
     frames = np.arange(ends[0], strike, dtype=float)
     turns = sample_property(curves, "rotation_quaternion", frames, (1.0, 0.0, 0.0, 0.0))
-    return frames, sample_property(curves, "location", frames, (0.0, 0.0, 0.0)), quaternion.normalized(turns)
+    return frames, sample_property(curves, "location", frames, (0.0, 0.0, 0.0)), quaternion.normalize(turns)
 
 
-def trajectory(
+def update_trajectory_curve(
     scene: bpy.types.Scene, path: bpy.types.Object | None, ball: bpy.types.Object, flight: "Flight"
 ) -> bpy.types.Object:
     """Update the curve along a flight, up to where the ball rests; visible in views, not in renders.
@@ -401,7 +401,7 @@ def trajectory(
     if path is None or path.name not in scene.objects or path.type != "CURVE":
         data = bpy.data.curves.new(f"{ball.name} trajectory", "CURVE")
         data.dimensions = "3D"
-        data.materials.append(colour("Trajectory", (0.9, 0.9, 0.9), 0.9))
+        data.materials.append(get_material("Trajectory", (0.9, 0.9, 0.9), 0.9))
         path = bpy.data.objects.new(data.name, data)
         path[MARK] = True
         path.hide_select = path.hide_render = True
@@ -417,34 +417,34 @@ def trajectory(
     return path
 
 
-def lines(solved: Solved) -> list[str]:
+def describe_shot(solved: SolvedShot) -> list[str]:
     """Describe a shot in lines "name: value"."""
-    shot, aimed = solved.shot, solved.shot.aimed
+    shot, launches = solved.shot, solved.shot.launches
     speed = float(np.linalg.norm(shot.velocity))
     up = float(np.degrees(np.arctan2(shot.velocity[2], np.linalg.norm(shot.velocity[:2]))))
-    part = float(np.linalg.norm(solved.strikes.velocity[shot.chosen]))
-    told = [f"Struck on frame: {solved.strike}", f"Launch: {speed:.1f} m/s, {up:.0f}\N{DEGREE SIGN} up"]
+    part = float(np.linalg.norm(solved.strikes.velocity[shot.chosen_index]))
+    texts = [f"Struck on frame: {solved.strike}", f"Launch: {speed:.1f} m/s, {up:.0f}\N{DEGREE SIGN} up"]
     if part:
-        told.append(f"Part speed: {part:.1f} m/s")
-    told.append(f"Arrives on frame: {solved.strike + shot.seconds * solved.fps:.1f}")
-    told.append(f"Flight, miss: {shot.seconds:.2f} s, {1000.0 * aimed.miss[shot.chosen]:.1f} mm")
+        texts.append(f"Part speed: {part:.1f} m/s")
+    texts.append(f"Arrives on frame: {solved.strike + shot.seconds * solved.fps:.1f}")
+    texts.append(f"Flight, miss: {shot.seconds:.2f} s, {1000.0 * launches.miss[shot.chosen_index]:.1f} mm")
     before = solved.flight.bounces[solved.flight.bounces < shot.seconds - 1e-3]
     if len(before):
-        told.append("Bounces on frame: " + ", ".join(f"{solved.strike + second * solved.fps:.1f}" for second in before))
+        texts.append("Bounces on frame: " + ", ".join(f"{solved.strike + second * solved.fps:.1f}" for second in before))
     if len(shot.frames) > 1:
-        told.append(f"Possible frames: {int(aimed.possible.sum())} of {len(shot.frames)}")
-    return told
+        texts.append(f"Possible frames: {int(launches.possible.sum())} of {len(shot.frames)}")
+    return texts
 
 
-def leave(ball: bpy.types.Object) -> None:
+def remove_aim(ball: bpy.types.Object) -> None:
     """Remove the aim of a ball: its earlier animation returns and its curve is removed; the target stays."""
     channels.check_local(ball)
-    channels.check_free(ball)
+    channels.check_editable(ball)
     aim = ball.beyond_mocap_aim
     if aim.curve is not None and aim.curve.get(MARK):
         remove_curve(aim.curve)
     if aim.before.kept:
-        bring_back(aim.before, ball, MARK)
+        restore_playback(aim.before, ball, MARK)
     for name in ("on", "body", "target", "curve", "told", "figures", "strike", "arrived"):
         aim.property_unset(name)
     _solved.pop(ball.session_uid, None)

@@ -12,17 +12,17 @@ import numpy as np
 from ...beyond_mocap.base.errors import InputError
 from ...beyond_mocap.base.vectors import unit_vectors
 from ...beyond_mocap.motion import quaternion
-from ...beyond_mocap.motion.motion import Motion, at_frames
+from ...beyond_mocap.motion.motion import Motion, sample_frames
 from ..rigs import armature
 from . import channels
 from .measure import frames_per_second, whole_frames
 
-PLACED = "beyond_mocap_placement"
+PLACEMENT = "beyond_mocap_placement"
 """Custom property of an action: the 16 numbers of the armature's matrix when the motion was written, so that overlays
 follow the body when it is moved."""
 
 
-def write(body: bpy.types.Object, motion: Motion, scene: bpy.types.Scene, start: float | None = None,
+def write_motion(body: bpy.types.Object, motion: Motion, scene: bpy.types.Scene, start: float | None = None,
           name: str | None = None, generated: bool = False) -> bpy.types.Action:
     """Write a motion as a new action with a key on every whole scene frame.
 
@@ -38,13 +38,13 @@ def write(body: bpy.types.Object, motion: Motion, scene: bpy.types.Scene, start:
     Raises:
         InputError: if the armature cannot play the motion.
     """
-    frames, curves = keyed(body, motion, scene, start)
-    action = channels.animate(body, name or f"{body.name} motion", frames, curves, generated)
-    action[PLACED] = [number for row in body.matrix_world for number in row]
+    frames, curves = build_keys(body, motion, scene, start)
+    action = channels.create_action(body, name or f"{body.name} motion", frames, curves, generated)
+    action[PLACEMENT] = [number for row in body.matrix_world for number in row]
     return action
 
 
-def keyed(body: bpy.types.Object, motion: Motion, scene: bpy.types.Scene, start: float | None = None):
+def build_keys(body: bpy.types.Object, motion: Motion, scene: bpy.types.Scene, start: float | None = None):
     """Build the keys that `write_motion` writes, as `channels.create_action` takes them.
 
     Returns:
@@ -53,7 +53,7 @@ def keyed(body: bpy.types.Object, motion: Motion, scene: bpy.types.Scene, start:
         InputError: if the armature cannot play the motion.
     """
     channels.check_local(body)
-    channels.check_free(body)
+    channels.check_editable(body)
     if getattr(body, "beyond_mocap_ride", None) is not None and body.beyond_mocap_ride.on:  # not there for batch.py
         raise InputError(f"armature {body.name}", "its path is being edited", "an armature without a path edit",
                          "press Apply or Revert first")
@@ -63,22 +63,22 @@ def keyed(body: bpy.types.Object, motion: Motion, scene: bpy.types.Scene, start:
     fps = frames_per_second(scene)
     start = float(scene.frame_start) if start is None else start
     frames = whole_frames(start, motion.duration, fps)
-    root, rotations = at_frames(motion, (frames - start) * (motion.fps / fps))
-    lie, rest = armature.placement(body, scene), armature.rest_rotations(body, motion.skeleton.names)
-    rotations[:, 0] = quaternion.multiply(quaternion.inverse(lie.rotation), rotations[:, 0])
+    root, rotations = sample_frames(motion, (frames - start) * (motion.fps / fps))
+    placement, rest = armature.find_placement(body, scene), armature.compute_rest_rotations(body, motion.skeleton.names)
+    rotations[:, 0] = quaternion.multiply(quaternion.inverse(placement.rotation), rotations[:, 0])
     pose = quaternion.multiply(quaternion.inverse(rest), quaternion.multiply(rotations, rest))
-    pose = quaternion.continuous(pose)
+    pose = quaternion.unify_signs(pose)
     root_bone = body.data.bones[motion.skeleton.names[0]]
-    shift = lie.to_armature(root) - np.array(root_bone.head_local)
+    shift = placement.to_armature(root) - np.array(root_bone.head_local)
     location = quaternion.rotate(quaternion.inverse(rest[0]), shift)
-    curves = {_path(root_bone.name, "location"): (root_bone.name, location)}
+    curves = {_build_path(root_bone.name, "location"): (root_bone.name, location)}
     for joint, bone in enumerate(motion.skeleton.names):
         body.pose.bones[bone].rotation_mode = "QUATERNION"
-        curves[_path(bone, "rotation_quaternion")] = (bone, pose[:, joint])
+        curves[_build_path(bone, "rotation_quaternion")] = (bone, pose[:, joint])
     return frames, curves
 
 
-def read(body: bpy.types.Object, scene: bpy.types.Scene, action: bpy.types.Action | None = None, slot=None) -> Motion:
+def read_motion(body: bpy.types.Object, scene: bpy.types.Scene, action: bpy.types.Action | None = None, slot=None) -> Motion:
     """Read the motion that an action plays on an armature, at the scene's frame rate, from the first to the last key.
 
     Curves of any rotation mode are read; what has no curve keeps its present pose. Constraints and drivers are not part
@@ -95,54 +95,54 @@ def read(body: bpy.types.Object, scene: bpy.types.Scene, action: bpy.types.Actio
         InputError: if there is no action or no key on a bone.
     """
     if action is None:
-        action, slot = channels.playing(body)
+        action, slot = channels.find_playing_action(body)
     if action is None:
         raise InputError(f"armature {body.name}", "it plays no action", "an action with keys")
     slot = slot or next((s for s in action.slots if s.target_id_type == "OBJECT"), None)
-    curves = channels.curves(action, slot) if slot is not None else {}
-    ends = channels.keyed_range({key: curve for key, curve in curves.items() if key[0].startswith("pose.bones")})
-    if ends is None:
+    curves = channels.collect_curves(action, slot) if slot is not None else {}
+    key_range = channels.find_key_range({key: curve for key, curve in curves.items() if key[0].startswith("pose.bones")})
+    if key_range is None:
         raise InputError(f"action {action.name}", "no key on any bone", "an action with keys on bones")
-    frames = np.arange(ends[0], ends[1] + 1)
-    skeleton = armature.skeleton_of(body, scene)
-    lie, rest = armature.placement(body, scene), armature.rest_rotations(body, skeleton.names)
-    pose = np.stack([_rotation(body.pose.bones[name], curves, frames) for name in skeleton.names], axis=1)
+    frames = np.arange(key_range[0], key_range[1] + 1)
+    skeleton = armature.build_skeleton(body, scene)
+    placement, rest = armature.find_placement(body, scene), armature.compute_rest_rotations(body, skeleton.names)
+    pose = np.stack([_sample_rotation(body.pose.bones[name], curves, frames) for name in skeleton.names], axis=1)
     local = quaternion.multiply(quaternion.multiply(rest, pose), quaternion.inverse(rest))
-    local[:, 0] = quaternion.multiply(lie.rotation, local[:, 0])
+    local[:, 0] = quaternion.multiply(placement.rotation, local[:, 0])
     root = body.pose.bones[skeleton.names[0]]
-    location = _values(root, "location", curves, frames)
+    location = _sample_property(root, "location", curves, frames)
     place = np.array(root.bone.head_local) + quaternion.rotate(rest[0], location)
-    return Motion(skeleton, lie.to_world(place), local, frames_per_second(scene))
+    return Motion(skeleton, placement.to_world(place), local, frames_per_second(scene))
 
 
-def first_frame(body: bpy.types.Object) -> int | None:
+def find_first_frame(body: bpy.types.Object) -> int | None:
     """Find the first whole frame on which the armature's action has a key; None where it plays none."""
-    action, slot = channels.playing(body)
-    ends = channels.keyed_range(channels.curves(action, slot)) if action else None
-    return ends[0] if ends else None
+    action, slot = channels.find_playing_action(body)
+    key_range = channels.find_key_range(channels.collect_curves(action, slot)) if action else None
+    return key_range[0] if key_range else None
 
 
-def _path(bone: str, name: str) -> str:
+def _build_path(bone: str, name: str) -> str:
     return f'pose.bones["{bpy.utils.escape_identifier(bone)}"].{name}'
 
 
-def _values(bone: bpy.types.PoseBone, name: str, curves: dict, frames: np.ndarray) -> np.ndarray:
+def _sample_property(bone: bpy.types.PoseBone, name: str, curves: dict, frames: np.ndarray) -> np.ndarray:
     """Sample a pose bone's property over frames: (F, n)."""
-    path, now = _path(bone.name, name), getattr(bone, name)
-    columns = [channels.sample(curves[path, i], frames) if (path, i) in curves else np.full(len(frames), value) for i,
-               value in enumerate(now)]
+    path, current = _build_path(bone.name, name), getattr(bone, name)
+    columns = [channels.sample_curve(curves[path, i], frames) if (path, i) in curves else np.full(len(frames), value) for i,
+               value in enumerate(current)]
     return np.stack(columns, axis=1)
 
 
-def _rotation(bone: bpy.types.PoseBone, curves: dict, frames: np.ndarray) -> np.ndarray:
+def _sample_rotation(bone: bpy.types.PoseBone, curves: dict, frames: np.ndarray) -> np.ndarray:
     """Sample a pose bone's rotation over frames, in any rotation mode: (F, 4)."""
     if bone.rotation_mode == "QUATERNION":
-        return quaternion.normalized(_values(bone, "rotation_quaternion", curves, frames))
+        return quaternion.normalize(_sample_property(bone, "rotation_quaternion", curves, frames))
     if bone.rotation_mode == "AXIS_ANGLE":
-        angle, *axis = _values(bone, "rotation_axis_angle", curves, frames).T
+        angle, *axis = _sample_property(bone, "rotation_axis_angle", curves, frames).T
         axis = np.stack(axis, axis=1)
-        return quaternion.about_axis(unit_vectors(axis), angle)
+        return quaternion.from_axis_angle(unit_vectors(axis), angle)
     # Blender names the axes in the order in which they are applied to a point, the core as nested frames: reversed
     order = bone.rotation_mode[::-1]
-    turns = _values(bone, "rotation_euler", curves, frames)
+    turns = _sample_property(bone, "rotation_euler", curves, frames)
     return quaternion.from_euler(turns[:, ["XYZ".index(letter) for letter in order]], order)

@@ -11,14 +11,14 @@ import sys
 import threading
 from typing import Any, Callable
 
-from ...beyond_mocap.base.errors import Cancelled
+from ...beyond_mocap.base.errors import UserCancelledError
 
 Work = Callable[[Callable[[float, str], None], Callable[[], bool], Callable[[], bool]], Any]
 
 _newest: dict[str, "Job"] = {}
-_working, _counting = [0], threading.Lock()
-_usual = sys.getswitchinterval()  # seconds for which a thread keeps the interpreter
-POLITE = 0.0005  # the same while work runs: Blender's drawing thread needs the interpreter a dozen times per redraw
+_working_threads, _count_lock = [0], threading.Lock()
+_default_interval = sys.getswitchinterval()  # seconds for which a thread keeps the interpreter
+WORK_INTERVAL = 0.0005  # the same while work runs: Blender's drawing thread needs the interpreter a dozen times per redraw
 
 
 class Job:
@@ -29,7 +29,7 @@ class Job:
     `error` is set.
     """
 
-    def __init__(self, kind: str, work: Work, keeps: bool = False):
+    def __init__(self, kind: str, work: Work, can_end_early: bool = False):
         """Start the job; an older job of the same kind is cancelled.
 
         Args:
@@ -37,18 +37,18 @@ class Job:
             work: the function to run.
             can_end_early: whether the work can end early with what it has.
         """
-        stop(kind)
-        self.kind, self.keeps = kind, keeps
+        cancel_jobs(kind)
+        self.kind, self.can_end_early = kind, can_end_early
         self.fraction, self.text = 0.0, ""
         self.result, self.error, self._ended = None, None, False
-        self._stop, self._soon, self._news = threading.Event(), threading.Event(), queue.SimpleQueue()
+        self._stop, self._end_requested, self._messages = threading.Event(), threading.Event(), queue.SimpleQueue()
         _newest[kind] = self
-        threading.Thread(target=self._run, args=(work,), name=f"beyond-mocap {kind}", daemon=True).start()
+        threading.Thread(target=self._run_work, args=(work,), name=f"beyond-mocap {kind}", daemon=True).start()
 
     def poll(self) -> bool:
         """Receive what the thread has sent; return True once it has ended."""
-        while not self._news.empty():
-            what, value = self._news.get()
+        while not self._messages.empty():
+            what, value = self._messages.get()
             if what == "progress":
                 self.fraction, self.text = value
                 continue
@@ -61,64 +61,64 @@ class Job:
         """Ask the thread to stop; its result is dropped."""
         self._stop.set()
 
-    def end(self) -> None:
+    def request_end(self) -> None:
         """Ask the thread to end with what it has; the second time, or where it cannot, cancel it."""
-        if self.keeps and not self.ending:
-            self._soon.set()
+        if self.can_end_early and not self.is_ending:
+            self._end_requested.set()
         else:
             self.cancel()
 
     @property
-    def ending(self) -> bool:
+    def is_ending(self) -> bool:
         """Whether the thread was asked to end with what it has."""
-        return self._soon.is_set()
+        return self._end_requested.is_set()
 
     @property
-    def ended(self) -> bool:
+    def is_ended(self) -> bool:
         """Whether `poll` has found the end."""
         return self._ended
 
     @property
-    def stale(self) -> bool:
+    def is_stale(self) -> bool:
         """Whether the result is no longer wanted."""
         return self._stop.is_set() or _newest.get(self.kind) is not self
 
-    def _tell(self, fraction: float, text: str) -> None:
-        self._news.put(("progress", (fraction, text)))
+    def _send_progress(self, fraction: float, text: str) -> None:
+        self._messages.put(("progress", (fraction, text)))
 
-    def _run(self, work: Work) -> None:
+    def _run_work(self, work: Work) -> None:
         """Run the work in the thread, and send its result or error."""
-        _work(1)
+        _count_thread(1)
         try:
-            result = work(self._tell, self._stop.is_set, self._soon.is_set)
+            result = work(self._send_progress, self._stop.is_set, self._end_requested.is_set)
         except BaseException as error:  # passed to the main thread, which reports or raises it
-            self._news.put(("error", error))
+            self._messages.put(("error", error))
         else:
-            self._news.put(("result", result))
+            self._messages.put(("result", result))
         finally:
-            _work(-1)
+            _count_thread(-1)
 
 
-def _work(step: int) -> None:
+def _count_thread(step: int) -> None:
     """Count one more working thread, or one less; a short switch interval is used while there is one."""
-    with _counting:
-        _working[0] += step
-        sys.setswitchinterval(POLITE if _working[0] else _usual)
+    with _count_lock:
+        _working_threads[0] += step
+        sys.setswitchinterval(WORK_INTERVAL if _working_threads[0] else _default_interval)
 
 
-def stop(kind: str | None = None) -> None:
+def cancel_jobs(kind: str | None = None) -> None:
     """Cancel the running job of one kind, or all."""
     for name, job in list(_newest.items()):
         if kind in (None, name):
             job.cancel()
 
 
-def end() -> None:
+def end_jobs() -> None:
     """End all running jobs, as ESC does: see `Job.request_end`."""
     for job in list(_newest.values()):
-        job.end()
+        job.request_end()
 
 
-def cancelled(job: Job) -> bool:
+def is_cancelled(job: Job) -> bool:
     """Return whether an ended job was stopped by the user rather than by an error."""
-    return job.stale or isinstance(job.error, Cancelled)
+    return job.is_stale or isinstance(job.error, UserCancelledError)

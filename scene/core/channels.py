@@ -21,7 +21,7 @@ FIGURES = {  # other properties of a key, with the type that foreach_get returns
 }
 
 
-def animate(target: bpy.types.Object, name: str, frames: np.ndarray, channels: dict[str, tuple[str, np.ndarray]],
+def create_action(target: bpy.types.Object, name: str, frames: np.ndarray, channels: dict[str, tuple[str, np.ndarray]],
             generated: bool = False):
     """Create a new action and assign it to an object; the earlier action stays in the file.
 
@@ -36,10 +36,10 @@ def animate(target: bpy.types.Object, name: str, frames: np.ndarray, channels: d
     Raises:
         InputError: as `check_editable`.
     """
-    check_free(target)
+    check_editable(target)
     action = bpy.data.actions.new(name)
     slot = action.slots.new(id_type=target.id_type, name=target.name)
-    bag = _channelbag(action, slot)
+    bag = _get_channelbag(action, slot)
     keys = np.empty((len(frames), 2), np.float32)
     keys[:, 0] = frames
     linear = np.full(len(frames), LINEAR, np.int32)
@@ -47,18 +47,18 @@ def animate(target: bpy.types.Object, name: str, frames: np.ndarray, channels: d
         count = len(values)
         for index in range(values.shape[1]):
             keys[:count, 1] = values[:, index]
-            points = (curve := _new_curve(bag, path, index, group)).keyframe_points
+            points = (curve := _add_curve(bag, path, index, group)).keyframe_points
             points.add(count)
             points.foreach_set("co", keys[:count].ravel())
             points.foreach_set("interpolation", linear[:count])
             if generated:
                 points.foreach_set("type", np.full(count, GENERATED, np.int32))
             curve.update()
-    assign(target, action, slot)
+    assign_action(target, action, slot)
     return action
 
 
-def rewrite(target: bpy.types.Object, frames: np.ndarray, channels: dict[str, np.ndarray]) -> None:
+def replace_keys(target: bpy.types.Object, frames: np.ndarray, channels: dict[str, np.ndarray]) -> None:
     """Replace the keys of the action that an object plays, in place; paths without curves get no keys.
 
     Args:
@@ -66,7 +66,7 @@ def rewrite(target: bpy.types.Object, frames: np.ndarray, channels: dict[str, np
         frames: (F,) scene frames, increasing.
         channels: data path -> values (F, n).
     """
-    found = curves(*playing(target))
+    found = collect_curves(*find_playing_action(target))
     keys = np.empty((len(frames), 2), np.float32)
     keys[:, 0] = frames
     for path, values in channels.items():
@@ -84,7 +84,7 @@ def rewrite(target: bpy.types.Object, frames: np.ndarray, channels: dict[str, np
             curve.update()
 
 
-def check_free(target: bpy.types.ID) -> None:
+def check_editable(target: bpy.types.ID) -> None:
     """Raise InputError while an NLA strip is in tweak mode: Blender does not allow a change of the action then."""
     data = target.animation_data
     if data is not None and data.use_tweak_mode:
@@ -92,12 +92,12 @@ def check_free(target: bpy.types.ID) -> None:
                          "leave tweak mode with Tab in the NLA editor")
 
 
-def assign(target: bpy.types.Object, action: bpy.types.Action, slot=None) -> None:
+def assign_action(target: bpy.types.Object, action: bpy.types.Action, slot=None) -> None:
     """Assign an action, by `slot` or the first that fits; the earlier action is kept, even if unused.
 
     Raises InputError as `check_editable`.
     """
-    check_free(target)
+    check_editable(target)
     bpy.context.view_layer.update()  # assigning a slot to an object that is not in the depsgraph yet crashes Blender
     data = target.animation_data_create()
     if data.action is not None and data.action.users == 1:
@@ -106,18 +106,18 @@ def assign(target: bpy.types.Object, action: bpy.types.Action, slot=None) -> Non
     data.action_slot = slot or data.action_suitable_slots[0]
 
 
-def discard(target: bpy.types.Object, mark: str) -> None:
+def remove_marked_action(target: bpy.types.Object, mark: str) -> None:
     """Remove the action that an object plays, if it has the custom property `mark` and no other user.
 
     Used for results that are regenerated often, so that they do not accumulate in the file.
     """
-    action, _ = playing(target)
+    action, _ = find_playing_action(target)
     if action is not None and action.get(mark) and action.users - action.use_fake_user == 1:
         target.animation_data.action = None
         bpy.data.actions.remove(action)
 
 
-def playing(target: bpy.types.Object):
+def find_playing_action(target: bpy.types.Object):
     """Return the action and slot that an object plays; (None, None) where it plays none."""
     data = target.animation_data
     if data is None or data.action is None or data.action_slot is None:
@@ -125,7 +125,7 @@ def playing(target: bpy.types.Object):
     return data.action, data.action_slot
 
 
-def curves(action: bpy.types.Action, slot) -> dict[tuple[str, int], bpy.types.FCurve]:
+def collect_curves(action: bpy.types.Action, slot) -> dict[tuple[str, int], bpy.types.FCurve]:
     """Collect the curves of one slot by data path and array index."""
     found = {}
     for layer in action.layers:
@@ -145,7 +145,7 @@ def remove_curve(action: bpy.types.Action, slot, curve: bpy.types.FCurve) -> Non
                 return
 
 
-def keys_of(curve: bpy.types.FCurve) -> dict[str, np.ndarray]:
+def read_keys(curve: bpy.types.FCurve) -> dict[str, np.ndarray]:
     """Read all properties of the n keys of a curve: PLACES (n, 2), FIGURES (n,)."""
     points, count = curve.keyframe_points, len(curve.keyframe_points)
     found = {}
@@ -159,7 +159,7 @@ def keys_of(curve: bpy.types.FCurve) -> dict[str, np.ndarray]:
     return found
 
 
-def put_keys(curve: bpy.types.FCurve, keys: dict[str, np.ndarray]) -> None:
+def write_keys(curve: bpy.types.FCurve, keys: dict[str, np.ndarray]) -> None:
     """Write keys as `read_keys` returns them to a curve without keys; frames increase."""
     points = curve.keyframe_points
     points.add(len(keys["co"]))
@@ -167,17 +167,17 @@ def put_keys(curve: bpy.types.FCurve, keys: dict[str, np.ndarray]) -> None:
         points.foreach_set(name, np.ascontiguousarray(keys[name]).ravel())
 
 
-def new_curve(action: bpy.types.Action, slot, path: str, index: int, group: str) -> bpy.types.FCurve:
+def add_curve(action: bpy.types.Action, slot, path: str, index: int, group: str) -> bpy.types.FCurve:
     """Add a curve that the action does not have yet."""
-    return _new_curve(_channelbag(action, slot), path, index, group)
+    return _add_curve(_get_channelbag(action, slot), path, index, group)
 
 
-def chosen(keys: dict[str, np.ndarray], which: np.ndarray) -> dict[str, np.ndarray]:
+def select_keys(keys: dict[str, np.ndarray], which: np.ndarray) -> dict[str, np.ndarray]:
     """Select keys of a table by an index or mask."""
     return {name: values[which] for name, values in keys.items()}
 
 
-def built(name: str, slot_name: str, tables: dict, like: dict):
+def build_action(name: str, slot_name: str, tables: dict, models: dict):
     """Build a new action with one slot.
 
     Args:
@@ -190,58 +190,58 @@ def built(name: str, slot_name: str, tables: dict, like: dict):
     """
     action = bpy.data.actions.new(name)
     slot = action.slots.new(id_type="OBJECT", name=slot_name)
-    bag = _channelbag(action, slot)
+    bag = _get_channelbag(action, slot)
     for (path, index), keys in tables.items():
-        model = like[path, index]
-        curve = _new_curve(bag, path, index, model.group.name if model.group is not None else "")
-        put_keys(curve, keys)
+        model = models[path, index]
+        curve = _add_curve(bag, path, index, model.group.name if model.group is not None else "")
+        write_keys(curve, keys)
         curve.extrapolation, curve.lock, curve.mute = model.extrapolation, model.lock, model.mute
     return action, slot
 
 
-def cut(whole: bpy.types.Action, slot, start: float, end: float, name: str):
+def cut_action(whole: bpy.types.Action, slot, start: float, end: float, name: str):
     """Cut a new action from the keys between two frames; return it with its slot.
 
     Two more keys on either side are kept, so that the curves between the frames stay the same.
     """
-    models, tables = curves(whole, slot), {}
+    models, tables = collect_curves(whole, slot), {}
     for place, curve in models.items():
-        keys = keys_of(curve)
+        keys = read_keys(curve)
         frames = keys["co"][:, 0]
         if len(frames):
             low = max(0, int(np.searchsorted(frames, start - 1e-3)) - 2)
             high = int(np.searchsorted(frames, end + 1e-3)) + 2
-            tables[place] = chosen(keys, slice(low, high))
-    return built(name, slot.name_display, tables, models)
+            tables[place] = select_keys(keys, slice(low, high))
+    return build_action(name, slot.name_display, tables, models)
 
 
-def joined(parts: list, name: str, slot_name: str):
+def join_actions(parts: list, name: str, slot_name: str):
     """Join (action, slot, start frame, end frame) one after the other; return the new action and its slot.
 
     On a shared frame the later part's key is used.
     """
     tables, models = {}, {}
     for action, slot, start, end in parts:
-        for place, curve in curves(action, slot).items():
-            keys = keys_of(curve)
+        for place, curve in collect_curves(action, slot).items():
+            keys = read_keys(curve)
             inside = (keys["co"][:, 0] > start - 1e-3) & (keys["co"][:, 0] < end + 1e-3)
             before = tables.get(place)
             if before is not None:
-                before = chosen(before, before["co"][:, 0] < start - 1e-3)
-            tables[place] = _appended(before, chosen(keys, inside))
+                before = select_keys(before, before["co"][:, 0] < start - 1e-3)
+            tables[place] = _append_keys(before, select_keys(keys, inside))
             models.setdefault(place, curve)
-    return built(name, slot_name, tables, models)
+    return build_action(name, slot_name, tables, models)
 
 
-def keyed_range(found: dict) -> tuple[int, int] | None:
+def find_key_range(found: dict) -> tuple[int, int] | None:
     """Find the first and last whole frame between the outermost keys of curves; None without keys."""
-    ends = [curve.range() for curve in found.values() if len(curve.keyframe_points)]
-    if not ends:
+    ranges = [curve.range() for curve in found.values() if len(curve.keyframe_points)]
+    if not ranges:
         return None
-    return int(np.ceil(min(low for low, _ in ends) - 1e-4)), int(np.floor(max(high for _, high in ends) + 1e-4))
+    return int(np.ceil(min(low for low, _ in ranges) - 1e-4)), int(np.floor(max(high for _, high in ranges) + 1e-4))
 
 
-def sample(curve: bpy.types.FCurve, frames: np.ndarray) -> np.ndarray:
+def sample_curve(curve: bpy.types.FCurve, frames: np.ndarray) -> np.ndarray:
     """Sample a curve's values (F,) at scene frames (F,): from the keys where every frame has one, else by Blender."""
     count = len(curve.keyframe_points)
     if not curve.modifiers and count >= len(frames):
@@ -263,17 +263,17 @@ def check_local(*things: bpy.types.ID | None) -> None:
             raise InputError(thing.name, found, "one of this file", step)
 
 
-def _appended(before: dict | None, after: dict) -> dict:
+def _append_keys(before: dict | None, after: dict) -> dict:
     return after if before is None else {name: np.concatenate([before[name], after[name]]) for name in after}
 
 
-def _channelbag(action, slot):
+def _get_channelbag(action, slot):
     layer = action.layers[0] if action.layers else action.layers.new("Layer")
     strip = layer.strips[0] if layer.strips else layer.strips.new(type="KEYFRAME")
     return strip.channelbag(slot, ensure=True)
 
 
-def _new_curve(bag, path: str, index: int, group: str):
+def _add_curve(bag, path: str, index: int, group: str):
     if bpy.app.version >= (5, 0, 0):
         return bag.fcurves.new(path, index=index, group_name=group)
     curve = bag.fcurves.new(path, index=index)

@@ -24,17 +24,17 @@ from ...beyond_mocap.base.errors import BeyondMocapError
 from . import window
 
 TICK, IDLE = 0.05, 0.4  # seconds between two polls: usually, and without a window or after a failure
-RESTED = 0.15  # seconds without a change after which the user is idle
-HOLDING = ("TRANSFORM_OT", "CURVE_OT", "VIEW3D_OT_cursor3d")  # operators during which the user is not idle
+IDLE_SECONDS = 0.15  # seconds without a change after which the user is idle
+DRAG_OPERATORS = ("TRANSFORM_OT", "CURVE_OT", "VIEW3D_OT_cursor3d")  # operators during which the user is not idle
 # Seconds between two polls up to so many seconds after a change, for watchers that follow a drag.
-BUSY_TICK, BUSY = 0.01, 0.5
-SHARE = 0.3  # share of the time taken by an update that is left to the window before the next poll
+BUSY_TICK, BUSY_SECONDS = 0.01, 0.5
+PAUSE_SHARE = 0.3  # share of the time taken by an update that is left to the window before the next poll
 EVENTS = {  # Blender's handler -> the watcher's callback, and how many of Blender's arguments it gets
     "depsgraph_update_post": ("changed", 2), "frame_change_post": ("framed", 1), "undo_post": ("restored", 0),
     "redo_post": ("restored", 0), "load_post": ("loaded", 0), "load_pre": ("closing", 0), "save_pre": ("saving", 0),
 }
-WITH_WINDOW = {"changed", "framed"}
-ANOTHER_STATE = {"restored", "loaded"}
+WINDOW_EVENTS = {"changed", "framed"}
+STATE_EVENTS = {"restored", "loaded"}
 
 _watchers: list[Watcher] = []
 _handlers: list[tuple[str, Callable]] = []
@@ -67,7 +67,7 @@ class Watcher:
     """
 
     name: str
-    matters: tuple[type, ...] = ()
+    watched_types: tuple[type, ...] = ()
     changed: Callable[[bpy.types.Scene, bpy.types.Depsgraph], None] | None = None
     framed: Callable[[bpy.types.Scene], None] | None = None
     restored: Callable[[], None] | None = None
@@ -77,93 +77,93 @@ class Watcher:
     follow: Callable[[bpy.types.Scene], None] | None = None
     settle: Callable[[bpy.types.Scene], bool | None] | None = None
     dragged: Callable[[bpy.types.Scene], None] | None = None
-    held_by: tuple[str, ...] = ()
+    busy_operators: tuple[str, ...] = ()
     look: Callable[[], float] | None = None
     draws: tuple[tuple[type, Callable, str], ...] = ()
     ends: Callable[[], None] | None = None
     dirty: bool = field(default=True, init=False)
-    since: float = field(default=0.0, init=False)
+    changed_at: float = field(default=0.0, init=False)
 
     def __post_init__(self):
-        if self.matters:
-            self.changed = self._mark_what_matters
+        if self.watched_types:
+            self.changed = self._mark_if_watched
         _watchers.append(self)
 
-    def mark(self) -> None:
+    def mark_dirty(self) -> None:
         """Mark the watcher: something that may matter has changed."""
-        self.dirty, self.since = True, perf_counter()
+        self.dirty, self.changed_at = True, perf_counter()
 
-    def hear(self, what: str, *arguments) -> None:
+    def handle_event(self, event: str, *arguments) -> None:
         """Handle an event.
 
         Args:
             event: one of the values of EVENTS.
             arguments: passed on.
         """
-        action = getattr(self, what)
+        action = getattr(self, event)
         if action is not None:
-            guard(self.name, lambda: action(*arguments), counts=not (self.look or self.follow or self.settle))
-        if what in ANOTHER_STATE:
-            self.mark()
+            call_guarded(self.name, lambda: action(*arguments), clears_failure=not (self.look or self.follow or self.settle))
+        if event in STATE_EVENTS:
+            self.mark_dirty()
 
-    def tick(self) -> float:
+    def run_tick(self) -> float:
         """Poll once; return the seconds until the next poll."""
-        act = self.look or (self._follow if self.follow else self._settle)
-        return guard(self.name, act, IDLE, counts=bool(self.look))  # the others clear failures after work
+        act = self.look or (self._run_follow if self.follow else self._run_settle)
+        return call_guarded(self.name, act, IDLE, clears_failure=bool(self.look))  # the others clear failures after work
 
-    def _mark_what_matters(self, _scene, depsgraph) -> None:
-        if any(isinstance(update.id, self.matters) for update in depsgraph.updates):
-            self.mark()
+    def _mark_if_watched(self, _scene, depsgraph) -> None:
+        if any(isinstance(update.id, self.watched_types) for update in depsgraph.updates):
+            self.mark_dirty()
 
-    def _follow(self) -> float:
+    def _run_follow(self) -> float:
         """Call `follow` for the scene of each window if the watcher is marked; return the seconds until the next
         poll.
         """
         if not self.dirty or bpy.app.is_job_running("RENDER"):
-            return BUSY_TICK if perf_counter() - self.since < BUSY else TICK
-        self.dirty, begun, scenes = False, perf_counter(), set()
-        for shown in bpy.context.window_manager.windows:
-            if shown.scene.session_uid not in scenes:
-                scenes.add(shown.scene.session_uid)
-                with bpy.context.temp_override(window=shown):
-                    self.follow(shown.scene)
-        _take_back(f"{self.name} has failed")
-        return max(BUSY_TICK, SHARE * (perf_counter() - begun))
+            return BUSY_TICK if perf_counter() - self.changed_at < BUSY_SECONDS else TICK
+        self.dirty, began, scenes = False, perf_counter(), set()
+        for displayed in bpy.context.window_manager.windows:
+            if displayed.scene.session_uid not in scenes:
+                scenes.add(displayed.scene.session_uid)
+                with bpy.context.temp_override(window=displayed):
+                    self.follow(displayed.scene)
+        _clear_failure(f"{self.name} has failed")
+        return max(BUSY_TICK, PAUSE_SHARE * (perf_counter() - began))
 
-    def _settle(self) -> float:
+    def _run_settle(self) -> float:
         """Call `settle` if the watcher is marked and the user is idle; return the seconds until the next poll."""
-        shown = next(iter(bpy.context.window_manager.windows), None)
-        if not self.dirty or shown is None or bpy.app.is_job_running("RENDER"):
+        displayed = next(iter(bpy.context.window_manager.windows), None)
+        if not self.dirty or displayed is None or bpy.app.is_job_running("RENDER"):
             return TICK
-        if is_running(HOLDING + self.held_by):
+        if is_running(DRAG_OPERATORS + self.busy_operators):
             if self.dragged:
-                self.dragged(shown.scene)
-        elif perf_counter() - self.since > RESTED:
+                self.dragged(displayed.scene)
+        elif perf_counter() - self.changed_at > IDLE_SECONDS:
             self.dirty = False
-            with bpy.context.temp_override(window=shown):
-                again = self.settle(shown.scene)  # may mark it again
-            _take_back(f"{self.name} has failed")
+            with bpy.context.temp_override(window=displayed):
+                again = self.settle(displayed.scene)  # may mark it again
+            _clear_failure(f"{self.name} has failed")
             self.dirty = self.dirty or bool(again)
         return TICK
 
 
-def mark(name: str) -> None:
+def mark_watcher(name: str) -> None:
     """Mark the watcher of this name, for modules that the watcher's own module imports."""
-    next(watcher for watcher in _watchers if watcher.name == name).mark()
+    next(watcher for watcher in _watchers if watcher.name == name).mark_dirty()
 
 
 def is_running(prefixes: tuple[str, ...]) -> bool:
     """Return whether an operator whose name begins with one of these runs in any window."""
     windows = bpy.context.window_manager.windows
-    return any(one.bl_idname.startswith(prefixes) for shown in windows for one in shown.modal_operators)
+    return any(one.bl_idname.startswith(prefixes) for displayed in windows for one in displayed.modal_operators)
 
 
 def is_playing() -> bool:
     """Return whether the animation plays in any window."""
-    return any(shown.screen.is_animation_playing for shown in bpy.context.window_manager.windows)
+    return any(displayed.screen.is_animation_playing for displayed in bpy.context.window_manager.windows)
 
 
-def guard(name: str, action: Callable[[], Any], otherwise: Any = None, counts: bool = True) -> Any:
+def call_guarded(name: str, action: Callable[[], Any], fallback: Any = None, clears_failure: bool = True) -> Any:
     """Call an action; report an exception once under this name.
 
     Args:
@@ -177,14 +177,14 @@ def guard(name: str, action: Callable[[], Any], otherwise: Any = None, counts: b
     try:
         result = action()
     except Exception as error:  # a timer that raises is never called again
-        _report(f"{name} has failed", error)
-        return otherwise
-    if counts:
-        _take_back(f"{name} has failed")
+        _report_failure(f"{name} has failed", error)
+        return fallback
+    if clears_failure:
+        _clear_failure(f"{name} has failed")
     return result
 
 
-def attempt(action: Callable[[], Any], tell: Callable[[str], Any], failed: str) -> Any:
+def call_or_describe(action: Callable[[], Any], describe: Callable[[str], Any], failed: str) -> Any:
     """Call an action; describe an exception.
 
     Args:
@@ -198,22 +198,22 @@ def attempt(action: Callable[[], Any], tell: Callable[[str], Any], failed: str) 
     try:
         result = action()
     except BeyondMocapError as error:
-        return tell(str(error))
+        return describe(str(error))
     except Exception as error:  # one failure must not stop the others
-        _report(failed, error)
-        return tell(_message(failed))
-    _take_back(failed)
+        _report_failure(failed, error)
+        return describe(_format_failure(failed))
+    _clear_failure(failed)
     return result
 
 
-def soon(action: Callable[[], float | None], seconds: float) -> None:
+def call_soon(action: Callable[[], float | None], seconds: float) -> None:
     """Call an action in so many seconds, and again as long as it returns seconds.
 
     Nothing happens if it is scheduled already, or without a window.
     """
     def call() -> float | None:
         del _timers[action]  # it may be scheduled again while it runs
-        wait = guard(getattr(action, "__name__", "timer"), action)
+        wait = call_guarded(getattr(action, "__name__", "timer"), action)
         if wait is not None and action not in _timers:
             _timers[action] = call
             return wait
@@ -227,14 +227,14 @@ def soon(action: Callable[[], float | None], seconds: float) -> None:
 def start_watching() -> None:
     """Start handlers, overlays and timers for all watchers."""
     for handler, (what, count) in EVENTS.items():
-        if not (bpy.app.background and what in WITH_WINDOW):
-            _handlers.append((handler, _handler(what, count)))
+        if not (bpy.app.background and what in WINDOW_EVENTS):
+            _handlers.append((handler, _build_handler(what, count)))
             getattr(bpy.app.handlers, handler).append(_handlers[-1][1])
     for watcher in _watchers:
         for drawing in watcher.draws:
-            window.draw(*drawing)
+            window.add_overlay(*drawing)
         if watcher.look or watcher.follow or watcher.settle:
-            soon(watcher.tick, 1.0)
+            call_soon(watcher.run_tick, 1.0)
 
 
 def stop_watching() -> None:
@@ -249,39 +249,39 @@ def stop_watching() -> None:
             bpy.app.timers.unregister(call)
     for watcher in reversed(_watchers):
         if watcher.ends:
-            guard(watcher.name, watcher.ends, counts=False)
+            call_guarded(watcher.name, watcher.ends, clears_failure=False)
         watcher.dirty = True
-    window.clear()
+    window.clear_windows()
     _reported.clear()
 
 
-def _handler(what: str, count: int) -> Callable:
+def _build_handler(event: str, count: int) -> Callable:
     """Build the handler that passes an event to all watchers."""
     @persistent
     def call(*arguments):
         for watcher in _watchers:
-            watcher.hear(what, *arguments[:count])
+            watcher.handle_event(event, *arguments[:count])
 
     return call
 
 
-def _report(failed: str, error: Exception) -> None:
+def _report_failure(failed: str, error: Exception) -> None:
     """Show in the panel that something failed, and print the traceback; the same one is printed only once."""
     places = traceback.extract_tb(error.__traceback__)
     seen = (failed, type(error), places[-1].filename, places[-1].lineno)
     if seen not in _reported:
         _reported.add(seen)
         traceback.print_exception(error)
-    bpy.context.window_manager.beyond_mocap_work.trouble = _message(failed)
+    bpy.context.window_manager.beyond_mocap_work.trouble = _format_failure(failed)
 
 
-def _take_back(failed: str) -> None:
+def _clear_failure(failed: str) -> None:
     """Clear a failure from the panel once the action succeeds."""
     work = bpy.context.window_manager.beyond_mocap_work
-    if work.trouble == _message(failed):
+    if work.trouble == _format_failure(failed):
         work.trouble = ""
-        window.redraw()
+        window.redraw_editors()
 
 
-def _message(failed: str) -> str:
+def _format_failure(failed: str) -> str:
     return f"{failed}; see the system console"

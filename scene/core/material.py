@@ -5,13 +5,13 @@ from __future__ import annotations
 import bpy
 
 
-def colour(name: str, rgb: tuple[float, float, float], roughness: float = 0.7) -> bpy.types.Material:
+def get_material(name: str, rgb: tuple[float, float, float], roughness: float = 0.7) -> bpy.types.Material:
     """Return the material `name`; create it with this colour (linear RGB) if the file has none of its own."""
     found = bpy.data.materials.get((name, None))  # a linked material cannot be changed
-    return found if found is not None else made(name, rgb, roughness)
+    return found if found is not None else create_material(name, rgb, roughness)
 
 
-def made(name: str, rgb: tuple[float, float, float], roughness: float = 0.7) -> bpy.types.Material:
+def create_material(name: str, rgb: tuple[float, float, float], roughness: float = 0.7) -> bpy.types.Material:
     """Create a material of this colour (linear RGB); Blender appends a number where the name is taken."""
     material = bpy.data.materials.new(name)
     material["beyond_mocap_take"] = True  # created here: may be removed when unused

@@ -37,34 +37,34 @@ class Clock:
     start_time: float
     fps: float
 
-    def frame(self, seconds: float) -> float:
+    def to_frame(self, seconds: float) -> float:
         """Return the (fractional) frame at which the clock shows `seconds`."""
         return self.start_frame + (seconds - self.start_time) * self.fps
 
-    def whole(self, seconds: float) -> int:
+    def to_whole_frame(self, seconds: float) -> int:
         """Return the whole frame nearest to `seconds`."""
-        return nearest_frame(self.frame(seconds))
+        return round_frame(self.to_frame(seconds))
 
-    def seconds(self, frame: float) -> float:
+    def to_seconds(self, frame: float) -> float:
         """Return the time on a frame, rounded to the microsecond for display; `to_whole_frame` inverts it."""
         return round(self.start_time + (frame - self.start_frame) / self.fps, 6)
 
-    def spelled(self) -> str:
+    def to_text(self) -> str:
         """Format the clock as exact text; `from_text` inverts it."""
         return f"{self.start_frame!r} {self.start_time!r} {self.fps!r}"
 
     @classmethod
-    def read(cls, text: str) -> "Clock | None":
+    def from_text(cls, text: str) -> "Clock | None":
         """Parse a text of `to_text`; None for an empty one."""
         return cls(*map(float, text.split())) if text else None
 
 
-def scene_clock(scene: bpy.types.Scene) -> Clock:
+def build_scene_clock(scene: bpy.types.Scene) -> Clock:
     """Build the clock of the scene's settings."""
     settings = scene.beyond_mocap
     return Clock(float(settings.start_frame), float(settings.start_time), float(frames_per_second(scene)))
 
 
-def nearest_frame(frame: float) -> int:
+def round_frame(frame: float) -> int:
     """Round to the nearest whole frame; halves go up, for negative frames too."""
     return math.floor(frame + 0.5)

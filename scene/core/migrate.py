@@ -16,20 +16,20 @@ from .settings import BeyondMocapSettings
 VERSION = 1  # 0: before the editor, without a number; also a scene that has not been saved
 
 
-def bring_up(scene: bpy.types.Scene) -> None:
+def migrate_scene(scene: bpy.types.Scene) -> None:
     """Migrate one scene's settings from the version they were saved with."""
     settings = scene.beyond_mocap
     if settings.version < 1:
-        _know_bodies(settings)
+        _mark_accepted_bodies(settings)
     settings.version = max(settings.version, VERSION)
 
 
-def _know_bodies(settings: BeyondMocapSettings) -> None:
+def _mark_accepted_bodies(settings: BeyondMocapSettings) -> None:
     """From version 0: a body that plays what Bake wrote is an accepted result."""
     for player in settings.players:
         if player.body is None or player.result.state != "NONE":
             continue
-        action, _ = channels.playing(player.body)
+        action, _ = channels.find_playing_action(player.body)
         if action is not None and action.get(bake.MARK):
             player.result.state = "ACCEPTED"
 
@@ -38,7 +38,7 @@ def on_load() -> None:
     """Migrate an opened file; there is no undo history yet, so this adds no step."""
     for scene in bpy.data.scenes:
         if scene.library is None:
-            bring_up(scene)
+            migrate_scene(scene)
 
 
 def on_save() -> None:

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import bpy
 
-from ...beyond_mocap.annotation.annotating import State
-from ...beyond_mocap.annotation.decision import can_skip, instead_of, served
+from ...beyond_mocap.annotation.annotating import AnnotationState
+from ...beyond_mocap.annotation.decision import can_skip, find_alternative, is_available
 
 Rect = tuple[float, float, float, float]
 
@@ -83,12 +83,12 @@ class Box:
     def word_at(self, x: float, y: float) -> str | None:
         """Return the label of the row at this place; "" elsewhere in the box, None outside."""
         for row, rect in zip(self.content.rows, self.rows):
-            if _inside(rect, x, y):
+            if _is_inside(rect, x, y):
                 return row.word
-        return "" if _inside(self.box, x, y) else None
+        return "" if _is_inside(self.box, x, y) else None
 
 
-def content(state: State, who: str, told: str = "", folded: bool = False) -> Content:
+def build_content(state: AnnotationState, player: str, message: str = "", folded: bool = False) -> Content:
     """Build the contents for a state.
 
     Args:
@@ -99,27 +99,27 @@ def content(state: State, who: str, told: str = "", folded: bool = False) -> Con
     Returns:
         The contents.
     """
-    rows = tuple(Row(str(option.digit), option.word, f"{_ARROW} {' '.join(option.instead)}" if option.instead else "",
-                     word=option.word, faint=not option.served, chosen=option.chosen)
-                 for option in state.shown)
-    more = [f"= more ({state.page + 1}/{state.pages})"] if state.pages > 1 else []
+    rows = tuple(Row(str(option.digit), option.word, f"{_ARROW} {' '.join(option.alternative)}" if option.alternative else "",
+                     word=option.word, faint=not option.is_available, chosen=option.is_chosen)
+                 for option in state.page_options)
+    more = [f"= more ({state.page + 1}/{state.page_count})"] if state.page_count > 1 else []
     if not state.trail:
-        begun = [f"in {state.start:.2f} s, O: out"] if state.start is not None else ["I in  O out"]
-        hints = "   ".join([*begun, *more, "Esc leave"])
-        shown = () if folded else rows
-        return Content(f"{who}: key moment at the playhead", shown, (hints, told) if told else (hints,))
+        start_hint = [f"in {state.start:.2f} s, O: out"] if state.start is not None else ["I in  O out"]
+        hints = "   ".join([*start_hint, *more, "Esc leave"])
+        visible_rows = () if folded else rows
+        return Content(f"{player}: key moment at the playhead", visible_rows, (hints, message) if message else (hints,))
     walk = state.walk
     when = f"{state.time:.2f} s" if walk.kind == "moment" else f"{state.start:.2f} to {state.end:.2f} s"
-    head = f"{who}: {' '.join(walk.words) or '...'}   {when}"
+    head = f"{player}: {' '.join(walk.words) or '...'}   {when}"
     skip = ["0 any"] if can_skip(walk) else []
     hints = ["   ".join([*skip, *more, "Enter done", "Backspace back"])]
-    if walk.words and not served(walk, state.held):
-        near = " ".join(instead_of(walk.words, walk.kind, state.held))
-        hints.insert(0, "not in the library" + (f" {_ARROW} {near}" if near else ""))
+    if walk.words and not is_available(walk, state.available):
+        nearest = " ".join(find_alternative(walk.words, walk.kind, state.available))
+        hints.insert(0, "not in the library" + (f" {_ARROW} {nearest}" if nearest else ""))
     return Content(head, rows, tuple(hints))
 
 
-def laid_out(content: Content, at: tuple[float, float] | None, free: Rect, size: float,
+def place_menu(content: Content, at: tuple[float, float] | None, free: Rect, size: float,
              width_of: Callable[[str], float]) -> Box:
     """Place the menu within a free rectangle.
 
@@ -142,58 +142,58 @@ def laid_out(content: Content, at: tuple[float, float] | None, free: Rect, size:
     columns = max(1, -(-len(content.rows) // per_column))
     tallest = -(-len(content.rows) // columns) if content.rows else 0
     column = math.ceil(key + text + note + (gap if columns > 1 else 0.0))
-    wide = math.ceil(max([columns * column, width_of(content.head), *map(width_of, content.foot)])) + 2 * edge
-    tall = (tallest + lines) * row + 2 * edge
-    left, top = map(round, _corner(at, free, wide, tall, _OFF_POINTER * size))
+    width = math.ceil(max([columns * column, width_of(content.head), *map(width_of, content.foot)])) + 2 * edge
+    height = (tallest + lines) * row + 2 * edge
+    left, top = map(round, _find_corner(at, free, width, height, _OFF_POINTER * size))
     first = top - edge - row
     rects = []
     for number in range(len(content.rows)):
         x, y = left + edge + (number // tallest) * column, first - (number % tallest + 1) * row
-        rects.append((x, y, x + (column if columns > 1 else wide - 2 * edge), y + row))
+        rects.append((x, y, x + (column if columns > 1 else width - 2 * edge), y + row))
     feet = [(left + edge, first - (tallest + number + 1) * row) for number in range(len(content.foot))]
-    box = (left, top - tall, left + wide, top)
+    box = (left, top - height, left + width, top)
     return Box(content, box, tuple(rects), head=(left + edge, first), foot=tuple(feet), offsets=(key, key + text),
                size=size)
 
 
-def letters() -> float:
+def measure_font_size() -> float:
     """Return the font size of the interface in pixels."""
     preferences = bpy.context.preferences
     return preferences.ui_styles[0].widget.points * preferences.system.ui_scale
 
 
-def width_of(text: str) -> float:
+def measure_text(text: str) -> float:
     """Return the width of a text in the interface's font, in pixels."""
     import blf
 
-    blf.size(0, letters())
+    blf.size(0, measure_font_size())
     return blf.dimensions(0, text)[0]
 
 
-def draw(box: Box, hovered: str = "") -> None:
+def draw_menu(box: Box, hovered: str = "") -> None:
     """Draw the menu into the present region; `hovered` is the label under the mouse."""
     import gpu
 
     theme = bpy.context.preferences.themes[0].user_interface
     back, item = theme.wcol_menu_back, theme.wcol_menu_item
     gpu.state.blend_set("ALPHA")
-    _fill(box.box, (*back.inner[:3], max(back.inner[3], 0.92)))
+    _draw_rectangle(box.box, (*back.inner[:3], max(back.inner[3], 0.92)))
     for row, rect in zip(box.content.rows, box.rows):
         if row.word and (row.word == hovered or row.chosen):
-            _fill(rect, tuple(item.inner_sel) if row.word == hovered else (*item.inner_sel[:3], 0.45))
+            _draw_rectangle(rect, tuple(item.inner_sel) if row.word == hovered else (*item.inner_sel[:3], 0.45))
     plain, bright = (*item.text, 1.0), (*item.text_sel, 1.0)
-    _write(box.content.head, *box.head, bright, box)
+    _draw_text(box.content.head, *box.head, bright, box)
     for row, rect in zip(box.content.rows, box.rows):
         faint = (*item.text, 0.45)
-        _write(row.key, rect[0], rect[1], faint if row.faint else bright, box)
-        _write(row.text, rect[0] + box.offsets[0], rect[1], faint if row.faint else plain, box)
-        _write(row.note, rect[0] + box.offsets[1], rect[1], (*item.text, 0.6), box)
+        _draw_text(row.key, rect[0], rect[1], faint if row.faint else bright, box)
+        _draw_text(row.text, rect[0] + box.offsets[0], rect[1], faint if row.faint else plain, box)
+        _draw_text(row.note, rect[0] + box.offsets[1], rect[1], (*item.text, 0.6), box)
     for line, place in zip(box.content.foot, box.foot):
-        _write(line, *place, (*item.text, 0.7), box)
+        _draw_text(line, *place, (*item.text, 0.7), box)
     gpu.state.blend_set("NONE")
 
 
-def _corner(at, free: Rect, wide: float, tall: float, away: float) -> tuple[float, float]:
+def _find_corner(at, free: Rect, wide: float, tall: float, away: float) -> tuple[float, float]:
     """Return left and top of the box: beside the pointer, on its other side at the right edge, always within `free`."""
     left, top = (free[0], free[1] + tall) if at is None else (at[0] + away, at[1] - away)
     if at is not None and left + wide > free[2] and at[0] - away - wide >= free[0]:
@@ -201,11 +201,11 @@ def _corner(at, free: Rect, wide: float, tall: float, away: float) -> tuple[floa
     return max(free[0], min(left, free[2] - wide)), min(free[3], max(top, free[1] + tall))
 
 
-def _inside(rect: Rect, x: float, y: float) -> bool:
+def _is_inside(rect: Rect, x: float, y: float) -> bool:
     return rect[0] <= x < rect[2] and rect[1] <= y < rect[3]
 
 
-def _fill(rect: Rect, color: Sequence[float]) -> None:
+def _draw_rectangle(rect: Rect, color: Sequence[float]) -> None:
     """Draw a filled rectangle."""
     import gpu
     from gpu_extras.batch import batch_for_shader
@@ -218,7 +218,7 @@ def _fill(rect: Rect, color: Sequence[float]) -> None:
     batch.draw(shader)
 
 
-def _write(text: str, x: float, y: float, color: Sequence[float], box: Box) -> None:
+def _draw_text(text: str, x: float, y: float, color: Sequence[float], box: Box) -> None:
     """Draw text on the baseline of the row with lower edge `y`, clipped at the box's right edge."""
     import blf
 

@@ -20,28 +20,28 @@ class Preferences:
     """The properties; panels/preferences.py draws and registers them."""
 
 
-def get() -> "Preferences | None":
+def find_preferences() -> "Preferences | None":
     """Return the user's preferences; None where the extension has none."""
     addon = bpy.context.preferences.addons.get(EXTENSION)
     return addon.preferences if addon is not None else None
 
 
-def threads() -> int:
+def count_threads() -> int:
     """Return how many threads may be used, at least one."""
-    chosen = get()
-    return (chosen.threads if chosen else 0) or os.cpu_count() or 1
+    chosen = find_preferences()
+    return (chosen.count_threads if chosen else 0) or os.cpu_count() or 1
 
 
-def cache_folder(library_folder: str) -> str | None:
+def find_cache_folder(library_folder: str) -> str | None:
     """Return where the library of a folder is cached; None for beside its recordings."""
     from ...beyond_mocap.library import cache  # slow to import, and enabling the extension must be quick
 
-    chosen = get()
-    if not chosen or not chosen.cache_folder:
+    chosen = find_preferences()
+    if not chosen or not chosen.find_cache_folder:
         return None
-    return str(cache.own_folder(Path(bpy.path.abspath(chosen.cache_folder)), Path(library_folder)))
+    return str(cache.find_own_folder(Path(bpy.path.abspath(chosen.find_cache_folder)), Path(library_folder)))
 
 
-def for_build(library_folder: str) -> dict:
+def build_library_options(library_folder: str) -> dict:
     """Return the arguments of the core's `library.build` that the preferences set."""
-    return {"cache_dir": cache_folder(library_folder), "threads": threads()}
+    return {"cache_dir": find_cache_folder(library_folder), "threads": count_threads()}

@@ -9,10 +9,10 @@ from pathlib import Path
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProperty, IntProperty, StringProperty
 
-from ...beyond_mocap.base.settings import rows_of
-from ...beyond_mocap.base.settings.setting import Setting, collect
+from ...beyond_mocap.base.settings import list_settings
+from ...beyond_mocap.base.settings.setting import Setting, collect_values
 
-_MAKERS = {bool: BoolProperty, int: IntProperty, float: FloatProperty, str: StringProperty, Path: StringProperty,
+_PROPERTY_TYPES = {bool: BoolProperty, int: IntProperty, float: FloatProperty, str: StringProperty, Path: StringProperty,
            tuple: StringProperty}
 
 
@@ -21,22 +21,22 @@ def with_settings(*groups: str, **callbacks: Callable) -> Callable[[type], type]
     `update`.
     """
 
-    def add(cls: type) -> type:
-        made = {row.identifier: property_of(row, **callbacks) for row in _shown(groups)}
-        cls.__annotations__ = {**get_annotations(cls), **made}
+    def add_properties(cls: type) -> type:
+        properties = {row.identifier: build_property(row, **callbacks) for row in _list_panel_settings(groups)}
+        cls.__annotations__ = {**get_annotations(cls), **properties}
         return cls
 
-    return add
+    return add_properties
 
 
-def property_of(row: Setting, **more):
+def build_property(row: Setting, **more):
     """Build a property of bpy from a setting, with further arguments."""
     arguments = {
         "name": row.title, "description": row.tooltip, "default": row.default or None, "min": row.least,
         "max": row.most, "precision": row.precision, "unit": "TIME_ABSOLUTE" if row.unit == "seconds" else None,
         **row.panel_more, **more,
     }  # fmt: skip
-    maker = _MAKERS[type(arguments["default"])] if arguments["default"] is not None else _MAKERS[row.kind]
+    maker = _PROPERTY_TYPES[type(arguments["default"])] if arguments["default"] is not None else _PROPERTY_TYPES[row.kind]
     if row.choices:
         maker, arguments["items"] = EnumProperty, row.choices
     elif row.kind is tuple and row.default:
@@ -44,7 +44,7 @@ def property_of(row: Setting, **more):
     return maker(**{name: value for name, value in arguments.items() if value is not None})
 
 
-def property_values(record: type, properties: bpy.types.PropertyGroup, *groups: str) -> dict[str, object]:
+def read_property_values(record: type, properties: bpy.types.PropertyGroup, *groups: str) -> dict[str, object]:
     """Read the values for the fields of a dataclass from properties.
 
     Args:
@@ -54,14 +54,14 @@ def property_values(record: type, properties: bpy.types.PropertyGroup, *groups: 
     Returns:
         Field name -> value.
     """
-    return collect(record, _shown(groups), lambda row: getattr(properties, row.identifier))
+    return collect_values(record, _list_panel_settings(groups), lambda row: getattr(properties, row.identifier))
 
 
-def active_row(rows, number: int):
+def find_active_row(rows, number: int):
     """Return the active row of a list; None while the list is empty."""
     return rows[number] if 0 <= number < len(rows) else None
 
 
-def _shown(groups: tuple[str, ...]) -> list[Setting]:
+def _list_panel_settings(groups: tuple[str, ...]) -> list[Setting]:
     """List the settings of groups that panels show."""
-    return [row for group in groups for row in rows_of(group) if row.tooltip]
+    return [row for group in groups for row in list_settings(group) if row.tooltip]

@@ -18,7 +18,7 @@ import bpy
 
 KINDS = (bpy.types.PropertyGroup, bpy.types.Operator, bpy.types.FileHandler, bpy.types.UIList, bpy.types.Menu,
          bpy.types.Panel, bpy.types.Header, bpy.types.AddonPreferences)
-_undoing: dict[str, list[Callable[[], None]]] = {}
+_undo_steps: dict[str, list[Callable[[], None]]] = {}
 
 
 def register_package(package: str) -> None:
@@ -28,9 +28,9 @@ def register_package(package: str) -> None:
     Args:
         package: its full name, `__name__` in its `__init__`.
     """
-    undoing = _undoing[package] = []
+    undoing = _undo_steps[package] = []
     try:
-        for do, undo in _steps(package):
+        for do, undo in _iter_steps(package):
             do()
             undoing.append(undo)
     except BaseException:
@@ -40,12 +40,12 @@ def register_package(package: str) -> None:
 
 def unregister_package(package: str) -> None:
     """Undo `register_package`, the last step first."""
-    undoing = _undoing.pop(package)
+    undoing = _undo_steps.pop(package)
     while undoing:
         undoing.pop()()
 
 
-def in_order(classes: Iterable[type]) -> list[type]:
+def sort_classes(classes: Iterable[type]) -> list[type]:
     """Sort classes by kind, each after those that it needs.
 
     Args:
@@ -56,49 +56,49 @@ def in_order(classes: Iterable[type]) -> list[type]:
     classes = sorted(classes, key=lambda cls: next(n for n, kind in enumerate(KINDS) if issubclass(cls, kind)))
     ordered: dict[type, None] = {}
 
-    def add(cls: type) -> None:
-        for needed in _needs(cls, classes):
-            add(needed)
+    def add_class(cls: type) -> None:
+        for needed in _list_requirements(cls, classes):
+            add_class(needed)
         ordered.setdefault(cls)
 
     for cls in classes:
-        add(cls)
+        add_class(cls)
     return list(ordered)
 
 
-def _steps(package: str) -> Iterator[tuple[Callable[[], None], Callable[[], None]]]:
+def _iter_steps(package: str) -> Iterator[tuple[Callable[[], None], Callable[[], None]]]:
     """Iterate over pairs of a step and its undo: classes, their places in Blender's data, then the modules' own
     hooks.
     """
-    modules = list(_modules(import_module(package)))
-    classes = in_order(cls for module in modules for cls in _classes(module))
+    modules = list(_iter_modules(import_module(package)))
+    classes = sort_classes(cls for module in modules for cls in _list_classes(module))
     for cls in classes:
         yield partial(bpy.utils.register_class, cls), partial(bpy.utils.unregister_class, cls)
     for cls in classes:
         for place in getattr(cls, "attached_to", ()):
             owner, _, name = place.partition(".")
             owner = getattr(bpy.types, owner)
-            yield partial(_attach, owner, name, cls), partial(delattr, owner, name)
+            yield partial(_attach_property, owner, name, cls), partial(delattr, owner, name)
     for module in modules:
-        yield getattr(module, "register", _nothing), getattr(module, "unregister", _nothing)
+        yield getattr(module, "register", _do_nothing), getattr(module, "unregister", _do_nothing)
 
 
-def _modules(package: ModuleType) -> Iterator[ModuleType]:
+def _iter_modules(package: ModuleType) -> Iterator[ModuleType]:
     """Iterate over the modules below a package by name; of a package that registers itself, only that package."""
     for found in sorted(iter_modules(package.__path__), key=lambda found: found.name):
         module = import_module(f"{package.__name__}.{found.name}")
         yield module
         if found.ispkg and not hasattr(module, "register"):
-            yield from _modules(module)
+            yield from _iter_modules(module)
 
 
-def _classes(module: ModuleType) -> list[type]:
+def _list_classes(module: ModuleType) -> list[type]:
     """List the Blender classes that a module defines, in the order of its lines."""
     defined = [thing for thing in vars(module).values() if isinstance(thing, type)]
     return [cls for cls in defined if cls.__module__ == module.__name__ and issubclass(cls, KINDS)]
 
 
-def _needs(cls: type, classes: list[type]) -> list[type]:
+def _list_requirements(cls: type, classes: list[type]) -> list[type]:
     """List the classes that must be registered before this one: targets of its properties, or a panel's parent."""
     if issubclass(cls, bpy.types.PropertyGroup):
         pointed = [getattr(hint, "keywords", {}).get("type") for hint in get_type_hints(cls).values()]
@@ -106,9 +106,9 @@ def _needs(cls: type, classes: list[type]) -> list[type]:
     return [other for other in classes if other.__name__ == getattr(cls, "bl_parent_id", None)]
 
 
-def _attach(owner: type, name: str, cls: type) -> None:
+def _attach_property(owner: type, name: str, cls: type) -> None:
     setattr(owner, name, bpy.props.PointerProperty(type=cls))
 
 
-def _nothing() -> None:
+def _do_nothing() -> None:
     """Do nothing, for a module without a hook."""

@@ -17,18 +17,18 @@ if TYPE_CHECKING:  # the library's modules are slow to import, and enabling the 
     from ...beyond_mocap.synthesis.plan import Plan
     from ...beyond_mocap.synthesis.take import Take
 
-KEPT_TAKES = 200
-KEPT_LIBRARIES = 3
+MAX_TAKES = 200
+MAX_LIBRARIES = 3
 
 _numbers = itertools.count(1)
 # Part of every name, so that takes of another session are not confused with those of this one.
 _session = uuid.uuid4().hex[:8]
 _libraries: dict[tuple[str, float | None], "Library"] = {}
-_takes: dict[str, "Made"] = {}
+_takes: dict[str, "StoredTake"] = {}
 
 
 @dataclass(frozen=True, eq=False)
-class Made:
+class StoredTake:
     """A stored take.
 
     Attributes:
@@ -42,35 +42,35 @@ class Made:
     report: dict | None = None
 
 
-def keep_library(library: "Library", unit: float | None) -> None:
+def store_library(library: "Library", unit: float | None) -> None:
     """Store a built library under its folder and the unit (metres, None where guessed) its clips were read with."""
-    _keep(_libraries, (str(Path(library.folder).resolve()), unit), library, KEPT_LIBRARIES)
+    _store_limited(_libraries, (str(Path(library.folder).resolve()), unit), library, MAX_LIBRARIES)
 
 
-def library(folder: str, unit: float | None) -> "Library | None":
+def find_library(folder: str, unit: float | None) -> "Library | None":
     """Return the library built from a folder with that unit in this session, or None."""
     return _libraries.get((str(Path(folder).resolve()), unit))
 
 
-def keep_take(plan: "Plan", take: "Take", report: dict | None = None) -> str:
+def store_take(plan: "Plan", take: "Take", report: dict | None = None) -> str:
     """Store a take with its plan and its report; return its name."""
     name = f"take-{_session}-{next(_numbers)}"
-    _keep(_takes, name, Made(plan, take, report), KEPT_TAKES)
+    _store_limited(_takes, name, StoredTake(plan, take, report), MAX_TAKES)
     return name
 
 
-def made(name: str) -> Made | None:
+def find_take(name: str) -> StoredTake | None:
     """Return the take of that name with its plan; None if it is not of this session."""
     return _takes.get(name)
 
 
-def clear() -> None:
+def clear_session() -> None:
     """Clear the store."""
     _libraries.clear()
     _takes.clear()
 
 
-def _keep(store: dict, name, value, limit: int) -> None:
+def _store_limited(store: dict, name, value, limit: int) -> None:
     store.pop(name, None)
     store[name] = value
     while len(store) > limit:

@@ -12,13 +12,13 @@ import bpy
 from ..result.result import BeyondMocapBefore
 from . import channels
 
-STANDS = ("location", "rotation_quaternion", "rotation_euler", "rotation_axis_angle", "scale")
+TRANSFORMS = ("location", "rotation_quaternion", "rotation_euler", "rotation_axis_angle", "scale")
 
 
-def put_aside(before: BeyondMocapBefore, target: bpy.types.Object) -> None:
+def save_playback(before: BeyondMocapBefore, target: bpy.types.Object) -> None:
     """Save what an object plays, and let it play nothing: its action is removed from it, its NLA tracks are off."""
     before.kept, before.made = True, False
-    before.stance = json.dumps(stance_of(target))
+    before.stance = json.dumps(read_stance(target))
     data = target.animation_data
     before.animated = data is not None
     if data is None:
@@ -32,15 +32,15 @@ def put_aside(before: BeyondMocapBefore, target: bpy.types.Object) -> None:
     data.action_extrapolation = "HOLD"
 
 
-def bring_back(before: BeyondMocapBefore, target: bpy.types.Object, mark: str) -> None:
+def restore_playback(before: BeyondMocapBefore, target: bpy.types.Object, mark: str) -> None:
     """Restore what an object played and its pose.
 
     An action with the custom property `mark` that it plays now is removed; another one stays in the file.
     """
-    channels.discard(target, mark)
-    now, _ = channels.playing(target)
-    if now is not None and now != before.action and now.users == 1:
-        now.use_fake_user = True
+    channels.remove_marked_action(target, mark)
+    current, _ = channels.find_playing_action(target)
+    if current is not None and current != before.action and current.users == 1:
+        current.use_fake_user = True
     if not before.animated:
         if target.animation_data is not None:
             target.animation_data.action = None
@@ -50,34 +50,34 @@ def bring_back(before: BeyondMocapBefore, target: bpy.types.Object, mark: str) -
         data.action = before.action
         if before.action is not None:
             data.action_slot = next((s for s in before.action.slots if s.identifier == before.slot), None)
-        play_as_before(before, data)
+        restore_nla(before, data)
     if before.stance:
-        stand(target, json.loads(before.stance))
-    clear(before)
+        apply_stance(target, json.loads(before.stance))
+    clear_saved_state(before)
 
 
-def play_as_before(before: BeyondMocapBefore, data: bpy.types.AnimData) -> None:
+def restore_nla(before: BeyondMocapBefore, data: bpy.types.AnimData) -> None:
     """Restore NLA, influence and blending."""
     data.use_nla, data.action_influence = before.use_nla, before.influence
     data.action_blend_type, data.action_extrapolation = before.blend, before.extrapolation
 
 
-def clear(before: BeyondMocapBefore) -> None:
+def clear_saved_state(before: BeyondMocapBefore) -> None:
     """Clear what was saved."""
     for name in ("kept", "made", "animated", "action", "slot", "use_nla", "influence", "blend", "extrapolation",
                  "stance"):
         before.property_unset(name)
 
 
-def drop(before: BeyondMocapBefore, mark: str) -> None:
+def discard_saved_state(before: BeyondMocapBefore, mark: str) -> None:
     """Clear what was saved without restoring it; an unused action with `mark` is removed, others stay in the file."""
     action = before.action
-    clear(before)
+    clear_saved_state(before)
     if action is not None:
-        purge_action(action, mark)
+        remove_unused_action(action, mark)
 
 
-def purge_action(action: bpy.types.Action, mark: str) -> None:
+def remove_unused_action(action: bpy.types.Action, mark: str) -> None:
     """Remove an action with `mark` and no user; one without the mark stays in the file."""
     if action.users - action.use_fake_user:
         return
@@ -87,33 +87,33 @@ def purge_action(action: bpy.types.Action, mark: str) -> None:
         action.use_fake_user = True
 
 
-def stance_of(target: bpy.types.Object) -> dict:
+def read_stance(target: bpy.types.Object) -> dict:
     """Read the transforms of an object and its bones: name ("" for the object) -> rotation mode and transform
     properties.
     """
     bones = target.pose.bones if target.pose is not None else ()
-    return {"": _stands(target), **{f"{bone.name}": _stands(bone) for bone in bones}}
+    return {"": _read_transform(target), **{f"{bone.name}": _read_transform(bone) for bone in bones}}
 
 
-def stand(target: bpy.types.Object, stance: dict) -> None:
+def apply_stance(target: bpy.types.Object, stance: dict) -> None:
     """Apply the transforms that `read_stance` returned."""
     for name, (mode, *values) in stance.items():
         thing = target if not name else target.pose.bones.get(name)
         if thing is None:
             continue
         thing.rotation_mode = mode
-        for place, value in zip(STANDS, values, strict=True):
+        for place, value in zip(TRANSFORMS, values, strict=True):
             setattr(thing, place, value)
 
 
 @contextmanager
-def scene_aside(name: str):
+def use_temporary_scene(name: str):
     """Use a temporary scene, in the window where there is one, else in the context.
 
     All data that is added meanwhile is removed at the end, and the earlier scene and view layer are shown again.
     """
-    before, window = set(_all_data()), bpy.context.window
-    home, layer = (window.scene, window.view_layer.name) if window is not None else (None, "")
+    before, window = set(_collect_all_data()), bpy.context.window
+    user_scene, layer = (window.scene, window.view_layer.name) if window is not None else (None, "")
     scene = bpy.data.scenes.new(name)
     try:
         if window is not None:
@@ -123,20 +123,20 @@ def scene_aside(name: str):
             yield scene
     finally:
         if window is not None:
-            window.scene = home
-            window.view_layer = home.view_layers[layer]
-        came = [item for key, item in _all_data().items() if key not in before]
-        bpy.data.batch_remove([item for item in came if not isinstance(item, bpy.types.Scene)])
-        for item in [item for item in came if isinstance(item, bpy.types.Scene)]:
+            window.scene = user_scene
+            window.view_layer = user_scene.view_layers[layer]
+        added = [item for key, item in _collect_all_data().items() if key not in before]
+        bpy.data.batch_remove([item for item in added if not isinstance(item, bpy.types.Scene)])
+        for item in [item for item in added if isinstance(item, bpy.types.Scene)]:
             bpy.data.scenes.remove(item)
 
 
-def _stands(thing) -> list:
+def _read_transform(thing) -> list:
     """Read the transform of an object or bone."""
-    return [thing.rotation_mode, *(list(getattr(thing, name)) for name in STANDS)]
+    return [thing.rotation_mode, *(list(getattr(thing, name)) for name in TRANSFORMS)]
 
 
-def _all_data() -> dict:
+def _collect_all_data() -> dict:
     """Return all data of the file by identity; newer Blender versions list some data under several names."""
     found = {}
     for name in dir(bpy.data):

@@ -9,13 +9,13 @@ from __future__ import annotations
 import bpy
 from bpy.props import BoolProperty, CollectionProperty, FloatProperty, IntProperty, PointerProperty, StringProperty
 
-from ...beyond_mocap.base.settings import rows_of
+from ...beyond_mocap.base.settings import list_settings
 from ..overlays.settings import BeyondMocapView
 from ..player.pins import BeyondMocapPin
 from ..result.result import BeyondMocapResult, BeyondMocapShared
 from ..rigs.rig import BeyondMocapRig
-from ..timeline.video import BeyondMocapVideo, renew
-from .properties import active_row, with_settings
+from ..timeline.video import BeyondMocapVideo, tag_update
+from .properties import find_active_row, with_settings
 
 FILE = {"subtype": "FILE_PATH", "options": {"PATH_SUPPORTS_BLEND_RELATIVE"}}
 
@@ -30,7 +30,7 @@ def is_track(_settings, candidate: bpy.types.Object) -> bool:
     return candidate.type in {"CURVE", "EMPTY", "MESH", "ARMATURE"}
 
 
-def show_on_dot(player, _context) -> None:
+def update_dot(player, _context) -> None:
     """Apply a player's new name or colour to their dot."""
     if player.dot is not None:
         player.dot.name, player.dot.color = f"{player.name} dot", (*player.shirt, 1.0)
@@ -41,7 +41,7 @@ def show_on_dot(player, _context) -> None:
 class BeyondMocapPlayer(bpy.types.PropertyGroup):
     """One player: tracking data, labels, and the generated body."""
 
-    name: StringProperty(name="Name", update=show_on_dot, description="Name of the player")
+    name: StringProperty(name="Name", update=update_dot, description="Name of the player")
     use: BoolProperty(name="Use", default=True, description="Include this player in Synthesize and Accept")
     tracking_file: StringProperty(name="Tracking", description="The file with this player's positions", **FILE)
     metadata_file: StringProperty(name="Metadata", **FILE,
@@ -62,7 +62,7 @@ class BeyondMocapPlayer(bpy.types.PropertyGroup):
     annotation_text: PointerProperty(name="Text", type=bpy.types.Text,
                                      description="A text of this file with the labels; it replaces the file "
                                      "on disk")
-    shirt: bpy.props.FloatVectorProperty(name="Shirt", subtype="COLOR", size=3, min=0.0, max=1.0, update=show_on_dot,
+    shirt: bpy.props.FloatVectorProperty(name="Shirt", subtype="COLOR", size=3, min=0.0, max=1.0, update=update_dot,
                                          default=(0.75, 0.05, 0.06), description="Colour of the player's shirt")
     dot: PointerProperty(name="Dot", type=bpy.types.Object,
                          description="The empty that moves along the track and has the strips of the player's labels")
@@ -83,7 +83,7 @@ class BeyondMocapPlayer(bpy.types.PropertyGroup):
 
 
 @with_settings("synthesis", "result", "library", "path.new_curve")
-@with_settings("clock", update=renew)
+@with_settings("clock", update=tag_update)
 class BeyondMocapSettings(bpy.types.PropertyGroup):
     """The settings of one scene, for all steps."""
 
@@ -109,7 +109,7 @@ class BeyondMocapSettings(bpy.types.PropertyGroup):
 
     def list_tuning(self) -> list[str]:
         """List the names of the settings under Fine Tuning."""
-        return [row.identifier for row in rows_of("synthesis") if row.tuning in ("any", self.method)]
+        return [row.identifier for row in list_settings("synthesis") if row.tuning in ("any", self.method)]
 
 
 class BeyondMocapWork(bpy.types.PropertyGroup):
@@ -124,12 +124,12 @@ class BeyondMocapWork(bpy.types.PropertyGroup):
     trouble: StringProperty(description="Background update that failed; empty where none did")
 
 
-def absolute(path: str) -> str:
+def to_absolute_path(path: str) -> str:
     """Return a path from a setting as an absolute one; empty stays empty."""
     return bpy.path.abspath(path) if path else ""
 
 
-def as_setting(path: str) -> str:
+def to_setting_path(path: str) -> str:
     """Return a chosen path as it is stored: relative to a saved file where the user's preferences say so."""
     if bpy.data.is_saved and bpy.context.preferences.filepaths.use_relative_paths:
         try:
@@ -139,6 +139,6 @@ def as_setting(path: str) -> str:
     return path
 
 
-def active_player(settings: BeyondMocapSettings) -> BeyondMocapPlayer | None:
+def find_active_player(settings: BeyondMocapSettings) -> BeyondMocapPlayer | None:
     """Return the player chosen in the list; None while the list is empty."""
-    return active_row(settings.players, settings.active_player)
+    return find_active_row(settings.players, settings.active_player)

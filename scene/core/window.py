@@ -9,24 +9,24 @@ from collections.abc import Callable
 
 import bpy
 
-_drawn: list[tuple[type, Callable, object]] = []  # type of space, function, Blender's handle
-_clocks: list[bpy.types.Timer] = []
+_draw_handlers: list[tuple[type, Callable, object]] = []  # type of space, function, Blender's handle
+_timers: list[bpy.types.Timer] = []
 
 
-def draw(space: type, function: Callable[[], None], when: str = "POST_PIXEL") -> None:
+def add_overlay(space: type, function: Callable[[], None], when: str = "POST_PIXEL") -> None:
     """Call a function whenever the main region of such a space is drawn; never without a window."""
     if not bpy.app.background:
-        _drawn.append((space, function, space.draw_handler_add(function, (), "WINDOW", when)))
+        _draw_handlers.append((space, function, space.draw_handler_add(function, (), "WINDOW", when)))
 
 
-def undraw(function: Callable[[], None]) -> None:
+def remove_overlay(function: Callable[[], None]) -> None:
     """Remove a draw function from all spaces."""
-    for one in [one for one in _drawn if one[1] == function]:
+    for one in [one for one in _draw_handlers if one[1] == function]:
         one[0].draw_handler_remove(one[2], "WINDOW")
-        _drawn.remove(one)
+        _draw_handlers.remove(one)
 
 
-def redraw(*kinds: str) -> None:
+def redraw_editors(*kinds: str) -> None:
     """Redraw all editors of these kinds, 3D views by default; Blender does not watch the data of overlays."""
     for window in bpy.context.window_manager.windows:
         for area in window.screen.areas:
@@ -34,20 +34,20 @@ def redraw(*kinds: str) -> None:
                 area.tag_redraw()
 
 
-def start_clock(context: bpy.types.Context) -> bpy.types.Timer:
+def start_timer(context: bpy.types.Context) -> bpy.types.Timer:
     """Start timer events for an operator that polls a thread, and progress at the pointer; return the timer."""
     windows = context.window_manager
-    clock = windows.event_timer_add(0.05, window=context.window)
+    timer = windows.event_timer_add(0.05, window=context.window)
     windows.progress_begin(0, 100)
-    _clocks.append(clock)
-    return clock
+    _timers.append(timer)
+    return timer
 
 
-def stop_clock(context: bpy.types.Context, clock: bpy.types.Timer) -> None:
+def stop_timer(context: bpy.types.Context, timer: bpy.types.Timer) -> None:
     """Stop timer and progress, and clear the status bar."""
-    if clock in _clocks:
-        _clocks.remove(clock)
-    context.window_manager.event_timer_remove(clock)
+    if timer in _timers:
+        _timers.remove(timer)
+    context.window_manager.event_timer_remove(timer)
     context.window_manager.progress_end()
     clear_status()
 
@@ -58,12 +58,12 @@ def clear_status() -> None:
         workspace.status_text_set(None)
 
 
-def clear() -> None:
+def clear_windows() -> None:
     """Remove everything."""
-    while _clocks:
-        stop_clock(bpy.context, _clocks[-1])
-    for _, function, _ in list(_drawn):
-        undraw(function)
+    while _timers:
+        stop_timer(bpy.context, _timers[-1])
+    for _, function, _ in list(_draw_handlers):
+        remove_overlay(function)
     clear_status()
 
 
@@ -90,10 +90,10 @@ def open_editor(context: bpy.types.Context, kind: str, direction: str, factor: f
     window = context.window
     if bpy.app.background or window is None:
         return None
-    return largest_editor(window.screen, kind) or _split(context, window, kind, direction, factor)
+    return find_largest_editor(window.screen, kind) or _split_view(context, window, kind, direction, factor)
 
 
-def free_region(area: bpy.types.Area, region: bpy.types.Region) -> tuple[float, float, float, float]:
+def find_free_region(area: bpy.types.Area, region: bpy.types.Region) -> tuple[float, float, float, float]:
     """Find the part of a region that no toolbar, sidebar, header or redo panel covers, less a small margin.
 
     Returns:
@@ -102,8 +102,8 @@ def free_region(area: bpy.types.Area, region: bpy.types.Region) -> tuple[float, 
     left, bottom, right, top = 0.0, 0.0, float(region.width), float(region.height)
     for other in area.regions:
         x, y = other.x - region.x, other.y - region.y
-        over = x < region.width and y < region.height and x + other.width > 0 and y + other.height > 0
-        if other.type == region.type or min(other.width, other.height) <= 1 or not over:
+        overlaps = x < region.width and y < region.height and x + other.width > 0 and y + other.height > 0
+        if other.type == region.type or min(other.width, other.height) <= 1 or not overlaps:
             continue
         if other.type == "HUD":  # floats in the lower left corner: stay above it, or right of it where it is tall
             if y + other.height < 0.5 * region.height:
@@ -117,18 +117,18 @@ def free_region(area: bpy.types.Area, region: bpy.types.Region) -> tuple[float, 
     return (left + 4, bottom + 4, max(right - 4, left + 40), max(top - 4, bottom + 20))
 
 
-def largest_editor(screen: bpy.types.Screen, kind: str) -> bpy.types.Area | None:
+def find_largest_editor(screen: bpy.types.Screen, kind: str) -> bpy.types.Area | None:
     """Return the largest editor of a kind; None where there is none."""
     return max((area for area in screen.areas if area.type == kind), key=lambda a: a.width * a.height, default=None)
 
 
-def _split(context, window, kind: str, direction: str, factor: float) -> bpy.types.Area | None:
+def _split_view(context, window, kind: str, direction: str, factor: float) -> bpy.types.Area | None:
     """Split the largest 3D view; return the new editor, or None without a 3D view."""
-    view = largest_editor(window.screen, "VIEW_3D")
+    view = find_largest_editor(window.screen, "VIEW_3D")
     if view is None:
         return None
     before = {area.as_pointer() for area in window.screen.areas}
-    with context.temp_override(window=window, area=view, region=view.regions[-1]):
+    with context.temp_override(window=window, find_area=view, region=view.regions[-1]):
         bpy.ops.screen.area_split(direction=direction, factor=factor)
     halves = [area for area in window.screen.areas if area.as_pointer() not in before]
     new = min((*halves, view), key=lambda area: area.x if direction == "VERTICAL" else area.y)

@@ -25,13 +25,13 @@ if TYPE_CHECKING:
     from ...beyond_mocap.motion.motion import Motion
 
 CATALOGS = "blender_assets.cats.txt"
-TOP = "Beyond Mocap"
-_HEAD = "# This is an Asset Catalog Definition file for Blender.\n\nVERSION 1\n\n"
-_SPACE = uuid.UUID("6a8b2d0e-6f0f-5f0c-9d7b-0f3f5b3d7a11")
+ROOT_CATALOG = "Beyond Mocap"
+_CATALOG_HEADER = "# This is an Asset Catalog Definition file for Blender.\n\nVERSION 1\n\n"
+_CATALOG_NAMESPACE = uuid.UUID("6a8b2d0e-6f0f-5f0c-9d7b-0f3f5b3d7a11")
 
 
 @dataclass(frozen=True, eq=False)
-class Draft:
+class AssetDraft:
     """A motion that will become an asset.
 
     Attributes:
@@ -45,50 +45,50 @@ class Draft:
 
     name: str
     motion: "Motion"
-    words: tuple[str, ...]
+    labels: tuple[str, ...]
     frame: int
-    told: str
+    description: str
     action: str = ""
 
 
-def draft(name: str, motion: "Motion", rows, told: str = "", action: str = "") -> Draft:
+def build_draft(name: str, motion: "Motion", rows, description: str = "", action: str = "") -> AssetDraft:
     """Build a draft from a motion and its annotation rows.
 
     The picture shows the first key moment, else the middle of the longest row.
     """
-    from ...beyond_mocap.library.listing import words_of
+    from ...beyond_mocap.library.listing import collect_labels
 
     keys = [row.key for row in rows if row.key is not None]
     longest = max(rows, key=lambda row: row.end - row.start, default=None)
     middle = (longest.start + longest.end) // 2 if longest is not None else len(motion) // 2
     frame = min(keys[0] if keys else middle, len(motion) - 1)
-    return Draft(name, motion, words_of(rows)[0], frame=frame, told=told, action=action)
+    return AssetDraft(name, motion, collect_labels(rows)[0], frame=frame, description=description, action=action)
 
 
-def picture(one: Draft) -> np.ndarray | None:
+def render_picture(draft: AssetDraft) -> np.ndarray | None:
     """Render the picture (256, 256, 4) of a draft; None for a skeleton that cannot carry a body."""
-    from ...beyond_mocap.appearance.picture import pose_picture
+    from ...beyond_mocap.appearance.picture import render_pose
 
     try:
-        return pose_picture(one.motion, one.frame)
+        return render_pose(draft.motion, draft.frame)
     except InputError:
         return None
 
 
-def catalog_of(words: Iterable[str]) -> str:
+def choose_catalog(words: Iterable[str]) -> str:
     """Choose the catalog of a motion with these labels: its action, else its gait, else "Other"."""
     words = tuple(words)
     known = [word for word in words if word in DISCRETE] or [word for word in words if word in LOCOMOTION]
-    return f"{TOP}/{(known or ['other'])[0].replace('_', ' ').capitalize()}"
+    return f"{ROOT_CATALOG}/{(known or ['other'])[0].replace('_', ' ').capitalize()}"
 
 
-def catalog_id(catalog: str) -> str:
+def compute_catalog_id(catalog: str) -> str:
     """Compute a catalog's identity, the same in every file."""
-    return str(uuid.uuid5(_SPACE, catalog))
+    return str(uuid.uuid5(_CATALOG_NAMESPACE, catalog))
 
 
-def make(context: bpy.types.Context, drafts: list[Draft], pictures: list,
-         apart: bool = False) -> list[bpy.types.Action]:
+def create_assets(context: bpy.types.Context, drafts: list[AssetDraft], pictures: list,
+         copy_actions: bool = False) -> list[bpy.types.Action]:
     """Create assets from drafts: their own actions are marked, or new ones created.
 
     Args:
@@ -99,36 +99,36 @@ def make(context: bpy.types.Context, drafts: list[Draft], pictures: list,
     Returns:
         The actions.
     """
-    made, rigs = [], []
+    actions, rigs = [], []
     try:
         for one, pixels in zip(drafts, pictures):
-            own = bpy.data.actions.get(one.action) if one.action else None
-            if own is not None and apart:
-                own = own.copy()
-            if own is None:
-                rig = next((rig for rig, skeleton in rigs if skeleton.same_bones(one.motion.skeleton)), None)
+            own_action = bpy.data.actions.get(one.action) if one.action else None
+            if own_action is not None and copy_actions:
+                own_action = own_action.copy()
+            if own_action is None:
+                rig = next((rig for rig, skeleton in rigs if skeleton.has_same_bones(one.motion.skeleton)), None)
                 if rig is None:
-                    rig = armature.create(context, one.motion.skeleton, "Player")
+                    rig = armature.create_armature(context, one.motion.skeleton, "Player")
                     rigs.append((rig, one.motion.skeleton))
-                own = action.write(rig, one.motion, context.scene, name=one.name)
-            mark(own, one, pixels)
-            made.append(own)
+                own_action = action.write_motion(rig, one.motion, context.scene, name=one.name)
+            mark_asset(own_action, one, pixels)
+            actions.append(own_action)
     finally:
         data = [rig.data for rig, _ in rigs]
         bpy.data.batch_remove([rig for rig, _ in rigs])
         bpy.data.batch_remove(data)
-    return made
+    return actions
 
 
-def mark(item: bpy.types.Action, one: Draft, pixels: np.ndarray | None) -> None:
+def mark_asset(item: bpy.types.Action, draft: AssetDraft, pixels: np.ndarray | None) -> None:
     """Mark an action as an asset with catalog, tags, description and picture."""
     item.asset_mark()
     about = item.asset_data
-    about.catalog_id = catalog_id(catalog_of(one.words))
-    about.description = one.told
+    about.catalog_id = compute_catalog_id(choose_catalog(draft.labels))
+    about.description = draft.description
     for tag in list(about.tags):
         about.tags.remove(tag)
-    for word in one.words:
+    for word in draft.labels:
         about.tags.new(word)
     if pixels is not None:
         preview = item.preview_ensure()
@@ -148,17 +148,17 @@ def define_catalogs(folder: str | Path, catalogs: Iterable[str]) -> Path:
     target = next((place / CATALOGS for place in (folder, *folder.parents) if (place / CATALOGS).is_file()),
                   folder / CATALOGS)
     try:
-        text = target.read_text("utf-8") if target.is_file() else _HEAD
+        text = target.read_text("utf-8") if target.is_file() else _CATALOG_HEADER
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(target, f"cannot be read ({error})", "Blender's catalogs", "remove the file") from None
-    new = [name for name in sorted({TOP, *catalogs}) if catalog_id(name) not in text]
+    new = [name for name in sorted({ROOT_CATALOG, *catalogs}) if compute_catalog_id(name) not in text]
     if not new:
         return target
-    text = text.rstrip("\n") + "\n" + "".join(f"{catalog_id(name)}:{name}:{name.replace('/', '-')}\n" for name in new)
+    text = text.rstrip("\n") + "\n" + "".join(f"{compute_catalog_id(name)}:{name}:{name.replace('/', '-')}\n" for name in new)
     atomic_write(target, text)
     return target
 
 
 def write_library(path: Path, actions: list[bpy.types.Action]) -> None:
     """Write actions to a .blend of their own, completely or not at all; InputError where that fails."""
-    export.saved(path, lambda part: bpy.data.libraries.write(part, set(actions), fake_user=True, compress=True))
+    export.write_whole_file(path, lambda part: bpy.data.libraries.write(part, set(actions), fake_user=True, compress=True))

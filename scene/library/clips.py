@@ -23,10 +23,10 @@ from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatPrope
 from ...beyond_mocap.annotation.labels import find_label
 from ..core import window
 from ..core.live import Watcher
-from ..core.settings import absolute
+from ..core.settings import to_absolute_path
 
 if TYPE_CHECKING:
-    from ...beyond_mocap.library.listing import Listed
+    from ...beyond_mocap.library.listing import ListedClip
 
 ORDERS = (("NAME", "Name", "By folder and name"),
           ("WORDS", "Labels", "By key moment or gait"),
@@ -34,16 +34,16 @@ ORDERS = (("NAME", "Name", "By folder and name"),
           ("SPEED", "Speed", "Fastest first"),
           ("QUALITY", "Quality", "Best first"))
 
-SECONDS = 4.0  # seconds between two scans of the folder
+SCAN_INTERVAL = 4.0  # seconds between two scans of the folder
 
-_looking: dict = {}  # the scanning thread and its result
+_scan_state: dict = {}  # the scanning thread and its result
 
 
 @dataclass
-class _Kept:
+class _Listing:
     """The last listing: the clips, and the files at that time (`list_files`)."""
 
-    clips: tuple["Listed", ...] = ()
+    clips: tuple["ListedClip", ...] = ()
     files: dict[str, tuple[int, int]] = field(default_factory=dict)
 
 
@@ -56,7 +56,7 @@ class BeyondMocapClip(bpy.types.PropertyGroup):
     seconds: FloatProperty(name="Length", unit="TIME_ABSOLUTE", description="Seconds")
     figures: StringProperty(name="Figures", description="Length and speeds")
     mark: IntProperty(name="Quality", description="0 good, 1 fair, 2 poor, 3 not measured")
-    told: StringProperty(name="Quality", description="Lines with a name and a value")
+    messages: StringProperty(name="Quality", description="Lines with a name and a value")
 
 
 class BeyondMocapClips(bpy.types.PropertyGroup):
@@ -68,15 +68,15 @@ class BeyondMocapClips(bpy.types.PropertyGroup):
     active: IntProperty(name="Clip", min=0, description="The clip described below the list")
     total: IntProperty(description="Number of clips in the library")
     find: StringProperty(
-        name="Find", options={"TEXTEDIT_UPDATE"}, update=_refill,
+        name="Find", options={"TEXTEDIT_UPDATE"}, update=_on_filter_change,
         description="Show only clips whose name or labels contain all of these words",
     )
-    order: EnumProperty(name="Order", items=ORDERS, update=_refill, description="Order of the clips")
+    order: EnumProperty(name="Order", items=ORDERS, update=_on_filter_change, description="Order of the clips")
     missing: BoolProperty(description="Whether the library folder was missing at the last check")
     news: StringProperty(description="Changes in the folder since the list was filled; empty for none")
 
 
-def keep(manager: bpy.types.WindowManager, folder: str, clips, files) -> None:
+def store_clips(manager: bpy.types.WindowManager, folder: str, clips, files) -> None:
     """Store the clips of a library in the list.
 
     Args:
@@ -85,57 +85,57 @@ def keep(manager: bpy.types.WindowManager, folder: str, clips, files) -> None:
         clips: all of them.
         files: as `list_files` returned them.
     """
-    _kept.clips, _kept.files = tuple(clips), dict(files)
+    _listing.clips, _listing.files = tuple(clips), dict(files)
     manager.beyond_mocap_clips.folder = folder
     manager.beyond_mocap_clips.news = ""
     manager.beyond_mocap_clips.missing = False
-    fill(manager)
+    update_list(manager)
 
 
-def say(manager: bpy.types.WindowManager, path: str, rows) -> None:
+def update_labels(manager: bpy.types.WindowManager, path: str, rows) -> None:
     """Update the labels of a clip that were just written, from its annotation rows."""
-    from ...beyond_mocap.library.listing import words_of
+    from ...beyond_mocap.library.listing import collect_labels
 
-    words, moments = words_of(rows)
-    _kept.clips = tuple(
-        replace(clip, words=words, moments=moments) if clip.path == path else clip for clip in _kept.clips
+    words, moments = collect_labels(rows)
+    _listing.clips = tuple(
+        replace(clip, labels=words, key_moments=moments) if clip.path == path else clip for clip in _listing.clips
     )
-    fill(manager)
+    update_list(manager)
 
 
-def clear(manager: bpy.types.WindowManager | None = None) -> None:
+def clear_clips(manager: bpy.types.WindowManager | None = None) -> None:
     """Clear the list."""
-    _kept.clips, _kept.files = (), {}
+    _listing.clips, _listing.files = (), {}
     if manager is not None:
         manager.beyond_mocap_clips.folder = manager.beyond_mocap_clips.news = ""
-        fill(manager)
+        update_list(manager)
 
 
-def files() -> dict[str, tuple[int, int]]:
+def find_listed_files() -> dict[str, tuple[int, int]]:
     """Return the library's files when the list was filled: path -> size and modification time."""
-    return _kept.files
+    return _listing.files
 
 
-def fill(manager: bpy.types.WindowManager) -> None:
+def update_list(manager: bpy.types.WindowManager) -> None:
     """Show the clips that match, in order; the active one stays active if it is still shown."""
     listing = manager.beyond_mocap_clips
-    before = active(manager)
+    before = find_active_clip(manager)
     path = before.path if before is not None else ""
     listing.shown.clear()
-    listing.total = len(_kept.clips)
-    asked = listing.find.lower().split()
-    chosen = [clip for clip in _kept.clips if all(_fits(clip, word) for word in asked)]
+    listing.total = len(_listing.clips)
+    search_terms = listing.find.lower().split()
+    chosen = [clip for clip in _listing.clips if all(_matches(clip, word) for word in search_terms)]
     for clip in sorted(chosen, key=_KEYS[listing.order]):
         row = listing.shown.add()
-        row.name, row.path, row.words = Path(clip.path).stem, clip.path, " ".join(clip.words)
-        row.brief = find_label(clip.words[0]).title if clip.words else "no labels"
-        row.seconds, row.mark = clip.seconds, clip.mark
-        row.figures, row.told = _figures(clip), "\n".join(clip.told)
+        row.name, row.path, row.words = Path(clip.path).stem, clip.path, " ".join(clip.labels)
+        row.brief = find_label(clip.labels[0]).title if clip.labels else "no labels"
+        row.seconds, row.mark = clip.seconds, clip.grade
+        row.figures, row.told = _describe_figures(clip), "\n".join(clip.details)
     paths = [row.path for row in listing.shown]
     listing.active = paths.index(path) if path in paths else 0
 
 
-def active(manager: bpy.types.WindowManager) -> BeyondMocapClip | None:
+def find_active_clip(manager: bpy.types.WindowManager) -> BeyondMocapClip | None:
     """Return the clip chosen in the list; None while it is empty."""
     listing = manager.beyond_mocap_clips
     return listing.shown[listing.active] if 0 <= listing.active < len(listing.shown) else None
@@ -149,36 +149,36 @@ def list_files(folder: str) -> dict[str, tuple[int, int]] | None:
     """
     if not os.path.isdir(folder):
         return None
-    found = {}
-    for path in _below(folder):
+    sizes = {}
+    for path in _iter_files(folder):
         try:
             status = os.stat(path)
         except OSError:
             continue
-        found[os.path.relpath(path, folder)] = (status.st_size, status.st_mtime_ns)
-    return found
+        sizes[os.path.relpath(path, folder)] = (status.st_size, status.st_mtime_ns)
+    return sizes
 
 
 def holds_recordings(folder: str) -> bool:
     """Whether there is any recording below a folder; stops at the first."""
-    return any(not _is_words(path) for path in _below(folder))
+    return any(not _is_label_file(path) for path in _iter_files(folder))
 
 
-def tell_news(before: dict, now: dict) -> str:
+def describe_changes(before: dict, now: dict) -> str:
     """Describe in one line what is new, changed or removed between two scans; empty for no change."""
-    kinds = {"clip": lambda name: not _is_words(name), "label file": _is_words}
-    told = []
+    kinds = {"clip": lambda name: not _is_label_file(name), "label file": _is_label_file}
+    parts = []
     for kind, is_kind in kinds.items():
         new = [name for name in now if name not in before and is_kind(name)]
-        gone = [name for name in before if name not in now and is_kind(name)]
+        removed = [name for name in before if name not in now and is_kind(name)]
         changed = [name for name in now if name in before and now[name] != before[name] and is_kind(name)]
-        for names, what in ((new, "new"), (changed, "changed"), (gone, "removed")):
+        for names, what in ((new, "new"), (changed, "changed"), (removed, "removed")):
             if names:
-                told.append(f"{len(names)} {what} {kind}{'' if len(names) == 1 else 's'}")
-    return ", ".join(told)
+                parts.append(f"{len(names)} {what} {kind}{'' if len(names) == 1 else 's'}")
+    return ", ".join(parts)
 
 
-def found_again(folder: str, blend: str) -> str:
+def find_moved_folder(folder: str, blend: str) -> str:
     """Find the new place of a missing folder: its own last parts, as many as match, beside the .blend or above it.
 
     Args:
@@ -197,7 +197,7 @@ def found_again(folder: str, blend: str) -> str:
 
 def check_folder(scene: bpy.types.Scene) -> None:
     """Update whether the scene's library folder is missing."""
-    folder = absolute(scene.beyond_mocap.library_folder)
+    folder = to_absolute_path(scene.beyond_mocap.library_folder)
     listing = bpy.context.window_manager.beyond_mocap_clips
     listing.missing = bool(folder) and not os.path.isdir(folder)
 
@@ -205,38 +205,38 @@ def check_folder(scene: bpy.types.Scene) -> None:
 def relink_library(scene: bpy.types.Scene) -> str:
     """Relink the scene's missing library folder to one beside the .blend; returns the new folder or ""."""
     settings = scene.beyond_mocap
-    folder = absolute(settings.library_folder)
+    folder = to_absolute_path(settings.library_folder)
     if not folder or os.path.isdir(folder) or not bpy.data.filepath:
         return ""
-    found = found_again(folder, bpy.data.filepath)
+    found = find_moved_folder(folder, bpy.data.filepath)
     if found:
         settings.library_folder = bpy.path.relpath(found)
     return found
 
 
-def _refill(_self, context):
-    fill(context.window_manager)
+def _on_filter_change(_self, context):
+    update_list(context.window_manager)
 
 
-def _fits(clip: "Listed", asked: str) -> bool:
-    return asked in clip.path.lower() or any(word.startswith(asked) for word in clip.words)
+def _matches(clip: "ListedClip", term: str) -> bool:
+    return term in clip.path.lower() or any(word.startswith(term) for word in clip.labels)
 
 
-def _figures(clip: "Listed") -> str:
+def _describe_figures(clip: "ListedClip") -> str:
     """Describe length, speeds and key moments of a clip."""
     text = f"{clip.seconds:.1f} s" if clip.seconds else "unknown length"
     if not math.isnan(clip.speed):
-        text += f", {clip.speed:.1f} m/s (to {clip.fastest:.1f})"
-    if clip.moments:
-        text += f", {clip.moments} key {'moment' if clip.moments == 1 else 'moments'}"
+        text += f", {clip.speed:.1f} m/s (to {clip.max_speed:.1f})"
+    if clip.key_moments:
+        text += f", {clip.key_moments} key {'moment' if clip.key_moments == 1 else 'moments'}"
     return text
 
 
-def _is_words(name: str) -> bool:
+def _is_label_file(name: str) -> bool:
     return name.lower().endswith((".txt", ".csv"))
 
 
-def _below(folder: str):
+def _iter_files(folder: str):
     """Iterate over the paths of all recordings and label files below a folder; links are followed, each folder once."""
     from ...beyond_mocap.library.scan import CACHE_FOLDER, FOREIGN, TABLE_NAME
 
@@ -256,7 +256,7 @@ def _below(folder: str):
 
 def _after_load() -> None:
     manager = bpy.context.window_manager
-    clear(manager)
+    clear_clips(manager)
     for scene in [scene for scene in bpy.data.scenes if scene.library is None]:
         found = relink_library(scene)
         if found:
@@ -264,55 +264,55 @@ def _after_load() -> None:
     check_folder(bpy.context.scene)
 
 
-def _look_again() -> float:
+def _scan_folder() -> float:
     """Start a scan when due; apply the result of a finished one. Returns seconds until the next call."""
     scene, manager = bpy.context.scene, bpy.context.window_manager
     if scene is None or not scene.beyond_mocap.library_watch:
-        _looking.clear()
-        return SECONDS
-    thread = _looking.get("thread")
+        _scan_state.clear()
+        return SCAN_INTERVAL
+    thread = _scan_state.get("thread")
     if thread is None:
-        _begin(absolute(scene.beyond_mocap.library_folder))
+        _start_scan(to_absolute_path(scene.beyond_mocap.library_folder))
         return 0.5
     if thread.is_alive():
         return 0.5
-    _take_in(manager, scene.beyond_mocap.library_folder)
-    _looking.clear()
-    return SECONDS
+    _apply_scan(manager, scene.beyond_mocap.library_folder)
+    _scan_state.clear()
+    return SCAN_INTERVAL
 
 
-def _begin(folder: str) -> None:
+def _start_scan(folder: str) -> None:
     def work():
-        saw["files"] = list_files(folder) if folder else {}
+        result["files"] = list_files(folder) if folder else {}
 
-    saw: dict = {}
+    result: dict = {}
     thread = threading.Thread(target=work, name="beyond-mocap watch", daemon=True)
-    _looking.update(saw=saw, folder=folder, thread=thread)
+    _scan_state.update(saw=result, folder=folder, thread=thread)
     thread.start()
 
 
-def _take_in(manager: bpy.types.WindowManager, setting: str) -> None:
+def _apply_scan(manager: bpy.types.WindowManager, setting: str) -> None:
     """Write the scan's result if it is new, and redraw."""
     listing = manager.beyond_mocap_clips
-    if _looking["folder"] != absolute(setting) or "files" not in _looking["saw"]:  # stale, or the scan failed
+    if _scan_state["folder"] != to_absolute_path(setting) or "files" not in _scan_state["saw"]:  # stale, or the scan failed
         return
-    saw = _looking["saw"]["files"]
-    missing = saw is None
-    told = tell_news(files(), saw) if not missing and listing.folder == setting else ""
-    if (listing.missing, listing.news) != (missing, told):
-        listing.missing, listing.news = missing, told
-        window.redraw()
+    files_now = _scan_state["saw"]["files"]
+    missing = files_now is None
+    news = describe_changes(find_listed_files(), files_now) if not missing and listing.folder == setting else ""
+    if (listing.missing, listing.news) != (missing, news):
+        listing.missing, listing.news = missing, news
+        window.redraw_editors()
 
 
-def _end() -> None:
-    _looking.clear()
-    clear()
+def _stop_scan() -> None:
+    _scan_state.clear()
+    clear_clips()
 
 
-_kept = _Kept()
+_listing = _Listing()
 _KEYS = {"NAME": lambda clip: clip.path.lower(),
-         "WORDS": lambda clip: (not clip.words, clip.words, clip.path),
+         "WORDS": lambda clip: (not clip.labels, clip.labels, clip.path),
          "SECONDS": lambda clip: (-clip.seconds, clip.path),
          "SPEED": lambda clip: (1.0 if math.isnan(clip.speed) else -clip.speed, clip.path),
-         "QUALITY": lambda clip: (clip.mark, clip.path)}
-WATCHER = Watcher(name="Watching the library", loaded=_after_load, look=_look_again, ends=_end)
+         "QUALITY": lambda clip: (clip.grade, clip.path)}
+WATCHER = Watcher(name="Watching the library", loaded=_after_load, look=_scan_folder, ends=_stop_scan)

@@ -19,52 +19,52 @@ from ...beyond_mocap.motion import quaternion
 from ...beyond_mocap.motion.motion import Motion
 from ...beyond_mocap.motion.skeleton import Skeleton
 from ..core import channels
-from ..core.set_aside import scene_aside
+from ..core.set_aside import use_temporary_scene
 
 if TYPE_CHECKING:
     from ...beyond_mocap.files.bvh.bvh import BvhClip
 
-LEAST, MOST = 24.0, 240.0  # limits of the frames per second at which keys are sampled
+MIN_FPS, MAX_FPS = 24.0, 240.0  # limits of the frames per second at which keys are sampled
 _USD = (".usd", ".usda", ".usdc", ".usdz")
 
 
-class Take(NamedTuple):
+class ImportedTake(NamedTuple):
     """One animation of a file."""
 
     name: str
     motion: Motion
 
 
-def read(path: str | Path) -> list[Take]:
+def read_takes(path: str | Path) -> list[ImportedTake]:
     """Read all animations of the file's largest armature, the longest first; InputError where it has none or is broken.
     """
     path = Path(path)
     if not path.is_file():
         raise InputError(path, "no such file", "a file with an animated armature", "check the path")
-    with scene_aside("Import") as scene:
+    with use_temporary_scene("Import") as scene:
         scene.render.fps_base = 1.0
-        scene.render.fps = 30 if path.suffix.lower() not in _USD else _usd_rate(path)
-        _bring_in(path)
-        rig = _largest_rig(path, scene)
-        takes = [_sampled(path, scene, rig, action, slot) for action, slot in _actions(path, rig)]
+        scene.render.fps = 30 if path.suffix.lower() not in _USD else _read_usd_rate(path)
+        _import_file(path)
+        rig = _find_largest_rig(path, scene)
+        takes = [_sample_action(path, scene, rig, action, slot) for action, slot in _collect_actions(path, rig)]
     takes = [take for take in takes if len(take.motion) > 1]
     if not takes:
         raise InputError(path, "an armature that does not move", "an animation of at least two frames")
     return sorted(takes, key=lambda take: -take.motion.duration)
 
 
-def as_clip(motion: Motion) -> "BvhClip":
+def to_bvh_clip(motion: Motion) -> "BvhClip":
     """Convert a motion to a clip as a library reads it from BVH: joints above the hips merged, size checked and noted.
     """
     from ...beyond_mocap.files.bvh import bvh
 
-    with tempfile.TemporaryDirectory() as room:
-        file = Path(room, "clip.bvh")
-        bvh.write(file, motion)
-        return bvh.read(file)
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder, "clip.bvh")
+        bvh.write_bvh(file, motion)
+        return bvh.read_bvh(file)
 
 
-class Queue:
+class ConversionQueue:
     """The recordings of a library that need a conversion, one at a time, so that a window stays responsive.
 
     Attributes:
@@ -76,51 +76,51 @@ class Queue:
     def __init__(self, folder: str | Path, cache_dir: str | None):
         """Find the recordings below `folder` that need a conversion; InputError where there is no folder."""
         from ...beyond_mocap.library import cache
-        from ...beyond_mocap.library.scan import Conversions, own_recordings
+        from ...beyond_mocap.library.scan import Conversions, list_own_recordings
 
         folder = Path(folder)
-        self.conversions = Conversions(folder, cache.place(folder, cache_dir)[0])
-        self.todo = self.conversions.waiting(own_recordings(folder))
-        self.total, self.notes = len(self.todo), []
+        self.conversions = Conversions(folder, cache.find_cache_folder(folder, cache_dir)[0])
+        self.remaining = self.conversions.list_waiting(list_own_recordings(folder))
+        self.total, self.notes = len(self.remaining), []
 
-    def step(self) -> None:
+    def convert_next(self) -> None:
         """Convert the next one; one that cannot be converted is noted and skipped."""
-        from ...beyond_mocap.library.scan import stamp_of
+        from ...beyond_mocap.library.scan import read_stamp
 
-        path = self.todo.pop(0)
-        stamp = stamp_of(path)  # before it is read: a file that changes meanwhile is converted again
+        path = self.remaining.pop(0)
+        stamp = read_stamp(path)  # before it is read: a file that changes meanwhile is converted again
         try:
-            self._keep(path, read(path), stamp)
+            self._write_conversion(path, read_takes(path), stamp)
         except InputError as error:
             self.notes.append(f"skipped: {error}")
 
-    def _keep(self, path: Path, takes: list[Take], stamp: list[int]) -> None:
+    def _write_conversion(self, path: Path, takes: list[ImportedTake], stamp: list[int]) -> None:
         from ...beyond_mocap.files.bvh import bvh
 
-        bvh.write(self.conversions.prepare(path), takes[0].motion)
-        self.conversions.keep(path, stamp)
+        bvh.write_bvh(self.conversions.prepare_file(path), takes[0].motion)
+        self.conversions.record_conversion(path, stamp)
         if len(takes) > 1:
             others = ", ".join(take.name for take in takes[1:4])
             self.notes.append(f"{path.name}: only the longest of {len(takes)} animations is used; skipped: {others}")
 
 
-def _bring_in(path: Path) -> None:
+def _import_file(path: Path) -> None:
     """Import by the first of Blender's importers for this ending that exists and reads the file."""
-    importers = [operator for operator in _importers(path.suffix.lower()) if _exists(operator)]
+    importers = [operator for operator in _list_importers(path.suffix.lower()) if _has_operator(operator)]
     if not importers:
         raise InputError(path, "this Blender has no importer for it", "FBX, glTF or USD with an enabled importer",
                          "enable it in the preferences under Add-ons")
-    told = "nothing was imported"
+    reason = "nothing was imported"
     for operator in importers:
         try:
             if operator(filepath=str(path)) == {"FINISHED"} and bpy.context.scene.objects:
                 return
         except Exception as error:  # an importer may fail in any way on a broken file
-            told = (str(error).strip().splitlines() or [type(error).__name__])[-1]
-    raise InputError(path, f"cannot be read ({told})", "an intact file", "export it again")
+            reason = (str(error).strip().splitlines() or [type(error).__name__])[-1]
+    raise InputError(path, f"cannot be read ({reason})", "an intact file", "export it again")
 
 
-def _importers(ending: str) -> list:
+def _list_importers(ending: str) -> list:
     if ending == ".fbx":
         newer, older = bpy.ops.wm.fbx_import, bpy.ops.import_scene.fbx
         return [newer, older] if bpy.app.version >= (5, 0, 0) else [older, newer]
@@ -129,7 +129,7 @@ def _importers(ending: str) -> list:
     return [bpy.ops.wm.usd_import] if ending in _USD else []
 
 
-def _usd_rate(path: Path) -> int:
+def _read_usd_rate(path: Path) -> int:
     """Read the time codes per second of a USD file, which its importer takes as frames.
 
     24, USD's own default, where Blender has no module that reads them.
@@ -143,7 +143,7 @@ def _usd_rate(path: Path) -> int:
         return 24
 
 
-def _exists(operator) -> bool:
+def _has_operator(operator) -> bool:
     try:
         operator.get_rna_type()
     except (KeyError, AttributeError):
@@ -151,7 +151,7 @@ def _exists(operator) -> bool:
     return True
 
 
-def _largest_rig(path: Path, scene: bpy.types.Scene) -> bpy.types.Object:
+def _find_largest_rig(path: Path, scene: bpy.types.Scene) -> bpy.types.Object:
     """Find the armature with most bones; objects that do not carry it are removed, so that frames are quick."""
     rigs = [item for item in scene.objects if item.type == "ARMATURE" and len(item.data.bones)]
     if not rigs:
@@ -166,7 +166,7 @@ def _largest_rig(path: Path, scene: bpy.types.Scene) -> bpy.types.Object:
     return rig
 
 
-def _actions(path: Path, rig: bpy.types.Object) -> list[tuple[bpy.types.Action, object]]:
+def _collect_actions(path: Path, rig: bpy.types.Object) -> list[tuple[bpy.types.Action, object]]:
     """Collect the actions that the armature plays or has on its NLA tracks, each once with its matching slot."""
     data = rig.animation_data
     found: dict = {}
@@ -183,11 +183,11 @@ def _actions(path: Path, rig: bpy.types.Object) -> list[tuple[bpy.types.Action, 
     return list(found.values())
 
 
-def _sampled(path: Path, scene: bpy.types.Scene, rig: bpy.types.Object, action, slot) -> Take:
+def _sample_action(path: Path, scene: bpy.types.Scene, rig: bpy.types.Object, action, slot) -> ImportedTake:
     """Sample one action, frame by frame."""
-    channels.assign(rig, action, slot)
-    fps, times = _times(action, rig.animation_data.action_slot, scene.render.fps / scene.render.fps_base)
-    bones = _tree(rig)
+    channels.assign_action(rig, action, slot)
+    fps, times = _list_times(action, rig.animation_data.action_slot, scene.render.fps / scene.render.fps_base)
+    bones = _list_tree_bones(rig)
     order = [rig.pose.bones.find(bone.name) for bone in bones]
     posed = np.empty((len(times), len(rig.pose.bones), 4, 4), np.float32)
     world = np.empty((len(times), 4, 4))
@@ -198,13 +198,13 @@ def _sampled(path: Path, scene: bpy.types.Scene, rig: bpy.types.Object, action, 
     matrices = world[:, None] @ posed[:, order].transpose(0, 1, 3, 2).astype(float)  # Blender stores columns
     if not np.all(np.isfinite(matrices)):
         raise InputError(path, f"NaN or infinite values in action {action.name}", "an intact file", "export it again")
-    return Take(action.name, _motion(path, rig, bones, matrices=matrices, world=world[0], fps=fps))
+    return ImportedTake(action.name, _build_motion(path, rig, bones, matrices=matrices, world=world[0], fps=fps))
 
 
-def _times(action, slot, rate: float) -> tuple[float, np.ndarray]:
+def _list_times(action, slot, rate: float) -> tuple[float, np.ndarray]:
     """List the frames per second of the keys, within LEAST and MOST, and the scene frames (T,) to sample."""
     keys = set()
-    for (path, _), curve in channels.curves(action, slot).items():
+    for (path, _), curve in channels.collect_curves(action, slot).items():
         if path.startswith("pose.bones"):
             points = np.empty(2 * len(curve.keyframe_points), np.float32)
             curve.keyframe_points.foreach_get("co", points)
@@ -214,12 +214,12 @@ def _times(action, slot, rate: float) -> tuple[float, np.ndarray]:
     keys = np.array(sorted(keys))
     step = float(np.median(np.diff(keys))) if len(keys) > 1 else 1.0
     fps = rate / step
-    fps = float(np.clip(round(fps, 2) if abs(fps - round(fps)) > 0.02 else round(fps), LEAST, MOST))
+    fps = float(np.clip(round(fps, 2) if abs(fps - round(fps)) > 0.02 else round(fps), MIN_FPS, MAX_FPS))
     count = int(np.floor((keys[-1] - keys[0]) / rate * fps + 1e-2)) + 1
     return fps, keys[0] + np.arange(count) * (rate / fps)
 
 
-def _tree(rig: bpy.types.Object) -> list[bpy.types.Bone]:
+def _list_tree_bones(rig: bpy.types.Object) -> list[bpy.types.Bone]:
     """List the bones of the largest tree, parents first."""
     roots = [bone for bone in rig.data.bones if bone.parent is None]
     bones = [max(roots, key=lambda bone: len(bone.children_recursive))]
@@ -228,7 +228,7 @@ def _tree(rig: bpy.types.Object) -> list[bpy.types.Bone]:
     return bones
 
 
-def _motion(path: Path, rig, bones, matrices: np.ndarray, world: np.ndarray, fps: float) -> Motion:
+def _build_motion(path: Path, rig, bones, matrices: np.ndarray, world: np.ndarray, fps: float) -> Motion:
     """Build a motion from bones.
 
     Args:
@@ -246,20 +246,20 @@ def _motion(path: Path, rig, bones, matrices: np.ndarray, world: np.ndarray, fps
     scales = np.linalg.norm(matrices[..., :3, :3], axis=-2)
     if scales.min() < 1e-6:
         raise InputError(path, "a bone of size zero", "bones with a size", "apply the scale before exporting")
-    turns = quaternion.from_matrix(matrices[..., :3, :3] / scales[..., None, :])
+    rotations = quaternion.from_matrix(matrices[..., :3, :3] / scales[..., None, :])
     rest = np.array([world @ np.array(bone.matrix_local) for bone in bones])
     rest = quaternion.from_matrix(rest[:, :3, :3] / np.linalg.norm(rest[:, :3, :3], axis=-2)[:, None, :])
-    turns = quaternion.normalized(quaternion.multiply(turns, quaternion.inverse(rest)))
+    rotations = quaternion.normalize(quaternion.multiply(rotations, quaternion.inverse(rest)))
     places = matrices[..., :3, 3]
-    local, offsets = turns.copy(), np.zeros((len(names), 3))
+    local, offsets = rotations.copy(), np.zeros((len(names), 3))
     for joint, parent in enumerate(parents):
         if parent >= 0:
-            back = quaternion.inverse(turns[:, parent])
-            local[:, joint] = quaternion.multiply(back, turns[:, joint])
+            back = quaternion.inverse(rotations[:, parent])
+            local[:, joint] = quaternion.multiply(back, rotations[:, joint])
             offsets[joint] = np.median(quaternion.rotate(back, places[:, joint] - places[:, parent]), axis=0)
     tips = [number for number, bone in enumerate(bones) if not bone.children]
     size = float(np.cbrt(abs(np.linalg.det(world[:3, :3]))))
     ends = [quaternion.rotate(rest[number], [0.0, bones[number].length * size, 0.0]) for number in tips]
-    plain = tuple("_".join(name.split()) for name in names)
-    skeleton = Skeleton(plain, tuple(parents), offsets, tuple(tips), np.array(ends))
-    return Motion(skeleton, places[:, 0], quaternion.continuous(local), fps)
+    joint_names = tuple("_".join(name.split()) for name in names)
+    skeleton = Skeleton(joint_names, tuple(parents), offsets, tuple(tips), np.array(ends))
+    return Motion(skeleton, places[:, 0], quaternion.unify_signs(local), fps)

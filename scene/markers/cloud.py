@@ -29,10 +29,10 @@ if TYPE_CHECKING:
 RADIUS = 0.007  # metres of a marker's sphere
 
 LABEL_WIDTH = 32  # pixels of a label at an interface scale of 1
-LABEL_HEIGHT, RGBA, FREE = 11, (1.0, 1.0, 1.0, 0.9), (1.0, 0.65, 0.1, 1.0)
+LABEL_HEIGHT, RGBA, UNASSIGNED = 11, (1.0, 1.0, 1.0, 0.9), (1.0, 0.65, 0.1, 1.0)
 
 
-def create(
+def create_cloud(
     context: bpy.types.Context, trial: "MarkerTrial", name: str = "", start: float | None = None, collection=None
 ) -> bpy.types.Object:
     """Create a cloud that plays a trial; the scene's end is extended.
@@ -48,65 +48,65 @@ def create(
     Raises:
         InputError: if no marker is visible, or the collection belongs to another file.
     """
-    scene, units, room = context.scene, units_per_metre(context.scene), collection or context.collection
-    check(trial)
-    if room.library is not None:
-        raise InputError(room.name, "a linked collection", "one of this file", "choose another in the Outliner")
+    scene, units, target_collection = context.scene, units_per_metre(context.scene), collection or context.collection
+    check_visible(trial)
+    if target_collection.library is not None:
+        raise InputError(target_collection.name, "a linked collection", "one of this file", "choose another in the Outliner")
     mesh = bpy.data.meshes.new(name or trial.name)
     mesh.vertices.add(len(trial.labels))
-    _attribute(mesh, nodes.MARKER, "INT", np.arange(len(trial.labels), dtype=np.int32))
+    _write_attribute(mesh, nodes.MARKER, "INT", np.arange(len(trial.labels), dtype=np.int32))
     cloud = bpy.data.objects.new(name or trial.name, mesh)
-    room.objects.link(cloud)
-    kept = cloud.beyond_mocap_cloud
-    kept.on = True
+    target_collection.objects.link(cloud)
+    properties = cloud.beyond_mocap_cloud
+    properties.on = True
     for label in trial.labels:
-        kept.labels.add().name = label
+        properties.labels.add().name = label
     start = float(scene.frame_start) if start is None else float(start)
-    nodes.hang(cloud, {"Start": start})
-    kept.size = RADIUS * units
-    write(cloud, trial, scene)
-    bake.lengthen(scene, start + trial.duration * frames_per_second(scene))
+    nodes.add_modifier(cloud, {"Start": start})
+    properties.size = RADIUS * units
+    write_trial(cloud, trial, scene)
+    bake.extend_scene(scene, start + trial.duration * frames_per_second(scene))
     return cloud
 
 
-def write(cloud: bpy.types.Object, trial: "MarkerTrial", scene: bpy.types.Scene) -> None:
+def write_trial(cloud: bpy.types.Object, trial: "MarkerTrial", scene: bpy.types.Scene) -> None:
     """Write other or cleaned trajectories to a cloud, at the same playback speed; settings of a label stay by its name.
 
     Raises:
         InputError: if no marker is visible, or the cloud belongs to another file.
     """
     channels.check_local(cloud, cloud.data)
-    check(trial)
+    check_visible(trial)
     if cloud.data.is_editmode:
         bpy.ops.object.mode_set(mode="OBJECT")
-    kept = cloud.beyond_mocap_cloud
-    if tuple(label.name for label in kept.labels) != trial.labels:
-        _relabel(cloud, trial.labels)
-    for label, share in zip(kept.labels, trial.seen.mean(axis=0)):
+    properties = cloud.beyond_mocap_cloud
+    if tuple(label.name for label in properties.labels) != trial.labels:
+        _replace_labels(cloud, trial.labels)
+    for label, share in zip(properties.labels, trial.seen.mean(axis=0)):
         label.seen = 100.0 * float(share)
-    modifier = nodes.modifier_of(cloud)
-    usual = trial.fps / frames_per_second(scene)
-    step = nodes.get(modifier, "Step") * trial.fps / kept.fps if kept.fps else usual
-    kept.fps, kept.start, kept.subject = trial.fps, trial.start, trial.subject
-    kept.events.clear()
+    modifier = nodes.find_modifier(cloud)
+    default_step = trial.fps / frames_per_second(scene)
+    step = nodes.get_input(modifier, "Step") * trial.fps / properties.fps if properties.fps else default_step
+    properties.fps, properties.start, properties.subject = trial.fps, trial.start, trial.subject
+    properties.events.clear()
     for event in trial.events:
-        row = kept.events.add()
+        row = properties.events.add()
         row.name, row.side, row.seconds = event.label, event.side, event.seconds
-    places = held(trial.positions) * units_per_metre(scene)
-    before = nodes.get(modifier, "Trajectories")
-    nodes.put(modifier, "Trajectories", _trajectories(cloud.name, places, trial.seen))
-    nodes.put(modifier, "Markers", len(trial.labels))
-    nodes.put(modifier, "Samples", len(trial))
-    nodes.put(modifier, "Step", step)
+    places = hold_last_places(trial.positions) * units_per_metre(scene)
+    before = nodes.get_input(modifier, "Trajectories")
+    nodes.set_input(modifier, "Trajectories", _create_trajectories(cloud.name, places, trial.seen))
+    nodes.set_input(modifier, "Markers", len(trial.labels))
+    nodes.set_input(modifier, "Samples", len(trial))
+    nodes.set_input(modifier, "Step", step)
     if before is not None and before.users == 0:
         mesh = before.data
         bpy.data.objects.remove(before)
         bpy.data.meshes.remove(mesh)
-    cloud.data.attributes["position"].data.foreach_set("vector", places[0, markers(cloud)].astype(np.float32).ravel())
+    cloud.data.attributes["position"].data.foreach_set("vector", places[0, read_marker_indices(cloud)].astype(np.float32).ravel())
     nodes.draw_lines(cloud)
 
 
-def read(cloud: bpy.types.Object, scene: bpy.types.Scene) -> "MarkerTrial":
+def read_trial(cloud: bpy.types.Object, scene: bpy.types.Scene) -> "MarkerTrial":
     """Read the trial that a cloud plays, with its present labels, in the cloud's own space.
 
     Raises:
@@ -114,12 +114,12 @@ def read(cloud: bpy.types.Object, scene: bpy.types.Scene) -> "MarkerTrial":
     """
     from ...beyond_mocap.markers.trial import MarkerEvent, MarkerTrial
 
-    modifier = nodes.modifier_of(cloud) if is_cloud(cloud) else None
-    mesh = _samples(modifier)
+    modifier = nodes.find_modifier(cloud) if is_cloud(cloud) else None
+    mesh = _find_samples(modifier)
     if mesh is None:
         raise InputError(cloud.name, "no trajectories", "a cloud of markers", "import the recording again")
-    kept, count, samples = cloud.beyond_mocap_cloud, nodes.get(modifier, "Markers"), nodes.get(modifier, "Samples")
-    if len(mesh.vertices) != count * samples or len(kept.labels) != count or not samples:
+    properties, count, samples = cloud.beyond_mocap_cloud, nodes.get_input(modifier, "Markers"), nodes.get_input(modifier, "Samples")
+    if len(mesh.vertices) != count * samples or len(properties.labels) != count or not samples:
         found = f"{len(mesh.vertices)} places for {count} markers and {samples} samples"
         raise InputError(cloud.name, found, "one per marker and sample", "import the recording again")
     places, seen = np.empty(3 * count * samples, np.float32), np.empty(count * samples, bool)
@@ -127,57 +127,57 @@ def read(cloud: bpy.types.Object, scene: bpy.types.Scene) -> "MarkerTrial":
     mesh.attributes[nodes.SEEN].data.foreach_get("value", seen)
     places = places.reshape(samples, count, 3).astype(float) / units_per_metre(scene)
     places[~seen.reshape(samples, count)] = np.nan
-    events = tuple(MarkerEvent(row.seconds, row.name, row.side) for row in kept.events)
-    names = tuple(label.name.strip() for label in kept.labels)
-    trial = MarkerTrial(labels=names, positions=places, fps=kept.fps, residuals=None, events=events, start=kept.start,
-                        name=cloud.name, subject=kept.subject)
-    there = np.unique(markers(cloud))
-    if not len(there):
+    events = tuple(MarkerEvent(row.seconds, row.name, row.side) for row in properties.events)
+    names = tuple(label.name.strip() for label in properties.labels)
+    trial = MarkerTrial(labels=names, positions=places, fps=properties.fps, residuals=None, events=events, start=properties.start,
+                        name=cloud.name, subject=properties.subject)
+    marked = np.unique(read_marker_indices(cloud))
+    if not len(marked):
         raise InputError(cloud.name, "no vertex of a marker", "one vertex per marker", "import the recording again")
-    return trial if len(there) == count else trial.only([trial.labels[i] for i in there])
+    return trial if len(marked) == count else trial.select_markers([trial.labels[i] for i in marked])
 
 
-def start_frame(cloud: bpy.types.Object) -> float:
+def find_start_frame(cloud: bpy.types.Object) -> float:
     """Return the scene frame of the first sample; raise InputError where no modifier plays the cloud."""
-    return float(nodes.get(_player(cloud), "Start"))
+    return float(nodes.get_input(_find_modifier(cloud), "Start"))
 
 
-def played_rate(cloud: bpy.types.Object, scene: bpy.types.Scene) -> float:
+def compute_playback_rate(cloud: bpy.types.Object, scene: bpy.types.Scene) -> float:
     """Return the samples per second of the playback, which differ from the recording's in slow motion.
 
     Raises:
         InputError: if no modifier plays the cloud, or it is paused or runs backwards.
     """
-    step = float(nodes.get(_player(cloud), "Step"))
+    step = float(nodes.get_input(_find_modifier(cloud), "Step"))
     if step <= 0.0:
         raise InputError(cloud.name, f"a Step of {step:g}", "samples per frame, above 0", "set Step in the modifier")
     return step * frames_per_second(scene)
 
 
-def _player(cloud: bpy.types.Object) -> bpy.types.Modifier:
+def _find_modifier(cloud: bpy.types.Object) -> bpy.types.Modifier:
     """Return the modifier that plays a cloud; raise InputError where it is missing."""
-    modifier = nodes.modifier_of(cloud)
+    modifier = nodes.find_modifier(cloud)
     if modifier is None:
-        wanted, step = f"the modifier {nodes.NAME}", "import the recording again"
-        raise InputError(cloud.name, "no modifier that plays it", wanted, step)
+        expected, step = f"the modifier {nodes.NAME}", "import the recording again"
+        raise InputError(cloud.name, "no modifier that plays it", expected, step)
     return modifier
 
 
-def _samples(modifier: bpy.types.Modifier | None) -> bpy.types.Mesh | None:
+def _find_samples(modifier: bpy.types.Modifier | None) -> bpy.types.Mesh | None:
     """Return the mesh of all samples that a modifier plays; None where there is none."""
-    holder = nodes.get(modifier, "Trajectories") if modifier is not None else None
+    holder = nodes.get_input(modifier, "Trajectories") if modifier is not None else None
     mesh = holder.data if holder is not None and holder.type == "MESH" else None
     return mesh if mesh is not None and nodes.SEEN in mesh.attributes else None
 
 
-def places_at(cloud: bpy.types.Object, frame: float) -> list[tuple[int, Vector]]:
+def sample_places(cloud: bpy.types.Object, frame: float) -> list[tuple[int, Vector]]:
     """Return the visible markers on a scene frame with their places in the cloud's own space, quickly, in any mode."""
-    modifier = nodes.modifier_of(cloud)
-    mesh = _samples(modifier)
+    modifier = nodes.find_modifier(cloud)
+    mesh = _find_samples(modifier)
     if mesh is None:
         return []
-    count, samples = nodes.get(modifier, "Markers"), nodes.get(modifier, "Samples")
-    row = min(max((frame - nodes.get(modifier, "Start")) * nodes.get(modifier, "Step"), 0.0), samples - 1.0)
+    count, samples = nodes.get_input(modifier, "Markers"), nodes.get_input(modifier, "Samples")
+    row = min(max((frame - nodes.get_input(modifier, "Start")) * nodes.get_input(modifier, "Step"), 0.0), samples - 1.0)
     here = round(row)
     other = min(max(here + (1 if row > here else -1), 0), samples - 1)
     places, seen = mesh.vertices, mesh.attributes[nodes.SEEN].data
@@ -192,7 +192,7 @@ def places_at(cloud: bpy.types.Object, frame: float) -> list[tuple[int, Vector]]
     return found
 
 
-def markers(cloud: bpy.types.Object) -> np.ndarray:
+def read_marker_indices(cloud: bpy.types.Object) -> np.ndarray:
     """Read the marker of each vertex: (V,) indices of labels; empty where the mesh has no such attribute."""
     mesh = cloud.data
     if mesh.is_editmode:  # the mesh has no data in Edit Mode
@@ -207,13 +207,13 @@ def markers(cloud: bpy.types.Object) -> np.ndarray:
     return np.clip(found, 0, max(len(cloud.beyond_mocap_cloud.labels) - 1, 0))
 
 
-def check(trial: "MarkerTrial") -> None:
+def check_visible(trial: "MarkerTrial") -> None:
     """Raise InputError where no marker is visible."""
     if not len(trial) or not trial.seen.any():
         raise InputError(trial.name, "no marker is ever visible", "a recording with markers", "choose another file")
 
 
-def held(positions: np.ndarray) -> np.ndarray:
+def hold_last_places(positions: np.ndarray) -> np.ndarray:
     """Fill the gaps of positions (T, M, 3) with the last visible place, or the next one at the start.
 
     A marker that is never visible is placed in the middle of all.
@@ -221,53 +221,53 @@ def held(positions: np.ndarray) -> np.ndarray:
     out, seen = positions.copy(), np.isfinite(positions).all(axis=-1)
     rows = np.arange(len(out))
     for marker in range(out.shape[1]):
-        there = np.flatnonzero(seen[:, marker])
-        if not len(there):
+        visible_rows = np.flatnonzero(seen[:, marker])
+        if not len(visible_rows):
             out[:, marker] = positions[seen].mean(axis=0)
-        elif len(there) < len(out):
-            out[:, marker] = out[there[np.maximum(np.searchsorted(there, rows, side="right") - 1, 0)], marker]
+        elif len(visible_rows) < len(out):
+            out[:, marker] = out[visible_rows[np.maximum(np.searchsorted(visible_rows, rows, side="right") - 1, 0)], marker]
     return out
 
 
-def _relabel(cloud: bpy.types.Object, names: tuple[str, ...]) -> None:
+def _replace_labels(cloud: bpy.types.Object, names: tuple[str, ...]) -> None:
     """Replace the labels, as after markers were joined or left out; segment, landmark and role are kept by name."""
-    kept, mesh = cloud.beyond_mocap_cloud, cloud.data
-    known = {label.name.strip(): (label.segment, label.landmark, label.role) for label in kept.labels}
+    properties, mesh = cloud.beyond_mocap_cloud, cloud.data
+    known = {label.name.strip(): (label.segment, label.landmark, label.role) for label in properties.labels}
     mesh.clear_geometry()
     mesh.vertices.add(len(names))
-    _attribute(mesh, nodes.MARKER, "INT", np.arange(len(names), dtype=np.int32))
-    kept.labels.clear()
-    with nodes.draw_later():
+    _write_attribute(mesh, nodes.MARKER, "INT", np.arange(len(names), dtype=np.int32))
+    properties.labels.clear()
+    with nodes.defer_lines():
         for name in names:
-            label = kept.labels.add()
+            label = properties.labels.add()
             label.name = name
             label.segment, label.landmark, label.role = known.get(name, ("", "", "NEEDED"))
 
 
-def _trajectories(name: str, places: np.ndarray, seen: np.ndarray) -> bpy.types.Object:
+def _create_trajectories(name: str, places: np.ndarray, seen: np.ndarray) -> bpy.types.Object:
     """Create the mesh of all samples (T, M, 3), on an object in no collection."""
     mesh = bpy.data.meshes.new(f"{name} trajectories")
     mesh.vertices.add(seen.size)
     mesh.attributes["position"].data.foreach_set("vector", places.astype(np.float32).ravel())
-    _attribute(mesh, nodes.SEEN, "BOOLEAN", seen.ravel())
+    _write_attribute(mesh, nodes.SEEN, "BOOLEAN", seen.ravel())
     return bpy.data.objects.new(mesh.name, mesh)
 
 
-def _attribute(mesh: bpy.types.Mesh, name: str, kind: str, values: np.ndarray) -> None:
+def _write_attribute(mesh: bpy.types.Mesh, name: str, kind: str, values: np.ndarray) -> None:
     found = mesh.attributes.get(name) or mesh.attributes.new(name, kind, "POINT")
     found.data.foreach_set("value", np.ascontiguousarray(values))
 
 
-def visible_labels(context: bpy.types.Context) -> list[tuple[Vector, str, tuple]]:
+def list_visible_labels(context: bpy.types.Context) -> list[tuple[Vector, str, tuple]]:
     """List what is drawn: (place in the world, label, colour) of every visible marker."""
     thing = context.view_layer.objects.active
     if not context.scene.beyond_mocap_markers.names or not is_cloud(thing) or not thing.visible_get():
         return []
     rows = thing.beyond_mocap_cloud.labels
     found = []
-    for marker, place in places_at(thing, context.scene.frame_current_final):
+    for marker, place in sample_places(thing, context.scene.frame_current_final):
         if marker < len(rows):
-            colour = RGBA if rows[marker].segment or rows[marker].role in ("BALL", "OTHER") else FREE
+            colour = RGBA if rows[marker].segment or rows[marker].role in ("BALL", "OTHER") else UNASSIGNED
             found.append((thing.matrix_world @ place, rows[marker].name, colour))
     return found
 
@@ -281,7 +281,7 @@ def _draw_labels() -> None:
         return
     scale, taken = context.preferences.system.ui_scale, set()
     blf.size(0, LABEL_HEIGHT * scale)
-    for place, text, rgba in visible_labels(context):
+    for place, text, rgba in list_visible_labels(context):
         at = location_3d_to_region_2d(context.region, context.region_data, place)
         cell = at and (round(at.x / (LABEL_WIDTH * scale)), round(at.y / (LABEL_HEIGHT * scale)))
         if cell and cell not in taken:  # overlapping labels are unreadable

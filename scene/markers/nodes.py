@@ -13,7 +13,7 @@ import bmesh
 import bpy
 import numpy as np
 
-from ..core.material import colour
+from ..core.material import get_material
 
 NAME = "Marker Cloud"
 SEEN, SIDE, MARKER = "seen", "side", "marker"
@@ -31,10 +31,10 @@ INPUTS = (("Trajectories", "NodeSocketObject", None, "The mesh of all samples"),
 
 NEIGHBOURS = 3  # nearest markers to which each one gets an edge
 
-_waiting: list[bool] = []
+_deferred: list[bool] = []
 
 
-def group() -> bpy.types.NodeTree:
+def get_node_group() -> bpy.types.NodeTree:
     """Return the node group; create it if the file does not have it yet."""
     found = bpy.data.node_groups.get(NAME)
     if found is not None and all(name in found.interface.items_tree for name, *_ in INPUTS):
@@ -43,31 +43,31 @@ def group() -> bpy.types.NodeTree:
     tree.is_modifier = True
     tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
     tree.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
-    for name, kind, value, told in INPUTS:
-        socket = tree.interface.new_socket(name, in_out="INPUT", socket_type=kind, description=told)
+    for name, kind, value, description in INPUTS:
+        socket = tree.interface.new_socket(name, in_out="INPUT", socket_type=kind, description=description)
         if value is not None:
             socket.default_value = value
-    _Builder(tree).build()
+    _Builder(tree).build_group()
     return tree
 
 
-def hang(cloud: bpy.types.Object, values: dict) -> bpy.types.Modifier:
+def add_modifier(cloud: bpy.types.Object, values: dict) -> bpy.types.Modifier:
     """Add the modifier that plays a cloud, with inputs by name."""
     modifier = cloud.modifiers.new(NAME, "NODES")
-    modifier.node_group = group()
+    modifier.node_group = get_node_group()
     modifier.show_on_cage = True
     for name, value in values.items():
-        put(modifier, name, value)
+        set_input(modifier, name, value)
     return modifier
 
 
-def modifier_of(cloud: bpy.types.Object) -> bpy.types.Modifier | None:
+def find_modifier(cloud: bpy.types.Object) -> bpy.types.Modifier | None:
     """Find the modifier that plays a cloud; None where there is none."""
     nodes = (found for found in cloud.modifiers if found.type == "NODES" and found.node_group is not None)
     return next((found for found in nodes if "Trajectories" in found.node_group.interface.items_tree), None)
 
 
-def put(modifier: bpy.types.Modifier, name: str, value) -> None:
+def set_input(modifier: bpy.types.Modifier, name: str, value) -> None:
     """Set an input by its name."""
     identifier = modifier.node_group.interface.items_tree[name].identifier
     if hasattr(modifier, "properties"):  # Blender 5.2
@@ -77,7 +77,7 @@ def put(modifier: bpy.types.Modifier, name: str, value) -> None:
     modifier.id_data.update_tag()
 
 
-def get(modifier: bpy.types.Modifier, name: str):
+def get_input(modifier: bpy.types.Modifier, name: str):
     """Return an input by its name."""
     identifier = modifier.node_group.interface.items_tree[name].identifier
     if hasattr(modifier, "properties"):
@@ -91,9 +91,9 @@ class _Builder:
     def __init__(self, tree: bpy.types.NodeTree):
         """Start with an empty tree that has its inputs and outputs."""
         self.tree = tree
-        self.inputs = self.node("NodeGroupInput").outputs
+        self.inputs = self.add_node("NodeGroupInput").outputs
 
-    def node(self, kind: str, *sources, **settings):
+    def add_node(self, kind: str, *sources, **settings):
         """Add a node; its first sockets are fed from `sources` (sockets or values; None leaves one as it is)."""
         node = self.tree.nodes.new(kind)
         node.location = (220 * (len(self.tree.nodes) % 12), -220 * (len(self.tree.nodes) // 12))
@@ -107,85 +107,85 @@ class _Builder:
                 socket.default_value = source
         return node
 
-    def out(self, kind: str, *sources, **settings):
+    def add_output(self, kind: str, *sources, **settings):
         """Add a node and return its first output."""
-        return next(socket for socket in self.node(kind, *sources, **settings).outputs if socket.enabled)
+        return next(socket for socket in self.add_node(kind, *sources, **settings).outputs if socket.enabled)
 
-    def number(self, operation: str, *sources):
+    def add_math(self, operation: str, *sources):
         """Add arithmetic."""
-        return self.out("ShaderNodeMath", *sources, operation=operation)
+        return self.add_output("ShaderNodeMath", *sources, operation=operation)
 
-    def whole(self, operation: str, *sources):
+    def add_integer_math(self, operation: str, *sources):
         """Add integer arithmetic, exact for any number of samples."""
-        return self.out("FunctionNodeIntegerMath", *sources, operation=operation)
+        return self.add_output("FunctionNodeIntegerMath", *sources, operation=operation)
 
-    def logic(self, operation: str, *sources):
+    def add_boolean_math(self, operation: str, *sources):
         """Add and, or, not."""
-        return self.out("FunctionNodeBooleanMath", *sources, operation=operation)
+        return self.add_output("FunctionNodeBooleanMath", *sources, operation=operation)
 
-    def build(self) -> None:
+    def build_group(self) -> None:
         """Build the whole group."""
-        points, seen = self.sampled()
-        moved = self.out("GeometryNodeSetPosition", self.inputs["Geometry"], None, points)
-        kept = self.out("GeometryNodeStoreNamedAttribute", moved, None, SEEN, seen, data_type="BOOLEAN", domain="POINT")
-        shown = self.out("GeometryNodeInputNamedAttribute", SEEN, data_type="BOOLEAN")
-        hidden = self.logic("NOT", self.logic("AND", shown, self.inputs["Lines"]))
-        lines = self.out("GeometryNodeDeleteGeometry", kept, hidden, domain="EDGE", mode="EDGE_FACE")
-        joined = self.node("GeometryNodeJoinGeometry")
-        for source in (*reversed([self.spheres(kept, shown, number) for number in range(len(COLOURS))]), lines):
+        points, seen = self.build_sampling()
+        moved = self.add_output("GeometryNodeSetPosition", self.inputs["Geometry"], None, points)
+        stored = self.add_output("GeometryNodeStoreNamedAttribute", moved, None, SEEN, seen, data_type="BOOLEAN", domain="POINT")
+        visible = self.add_output("GeometryNodeInputNamedAttribute", SEEN, data_type="BOOLEAN")
+        hidden = self.add_boolean_math("NOT", self.add_boolean_math("AND", visible, self.inputs["Lines"]))
+        lines = self.add_output("GeometryNodeDeleteGeometry", stored, hidden, domain="EDGE", mode="EDGE_FACE")
+        joined = self.add_node("GeometryNodeJoinGeometry")
+        for source in (*reversed([self.build_spheres(stored, visible, number) for number in range(len(COLOURS))]), lines):
             self.tree.links.new(source, joined.inputs[0])
-        self.node("NodeGroupOutput", joined.outputs[0])
+        self.add_node("NodeGroupOutput", joined.outputs[0])
 
-    def sampled(self):
+    def build_sampling(self):
         """Return where each vertex is now, and whether it is visible: interpolated where both samples are visible."""
-        frame = self.node("GeometryNodeInputSceneTime").outputs["Frame"]
-        row = self.number("MULTIPLY", self.number("SUBTRACT", frame, self.inputs["Start"]), self.inputs["Step"])
-        end = self.whole("SUBTRACT", self.inputs["Samples"], 1)
-        row = self.number("MAXIMUM", self.number("MINIMUM", row, end), 0.0)
-        before = self.out("FunctionNodeFloatToInt", row, rounding_mode="FLOOR")
-        share = self.number("SUBTRACT", row, before)
-        after = self.whole("MINIMUM", self.whole("ADD", before, 1), end)
-        (place, saw), (then, sees) = self.sample(before), self.sample(after)
-        late = self.number("GREATER_THAN", share, 0.5)
-        share = self.out("GeometryNodeSwitch", self.logic("AND", saw, sees), sees, share, input_type="FLOAT")
-        points = self.out("ShaderNodeMix", share, place, then, data_type="VECTOR", clamp_factor=True)
-        return points, self.out("GeometryNodeSwitch", late, saw, sees, input_type="BOOLEAN")
+        frame = self.add_node("GeometryNodeInputSceneTime").outputs["Frame"]
+        row = self.add_math("MULTIPLY", self.add_math("SUBTRACT", frame, self.inputs["Start"]), self.inputs["Step"])
+        end = self.add_integer_math("SUBTRACT", self.inputs["Samples"], 1)
+        row = self.add_math("MAXIMUM", self.add_math("MINIMUM", row, end), 0.0)
+        before = self.add_output("FunctionNodeFloatToInt", row, rounding_mode="FLOOR")
+        share = self.add_math("SUBTRACT", row, before)
+        after = self.add_integer_math("MINIMUM", self.add_integer_math("ADD", before, 1), end)
+        (place, saw), (then, sees) = self.build_sample(before), self.build_sample(after)
+        late = self.add_math("GREATER_THAN", share, 0.5)
+        share = self.add_output("GeometryNodeSwitch", self.add_boolean_math("AND", saw, sees), sees, share, input_type="FLOAT")
+        points = self.add_output("ShaderNodeMix", share, place, then, data_type="VECTOR", clamp_factor=True)
+        return points, self.add_output("GeometryNodeSwitch", late, saw, sees, input_type="BOOLEAN")
 
-    def sample(self, row):
+    def build_sample(self, row):
         """Return place and visibility of each vertex in one sample."""
-        about = self.node("GeometryNodeObjectInfo", self.inputs["Trajectories"], transform_space="ORIGINAL")
-        marker = self.out("GeometryNodeInputNamedAttribute", MARKER, data_type="INT")
-        at = self.whole("ADD", self.whole("MULTIPLY", row, self.inputs["Markers"]), marker)
-        position = self.out("GeometryNodeInputPosition")
-        sight = self.out("GeometryNodeInputNamedAttribute", SEEN, data_type="BOOLEAN")
+        about = self.add_node("GeometryNodeObjectInfo", self.inputs["Trajectories"], transform_space="ORIGINAL")
+        marker = self.add_output("GeometryNodeInputNamedAttribute", MARKER, data_type="INT")
+        at = self.add_integer_math("ADD", self.add_integer_math("MULTIPLY", row, self.inputs["Markers"]), marker)
+        position = self.add_output("GeometryNodeInputPosition")
+        sight = self.add_output("GeometryNodeInputNamedAttribute", SEEN, data_type="BOOLEAN")
         geometry = about.outputs["Geometry"]
-        place = self.out("GeometryNodeSampleIndex", geometry, position, at, data_type="FLOAT_VECTOR", domain="POINT")
-        return place, self.out("GeometryNodeSampleIndex", geometry, sight, at, data_type="BOOLEAN", domain="POINT")
+        place = self.add_output("GeometryNodeSampleIndex", geometry, position, at, data_type="FLOAT_VECTOR", domain="POINT")
+        return place, self.add_output("GeometryNodeSampleIndex", geometry, sight, at, data_type="BOOLEAN", domain="POINT")
 
-    def spheres(self, points, shown, number: int):
+    def build_spheres(self, points, visible, number: int):
         """Return spheres on the visible markers of one colour."""
-        side = self.out("GeometryNodeInputNamedAttribute", SIDE, data_type="INT")
-        mine = self.out("FunctionNodeCompare", side, number, data_type="INT", operation="EQUAL")
-        ball = self.out("GeometryNodeMeshIcoSphere", self.inputs["Radius"], 2)
+        side = self.add_output("GeometryNodeInputNamedAttribute", SIDE, data_type="INT")
+        is_own_colour = self.add_output("FunctionNodeCompare", side, number, data_type="INT", operation="EQUAL")
+        ball = self.add_output("GeometryNodeMeshIcoSphere", self.inputs["Radius"], 2)
         name, rgb = COLOURS[number]
-        ball = self.out("GeometryNodeSetMaterial", ball, None, colour(name, rgb))
-        return self.out("GeometryNodeInstanceOnPoints", points, self.logic("AND", shown, mine), ball)
+        ball = self.add_output("GeometryNodeSetMaterial", ball, None, get_material(name, rgb))
+        return self.add_output("GeometryNodeInstanceOnPoints", points, self.add_boolean_math("AND", visible, is_own_colour), ball)
 
 
 @contextmanager
-def draw_later():
+def defer_lines():
     """Defer drawing of edges while many labels change."""
-    _waiting.append(True)
+    _deferred.append(True)
     try:
         yield
     finally:
-        _waiting.pop()
+        _deferred.pop()
 
 
 def draw_lines(cloud: bpy.types.Object) -> None:
     """Write edges and colours by the segments of the labels, in Edit Mode too; the selection stays."""
     mesh, labels = cloud.data, cloud.beyond_mocap_cloud.labels
-    if _waiting or cloud.library is not None or mesh.library is not None:
+    if _deferred or cloud.library is not None or mesh.library is not None:
         return
     if not mesh.is_editmode and MARKER not in mesh.attributes:
         return
@@ -193,15 +193,15 @@ def draw_lines(cloud: bpy.types.Object) -> None:
     if not mesh.is_editmode:
         shape.from_mesh(mesh)
     colours = shape.verts.layers.int.get(SIDE) or shape.verts.layers.int.new(SIDE)
-    which = shape.verts.layers.int[MARKER]
+    marker_layer = shape.verts.layers.int[MARKER]
     shape.verts.ensure_lookup_table()
-    segments = [labels[vertex[which]].segment if vertex[which] < len(labels) else "" for vertex in shape.verts]
+    segments = [labels[vertex[marker_layer]].segment if vertex[marker_layer] < len(labels) else "" for vertex in shape.verts]
     for vertex, segment in zip(shape.verts, segments):
-        thing = vertex[which] < len(labels) and labels[vertex[which]].role in ("BALL", "OTHER")
-        vertex[colours] = 0 if thing else side(segment)
+        thing = vertex[marker_layer] < len(labels) and labels[vertex[marker_layer]].role in ("BALL", "OTHER")
+        vertex[colours] = 0 if thing else find_colour_index(segment)
     for edge in list(shape.edges):
         shape.edges.remove(edge)
-    for one, other in edges(np.array([vertex.co for vertex in shape.verts]), segments):
+    for one, other in find_edges(np.array([vertex.co for vertex in shape.verts]), segments):
         shape.edges.new((shape.verts[one], shape.verts[other]))
     if mesh.is_editmode:
         bmesh.update_edit_mesh(mesh)
@@ -210,7 +210,7 @@ def draw_lines(cloud: bpy.types.Object) -> None:
         shape.free()
 
 
-def edges(places: np.ndarray, segments: list[str]) -> list[tuple[int, int]]:
+def find_edges(places: np.ndarray, segments: list[str]) -> list[tuple[int, int]]:
     """Find pairs of markers: each with its nearest ones of the same segment.
 
     Args:
@@ -221,15 +221,15 @@ def edges(places: np.ndarray, segments: list[str]) -> list[tuple[int, int]]:
     """
     found = set()
     for segment in sorted({name for name in segments if name}):
-        mine = np.flatnonzero([name == segment for name in segments])
-        apart = np.linalg.norm(places[mine, None] - places[None, mine], axis=-1)
-        for row, order in zip(mine, np.argsort(apart, axis=1, kind="stable")):
-            near = [mine[other] for other in order[: NEIGHBOURS + 1] if mine[other] != row]
+        own = np.flatnonzero([name == segment for name in segments])
+        distances = np.linalg.norm(places[own, None] - places[None, own], axis=-1)
+        for row, order in zip(own, np.argsort(distances, axis=1, kind="stable")):
+            near = [own[other] for other in order[: NEIGHBOURS + 1] if own[other] != row]
             found |= {(int(min(row, other)), int(max(row, other))) for other in near}
     return sorted(found)
 
 
-def side(segment: str) -> int:
+def find_colour_index(segment: str) -> int:
     """Return the index into COLOURS for the markers of a segment."""
     if not segment:
         return 3

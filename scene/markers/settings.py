@@ -22,31 +22,31 @@ ROLES = (("NEEDED", "Needed", "The marker is in every recording of this marker s
          ("OTHER", "Other", "The marker is neither on the body nor on a ball", "CANCEL", 4))
 
 
-def redraw(label, _context) -> None:
+def update_lines(label, _context) -> None:
     """Update edges and colours by the new segments."""
     from . import nodes
 
     nodes.draw_lines(label.id_data)
 
 
-def shown(kept, _context) -> None:
+def update_display(properties, _context) -> None:
     """Apply the chosen edges and sphere size."""
     from . import nodes
 
-    modifier = nodes.modifier_of(kept.id_data)
+    modifier = nodes.find_modifier(properties.id_data)
     if modifier is not None:
-        nodes.put(modifier, "Lines", kept.lines)
-        nodes.put(modifier, "Radius", kept.size)
+        nodes.set_input(modifier, "Lines", properties.lines)
+        nodes.set_input(modifier, "Radius", properties.size)
 
 
-def segments(_label, _context, typed: str) -> list[str]:
+def search_segments(_label, _context, typed: str) -> list[str]:
     """List the segments that can carry a marker."""
     from ...beyond_mocap.markers.model.template import JOINTS
 
     return [name for name in JOINTS if typed.lower() in name.lower()]
 
 
-def landmarks(_label, _context, typed: str) -> list[str]:
+def search_landmarks(_label, _context, typed: str) -> list[str]:
     """List the anatomical points on which a marker can lie."""
     from ...beyond_mocap.markers.model.template import LANDMARKS
 
@@ -57,13 +57,13 @@ class BeyondMocapMarker(bpy.types.PropertyGroup):
     """One marker of a cloud: its label, and what it lies on."""
 
     name: StringProperty(name="Label", description="Name of the marker")
-    segment: StringProperty(name="Segment", update=redraw, search=segments,
+    segment: StringProperty(name="Segment", update=update_lines, search=search_segments,
                             description="Body segment that the marker lies on")
     landmark: StringProperty(
-        name="Landmark", search=landmarks,
+        name="Landmark", search=search_landmarks,
         description="Anatomical point that the marker lies on, used to place joints; separate several by commas",
     )
-    role: EnumProperty(name="Role", items=ROLES, default="NEEDED", update=redraw,
+    role: EnumProperty(name="Role", items=ROLES, default="NEEDED", update=update_lines,
                        description="Whether the marker may be missing")
     seen: FloatProperty(name="Visible", subtype="PERCENTAGE", max=100.0, description="Share of the samples with it")
 
@@ -76,7 +76,7 @@ class BeyondMocapMarkerEvent(bpy.types.PropertyGroup):
     seconds: FloatProperty(name="Time", description="Seconds on the recording's clock")
 
 
-@with_settings("markers.cloud", update=shown)
+@with_settings("markers.cloud", update=update_display)
 @with_settings("markers.model")
 class BeyondMocapCloud(bpy.types.PropertyGroup):
     """A trial in the scene, as a cloud of markers."""
@@ -108,7 +108,7 @@ class BeyondMocapCloud(bpy.types.PropertyGroup):
     made: StringProperty(name="Reconstruction", options={"HIDDEN"}, description="Its name in this session")
     body: PointerProperty(name="Body", type=bpy.types.Object, description="Armature reconstructed from the markers")
     ball: PointerProperty(name="Ball", type=bpy.types.Object, description="Ball that was thrown")
-    told: StringProperty(name="Messages", options={"HIDDEN"}, description="Status and warnings, line by line")
+    messages: StringProperty(name="Messages", options={"HIDDEN"}, description="Status and warnings, line by line")
     figures: StringProperty(name="Figures", options={"HIDDEN"}, description="Figures of the body, line by line")
     cleaned: StringProperty(name="Cleaned", options={"HIDDEN"}, description="Report of the clean-up, line by line")
     release: StringProperty(name="Release", options={"HIDDEN"}, description="Figures of the release, line by line")
@@ -126,32 +126,32 @@ def is_cloud(thing: bpy.types.Object | None) -> bool:
     return thing is not None and thing.type == "MESH" and thing.beyond_mocap_cloud.on
 
 
-def clouds(scene: bpy.types.Scene) -> list[bpy.types.Object]:
+def list_clouds(scene: bpy.types.Scene) -> list[bpy.types.Object]:
     """List the clouds of a scene."""
     return [thing for thing in scene.objects if is_cloud(thing)]
 
 
-def cloud_meant(context: bpy.types.Context) -> bpy.types.Object | None:
+def find_target_cloud(context: bpy.types.Context) -> bpy.types.Object | None:
     """Find the target cloud: the active object, the cloud of the active body, a selected cloud, or the only one;
     else None.
     """
     active = context.view_layer.objects.active
     if is_cloud(active):
         return active
-    found = clouds(context.scene)
-    meant = [thing for thing in found if active is not None and thing.beyond_mocap_cloud.body == active]
-    meant += [thing for thing in found if thing.select_get()]
-    meant += found if len(found) == 1 else []
-    return meant[0] if meant else None
+    found = list_clouds(context.scene)
+    candidates = [thing for thing in found if active is not None and thing.beyond_mocap_cloud.body == active]
+    candidates += [thing for thing in found if thing.select_get()]
+    candidates += found if len(found) == 1 else []
+    return candidates[0] if candidates else None
 
 
-def is_alone(cloud: bpy.types.Object, scene: bpy.types.Scene, name: str) -> bool:
+def has_own_object(cloud: bpy.types.Object, scene: bpy.types.Scene, name: str) -> bool:
     """Return whether a cloud's `body` or `ball` is its own; a copied cloud points to those of the original."""
     thing = getattr(cloud.beyond_mocap_cloud, name)
-    return all(getattr(other.beyond_mocap_cloud, name) != thing for other in clouds(scene) if other != cloud)
+    return all(getattr(other.beyond_mocap_cloud, name) != thing for other in list_clouds(scene) if other != cloud)
 
 
-def active_label(cloud: bpy.types.Object) -> BeyondMocapMarker | None:
+def find_active_label(cloud: bpy.types.Object) -> BeyondMocapMarker | None:
     """Return the active marker of the list; None without one."""
-    kept = cloud.beyond_mocap_cloud
-    return kept.labels[kept.active_label] if 0 <= kept.active_label < len(kept.labels) else None
+    properties = cloud.beyond_mocap_cloud
+    return properties.labels[properties.active_label] if 0 <= properties.active_label < len(properties.labels) else None

@@ -8,22 +8,22 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from ..core.material import colour, made
-from ..stage.body import LOOKS
+from ..core.material import get_material, create_material
+from ..stage.body import COLOURS
 from . import ours
-from .load import TEAMS, Person
+from .load import TEAMS, Character
 
-USUAL = {"home": "#C8102E", "away": "#1D4ED8", "referee": "#15171A"}
+DEFAULT_COLOURS = {"home": "#C8102E", "away": "#1D4ED8", "referee": "#15171A"}
 """Shirts of teams without a colour in the feed."""
 
-KEEPERS = ("#F2C200", "#1FA34A", "#F07A13", "#8A3FB5")
+KEEPER_COLOURS = ("#F2C200", "#1FA34A", "#F07A13", "#8A3FB5")
 """Possible shirts of keepers: yellow, green, orange, violet."""
 
 WHITE, DARK = (0.8, 0.8, 0.8), (0.012, 0.016, 0.03)
-OWN = ("shirt", "shorts", "socks", "number")
+KIT_PARTS = ("shirt", "shorts", "socks", "number")
 """Parts that have the kit's colours."""
 
-BRIGHT = 0.35  # luminance from which a shirt gets a dark number and dark shorts
+BRIGHT_LUMINANCE = 0.35  # luminance from which a shirt gets a dark number and dark shorts
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class Kit:
     ink: tuple[float, float, float]
 
 
-def kit_of(person: Person, colours: dict[str, str]) -> Kit:
+def choose_kit(person: Character, colours: dict[str, str]) -> Kit:
     """Choose a person's kit.
 
     Args:
@@ -54,65 +54,65 @@ def kit_of(person: Person, colours: dict[str, str]) -> Kit:
     Returns:
         The kit.
     """
-    shirts = {team: linear(colours.get(team) or USUAL[team]) for team in USUAL}
+    shirts = {team: to_linear(colours.get(team) or DEFAULT_COLOURS[team]) for team in DEFAULT_COLOURS}
     if person.team == "referee":
         return Kit("Referee", shirts["referee"], DARK, DARK, WHITE)
     shirt, name = shirts[person.team], person.team.capitalize()
     if person.keeper:
-        shirt, name = _keepers(shirts, person.team), f"{name} keeper"
-    bright = luminance(shirt) > BRIGHT
+        shirt, name = _choose_keeper_shirt(shirts, person.team), f"{name} keeper"
+    bright = compute_luminance(shirt) > BRIGHT_LUMINANCE
     ink = DARK if bright else WHITE
     return Kit(name, shirt, DARK if person.keeper or bright else WHITE, shirt, ink)
 
 
-def _keepers(shirts: dict[str, tuple], team: str) -> tuple[float, float, float]:
+def _choose_keeper_shirt(shirts: dict[str, tuple], team: str) -> tuple[float, float, float]:
     """Choose the keeper's colour that differs most from all shirts; the away keeper's also from the home keeper's."""
-    worn, offered = list(shirts.values()), [linear(text) for text in KEEPERS]
-    first = max(offered, key=lambda rgb: _nearest(rgb, worn))
+    shirts_used, candidates = list(shirts.values()), [to_linear(text) for text in KEEPER_COLOURS]
+    first = max(candidates, key=lambda rgb: _measure_contrast(rgb, shirts_used))
     if team == "home":
         return first
-    return max((rgb for rgb in offered if rgb != first), key=lambda rgb: _nearest(rgb, worn))
+    return max((rgb for rgb in candidates if rgb != first), key=lambda rgb: _measure_contrast(rgb, shirts_used))
 
 
-def _nearest(rgb, others) -> float:
+def _measure_contrast(rgb, others) -> float:
     return min(float(np.linalg.norm(np.sqrt(rgb) - np.sqrt(other))) for other in others)
 
 
-def linear(text: str) -> tuple[float, float, float]:
+def to_linear(text: str) -> tuple[float, float, float]:
     """Convert "#RRGGBB" (sRGB) to linear RGB."""
     shares = np.array([int(text.lstrip("#")[i : i + 2], 16) for i in (0, 2, 4)]) / 255.0
     return tuple(np.where(shares <= 0.04045, shares / 12.92, ((shares + 0.055) / 1.055) ** 2.4).tolist())
 
 
-def written(rgb) -> str:
+def to_hex(rgb) -> str:
     """Convert linear RGB to "#RRGGBB"."""
     shares = np.clip(np.array(rgb[:3]), 0.0, 1.0)
     curved = np.where(shares <= 0.0031308, 12.92 * shares, 1.055 * shares ** (1 / 2.4) - 0.055)
     return "#" + "".join(f"{int(round(255.0 * share)):02X}" for share in curved)
 
 
-def luminance(rgb) -> float:
+def compute_luminance(rgb) -> float:
     """Compute the luminance of a linear colour, 0 to 1."""
     return float(np.dot(rgb, (0.2126, 0.7152, 0.0722)))
 
 
-def repaint(scene: bpy.types.Scene, colours: dict[str, str]) -> None:
+def update_materials(scene: bpy.types.Scene, colours: dict[str, str]) -> None:
     """Update the shirts of the displayed match.
 
     Args:
         scene: the scene.
         colours: "#RRGGBB" by team.
     """
-    worn = {cloth for team in TEAMS for thing in ours.meshes(scene, team) for cloth in thing.data.materials}
-    for team in USUAL:
+    used = {cloth for team in TEAMS for thing in ours.find_meshes(scene, team) for cloth in thing.data.materials}
+    for team in DEFAULT_COLOURS:
         for keeper in (False, True):
-            kit = kit_of(Person("", "", -1, team=team, keeper=keeper, motions=()), colours)
-            for part, rgb in _own(kit).items():
-                for material in worn & set(_all_of(kit, part)):
-                    _paint(material, rgb)
+            kit = choose_kit(Character("", "", -1, team=team, keeper=keeper, motions=()), colours)
+            for part, rgb in _build_part_colours(kit).items():
+                for material in used & set(_find_materials(kit, part)):
+                    _set_colour(material, rgb)
 
 
-def cloth(kit: Kit, part: str) -> bpy.types.Material:
+def create_kit_material(kit: Kit, part: str) -> bpy.types.Material:
     """Create or reuse a material for a part of a kit ("shirt", "number", or one of the body's), in the kit's present
     colour.
 
@@ -125,30 +125,30 @@ def cloth(kit: Kit, part: str) -> bpy.types.Material:
     Returns:
         The material.
     """
-    own = _own(kit)
-    if part not in own:
-        return colour(part.capitalize(), LOOKS[part])
-    free = (one for one in _all_of(kit, part) if one.users == one.use_fake_user)
-    material = next(free, None) or made(_name(kit, part), own[part])
-    _paint(material, own[part])
+    colours = _build_part_colours(kit)
+    if part not in colours:
+        return get_material(part.capitalize(), COLOURS[part])
+    unused = (one for one in _find_materials(kit, part) if one.users == one.use_fake_user)
+    material = next(unused, None) or create_material(_build_material_name(kit, part), colours[part])
+    _set_colour(material, colours[part])
     return material
 
 
-def _own(kit: Kit) -> dict[str, tuple[float, float, float]]:
-    return dict(zip(OWN, (kit.shirt, kit.shorts, kit.socks, kit.ink)))
+def _build_part_colours(kit: Kit) -> dict[str, tuple[float, float, float]]:
+    return dict(zip(KIT_PARTS, (kit.shirt, kit.shorts, kit.socks, kit.ink)))
 
 
-def _name(kit: Kit, part: str) -> str:
+def _build_material_name(kit: Kit, part: str) -> str:
     return f"Match {kit.name} {part}"
 
 
-def _all_of(kit: Kit, part: str) -> list[bpy.types.Material]:
+def _find_materials(kit: Kit, part: str) -> list[bpy.types.Material]:
     """Find the file's own materials for a part of a kit, of all displayed matches, by name."""
-    form = re.compile(re.escape(_name(kit, part)) + r"(\.\d{3,})?")
+    form = re.compile(re.escape(_build_material_name(kit, part)) + r"(\.\d{3,})?")
     return [one for one in bpy.data.materials if one.library is None and form.fullmatch(one.name)]
 
 
-def _paint(material: bpy.types.Material, rgb: tuple[float, float, float]) -> None:
+def _set_colour(material: bpy.types.Material, rgb: tuple[float, float, float]) -> None:
     """Set the colour of a material."""
     nodes = material.node_tree.nodes if material.node_tree is not None else ()
     shader = next((node for node in nodes if node.type == "BSDF_PRINCIPLED"), None)

@@ -9,19 +9,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...beyond_mocap.base.errors import Cancelled, InputError, told_time
+from ...beyond_mocap.base.errors import UserCancelledError, InputError, format_seconds
 from ...beyond_mocap.motion.motion import Motion
 from ...beyond_mocap.motion.track.ball_path import BallPath
 
 if TYPE_CHECKING:
     from ...beyond_mocap.library.library import Library
 
-LIBRARYS_SHARE = 0.1  # share of the progress bar
+LIBRARY_SHARE = 0.1  # share of the progress bar
 TEAMS = ("home", "away", "referee")
 
 
 @dataclass(frozen=True, eq=False)
-class Person:
+class Character:
     """A player or referee.
 
     Attributes:
@@ -42,7 +42,7 @@ class Person:
 
 
 @dataclass(frozen=True, eq=False)
-class Scenery:
+class MatchSection:
     """A section of a match.
 
     Attributes:
@@ -60,12 +60,12 @@ class Scenery:
     length: float
     width: float
     colours: dict[str, str]
-    people: tuple[Person, ...]
+    characters: tuple[Character, ...]
     ball: BallPath | None
 
 
 @dataclass(frozen=True)
-class Wanted:
+class DisplayRequest:
     """What to display.
 
     Attributes:
@@ -89,8 +89,8 @@ class Wanted:
     build: dict = field(default_factory=dict)
 
 
-def scenery(wanted: Wanted, library: "Library | None", progress: Callable[[float, str], None],
-            cancelled: Callable[[], bool]) -> tuple["Library", Scenery, tuple[str, ...]]:
+def load_section(request: DisplayRequest, library: "Library | None", progress: Callable[[float, str], None],
+            cancelled: Callable[[], bool]) -> tuple["Library", MatchSection, tuple[str, ...]]:
     """Load a section of a match.
 
     Args:
@@ -105,27 +105,27 @@ def scenery(wanted: Wanted, library: "Library | None", progress: Callable[[float
         Cancelled: if `cancelled` returns True.
     """
     from ...beyond_mocap.files.tables import read_ball
-    from ...beyond_mocap.library.build import build
+    from ...beyond_mocap.library.build import build_library
 
-    state = _state(wanted.folder)
+    state = _read_state(request.folder)
     if library is None:
-        library = build(wanted.library, unit=wanted.unit, **wanted.build, cancelled=cancelled, progress=lambda done,
-                        text: progress(LIBRARYS_SHARE * done, text))
-    start, end = _span(wanted, state)
-    course = Path(wanted.folder) / "ball.csv"
-    ball = read_ball(course) if course.is_file() else None
-    people, lines = _people(wanted, state, library, ball=ball, span=(start, end), progress=progress,
+        library = build_library(request.library, unit=request.unit, **request.build, cancelled=cancelled, progress=lambda done,
+                        text: progress(LIBRARY_SHARE * done, text))
+    start, end = _resolve_span(request, state)
+    ball_file = Path(request.folder) / "ball.csv"
+    ball = read_ball(ball_file) if ball_file.is_file() else None
+    characters, lines = _construct_characters(request, state, library, ball=ball, span=(start, end), progress=progress,
                             cancelled=cancelled)
-    if not people:
-        found = f"no player is present from {told_time(start)} to {told_time(end)} s"
-        raise InputError(wanted.folder, found, "a time of play", *lines[:1])
+    if not characters:
+        found = f"no player is present from {format_seconds(start)} to {format_seconds(end)} s"
+        raise InputError(request.folder, found, "a time of play", *lines[:1])
     length, width = map(float, state["pitch_m"])
-    seen = Scenery(start, end, length, width=width, colours=wanted.colours, people=tuple(people),
-                   ball=_between(ball, start, end))
-    return library, seen, tuple(lines)
+    section = MatchSection(start, end, length, width=width, colours=request.colours, characters=tuple(characters),
+                   ball=_cut_ball(ball, start, end))
+    return library, section, tuple(lines)
 
 
-def _state(folder: str) -> dict:
+def _read_state(folder: str) -> dict:
     """Read match.json; InputError if something needed here is missing."""
     from ...beyond_mocap.match.folder import STATE, read_state
 
@@ -139,53 +139,53 @@ def _state(folder: str) -> dict:
     return state
 
 
-def _span(wanted: Wanted, state: dict) -> tuple[float, float]:
+def _resolve_span(request: DisplayRequest, state: dict) -> tuple[float, float]:
     """Resolve the requested span (start, end) s within the match."""
     first, last = float(state["from_s"]), float(state["to_s"])
-    start, end = max(wanted.start, first), min(wanted.end or last, last)
+    start, end = max(request.start, first), min(request.end or last, last)
     if end - start < 0.2:
-        found = f"{told_time(wanted.start)} to {told_time(wanted.end)} s"
-        expected = f"a time within {told_time(first)} to {told_time(last)} s"
-        raise InputError(wanted.folder, found, expected, "press Make Match for another time")
+        found = f"{format_seconds(request.start)} to {format_seconds(request.end)} s"
+        expected = f"a time within {format_seconds(first)} to {format_seconds(last)} s"
+        raise InputError(request.folder, found, expected, "press Make Match for another time")
     return start, end
 
 
-def _people(wanted, state, library, ball, span, progress, cancelled) -> tuple[list[Person], list[str]]:
+def _construct_characters(request, state, library, ball, span, progress, cancelled) -> tuple[list[Character], list[str]]:
     """Construct all players who are present and finished; return them and messages about the others."""
     from ...beyond_mocap.match.player_edit import read_player
-    from ...beyond_mocap.match.shown import shown
+    from ...beyond_mocap.match.shown import construct_displayed_player
 
-    people, lines, trouble = [], [], None
-    asked = [player for player in state["players"] if not wanted.players or player["id"] in wanted.players]
-    for number, player in enumerate(asked):
+    characters, lines, last_error = [], [], None
+    selected = [player for player in state["players"] if not request.players or player["id"] in request.players]
+    for number, player in enumerate(selected):
         if cancelled():
-            raise Cancelled("cancelled")
-        progress(LIBRARYS_SHARE + (1.0 - LIBRARYS_SHARE) * number / len(asked), f"constructing {player['id']}")
+            raise UserCancelledError("cancelled")
+        progress(LIBRARY_SHARE + (1.0 - LIBRARY_SHARE) * number / len(selected), f"constructing {player['id']}")
         if player.get("status") != "done":
             lines.append(f"{player['id']} is not finished: {player.get('reason') or player.get('status')}")
             continue
         try:
-            takes = shown(library, read_player(Path(wanted.folder) / f"{player['file']}.take.npz"), ball, *span)
+            takes = construct_displayed_player(library, read_player(Path(request.folder) / f"{player['file']}.take.npz"), ball, *span)
         except InputError as error:  # this player's file, or the library, which then fails for all
-            trouble = error
+            last_error = error
             lines.append(f"{player['id']} cannot be shown: {error}")
             continue
         if takes:
-            people.append(_person(player, tuple((take.start_time, take.motion) for take in takes)))
-    if trouble is not None and not people:
-        raise trouble
-    return people, lines
+            characters.append(_build_character(player, tuple((take.start_time, take.motion) for take in takes)))
+    if last_error is not None and not characters:
+        raise last_error
+    return characters, lines
 
 
-def _person(player: dict, motions: tuple) -> Person:
+def _build_character(player: dict, motions: tuple) -> Character:
     number = int(player.get("number", -1))
     team = player.get("team") if player.get("team") in TEAMS else "home"
     position = str(player.get("position") or "")
     keeper = "keeper" in position.lower() or (not position and number == 1)
-    return Person(player["id"], str(player.get("name") or ""), number, team=team, keeper=keeper, motions=motions)
+    return Character(player["id"], str(player.get("name") or ""), number, team=team, keeper=keeper, motions=motions)
 
 
-def _between(ball: "BallPath | None", start: float, end: float) -> "BallPath | None":
+def _cut_ball(ball: "BallPath | None", start: float, end: float) -> "BallPath | None":
     """Cut the ball to `start` .. `end` s, with gaps interpolated linearly; None if it is not known anywhere."""
     if ball is None:
         return None

@@ -11,23 +11,23 @@ from bpy.props import CollectionProperty, EnumProperty, FloatProperty, FloatVect
 from ...beyond_mocap.files.event_providers import EVENT_PROVIDERS
 from ...beyond_mocap.files.tracking.providers import PROVIDERS
 from ..core.properties import with_settings
-from .kits import USUAL, linear, repaint, written
+from .kits import DEFAULT_COLOURS, to_linear, update_materials, to_hex
 
 FILE = {"subtype": "FILE_PATH", "options": {"PATH_SUPPORTS_BLEND_RELATIVE"}}
 AUTO = "AUTO"
-GUESS = (AUTO, "Automatic", "Detect the provider from the file")
-GIVEN = [GUESS, *((one.name, one.title, one.files.replace("`", "")) for one in PROVIDERS.values())]
-TOLD = [GUESS, *((one.name, one.title, one.files.replace("`", "")) for one in EVENT_PROVIDERS.values())]
+DETECT_ITEM = (AUTO, "Automatic", "Detect the provider from the file")
+PROVIDER_ITEMS = [DETECT_ITEM, *((one.name, one.title, one.files.replace("`", "")) for one in PROVIDERS.values())]
+EVENT_PROVIDER_ITEMS = [DETECT_ITEM, *((one.name, one.title, one.files.replace("`", "")) for one in EVENT_PROVIDERS.values())]
 COLOUR = {"subtype": "COLOR", "size": 3, "min": 0.0, "max": 1.0}
-KINDS = (("home", "Home", "The home team"), ("away", "Away", "The away team"), ("referee", "Referee", "Referees"))
-FIRST = 60.0
+TEAM_ITEMS = (("home", "Home", "The home team"), ("away", "Away", "The away team"), ("referee", "Referee", "Referees"))
+FIRST_SECONDS = 60.0
 """s that are selected after a match has been read."""
 
 
-def show_colours(match, _context) -> None:
+def update_colours(match, _context) -> None:
     """Update the displayed kits when a colour changes."""
     if match.shown:
-        repaint(match.id_data, colours_of(match))
+        update_materials(match.id_data, collect_colours(match))
 
 
 class BeyondMocapMatchPlayer(bpy.types.PropertyGroup):
@@ -36,7 +36,7 @@ class BeyondMocapMatchPlayer(bpy.types.PropertyGroup):
     feed_id: StringProperty(name="ID", description="Identifier in the feed")
     use: bpy.props.BoolProperty(name="Use", default=True, description="Include this player")
     number: IntProperty(name="Number", default=-1, description="Shirt number; -1 if the feed has none")
-    team: EnumProperty(name="Team", items=KINDS, description="Team of the player")
+    team: EnumProperty(name="Team", items=TEAM_ITEMS, description="Team of the player")
     position: StringProperty(name="Position", description="Playing position, if the feed provides it")
 
 
@@ -56,25 +56,25 @@ class BeyondMocapMatch(bpy.types.PropertyGroup):
         name="Events Metadata", description="Lineups or metadata of the events; empty: a matching file beside them",
         **FILE,
     )
-    events_provider: EnumProperty(name="Events Provider", items=TOLD, description="Format of the events")
-    provider: EnumProperty(name="Provider", items=GIVEN, description="Format of the files")
+    events_provider: EnumProperty(name="Events Provider", items=EVENT_PROVIDER_ITEMS, description="Format of the events")
+    provider: EnumProperty(name="Provider", items=PROVIDER_ITEMS, description="Format of the files")
     folder: StringProperty(
         name="Folder", subtype="DIR_PATH", options={"PATH_SUPPORTS_BLEND_RELATIVE"},
         description="Where results are stored, some megabytes per match; empty: a folder per selection "
         "beside the saved file or the tracking file",
     )
-    home_colour: FloatVectorProperty(name="Home Shirts", default=linear(USUAL["home"]), update=show_colours,
+    home_colour: FloatVectorProperty(name="Home Shirts", default=to_linear(DEFAULT_COLOURS["home"]), update=update_colours,
                                      description="Colour of the home team's shirts", **COLOUR)
-    away_colour: FloatVectorProperty(name="Away Shirts", default=linear(USUAL["away"]), update=show_colours,
+    away_colour: FloatVectorProperty(name="Away Shirts", default=to_linear(DEFAULT_COLOURS["away"]), update=update_colours,
                                      description="Colour of the away team's shirts", **COLOUR)
-    referee_colour: FloatVectorProperty(name="Referees", default=linear(USUAL["referee"]), update=show_colours,
+    referee_colour: FloatVectorProperty(name="Referees", default=to_linear(DEFAULT_COLOURS["referee"]), update=update_colours,
                                         description="Colour of the referees' shirts", **COLOUR)
     players: CollectionProperty(type=BeyondMocapMatchPlayer, description="Players of the match")
     active: IntProperty(name="Player", min=0, description="Active player in the list")
     read_of: StringProperty(options={"HIDDEN"}, description="Tracking file the list was read from")
     length_s: FloatProperty(options={"HIDDEN"}, description="End of the match on its clock, in seconds")
     report: StringProperty(options={"HIDDEN"}, description="Messages about the data: detected and corrected values")
-    told: StringProperty(options={"HIDDEN"}, description="Status and warnings")
+    messages: StringProperty(options={"HIDDEN"}, description="Status and warnings")
     made: StringProperty(options={"HIDDEN"}, description="Folder of the last result if none is chosen")
     shown_start: FloatProperty(options={"HIDDEN"}, description="Match second of the first displayed frame")
     shown_first: IntProperty(options={"HIDDEN"}, description="First displayed frame")
@@ -82,16 +82,16 @@ class BeyondMocapMatch(bpy.types.PropertyGroup):
     shown: StringProperty(options={"HIDDEN"}, description="Displayed folder; empty if there is none")
 
 
-def typed(value: float) -> str:
+def format_float(value: float) -> str:
     """Format a float property as it was typed: with the fewest decimals that keep its value."""
     return str(np.float32(value)).removesuffix(".0")
 
 
-def colours_of(match: BeyondMocapMatch) -> dict[str, str]:
+def collect_colours(match: BeyondMocapMatch) -> dict[str, str]:
     """Collect "#RRGGBB" of shirts by team."""
-    return {team: written(getattr(match, f"{team}_colour")) for team in USUAL}
+    return {team: to_hex(getattr(match, f"{team}_colour")) for team in DEFAULT_COLOURS}
 
 
-def active_of(match: BeyondMocapMatch) -> BeyondMocapMatchPlayer | None:
+def find_active_player(match: BeyondMocapMatch) -> BeyondMocapMatchPlayer | None:
     """Find the active player in the list; None if it is empty."""
     return match.players[match.active] if 0 <= match.active < len(match.players) else None

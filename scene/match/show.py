@@ -11,20 +11,20 @@ from time import perf_counter
 import bpy
 import numpy as np
 
-from ...beyond_mocap.base.time_series import interpolate
+from ...beyond_mocap.base.time_series import interpolate_columns
 from ...beyond_mocap.motion.track.ball_path import BallPath
 from ..core import action, channels
 from ..core.measure import frames_per_second, units_per_metre
 from ..result import bake
 from ..stage import ball, stage
 from . import cameras, ours
-from .bodies import Wardrobe
-from .load import Person, Scenery
+from .bodies import CharacterBuilder
+from .load import Character, MatchSection
 
-SHOWN = "Shown"  # group of curves
+VISIBILITY_GROUP = "Shown"  # group of curves
 
 
-def show(context: bpy.types.Context, scenery: Scenery, first: int) -> dict[str, float]:
+def show_match(context: bpy.types.Context, section: MatchSection, first: int) -> dict[str, float]:
     """Show a section of a match; what was displayed before is removed.
 
     Args:
@@ -34,39 +34,39 @@ def show(context: bpy.types.Context, scenery: Scenery, first: int) -> dict[str, 
     Returns:
         Seconds that pitch, bodies, keys and cameras took.
     """
-    scene, took = context.scene, {}
-    ours.clear(scene)
-    ours.include(context.view_layer)
-    last = int(np.floor(frame_of(scene, scenery.start, first, scenery.end) + 1e-4))
-    with _clock(took, "pitch"):
-        _pitch(scene, scenery)
-    with _clock(took, "bodies"):
-        dressed = _dressed(context, scenery)
-    with _clock(took, "keys"):
-        for person, worn in dressed:
-            bake_person(scene, person, worn, start=scenery.start, first=first, last=last)
-        if scenery.ball is not None:
-            bake_ball(context, scenery.ball, scenery.start, first, last)
-    with _clock(took, "cameras"):
-        frames, size = np.arange(first, last + 1), (scenery.length, scenery.width)
-        camera = cameras.broadcast(scene, size, frames, _followed(scene, scenery, frames, first))
+    scene, durations = context.scene, {}
+    ours.clear_match(scene)
+    ours.include_collections(context.view_layer)
+    last = int(np.floor(compute_frame(scene, section.start, first, section.end) + 1e-4))
+    with _measure_seconds(durations, "pitch"):
+        _create_pitch(scene, section)
+    with _measure_seconds(durations, "bodies"):
+        characters = _create_characters(context, section)
+    with _measure_seconds(durations, "keys"):
+        for person, worn in characters:
+            bake_character(scene, person, worn, start=section.start, first=first, last=last)
+        if section.ball is not None:
+            bake_ball(context, section.ball, section.start, first, last)
+    with _measure_seconds(durations, "cameras"):
+        frames, size = np.arange(first, last + 1), (section.length, section.width)
+        camera = cameras.create_broadcast_camera(scene, size, frames, _compute_camera_targets(scene, section, frames, first))
     if scene.camera is None:  # none, or one that has just been removed
         scene.camera = camera
-    bake.lengthen(scene, last)
-    return took
+    bake.extend_scene(scene, last)
+    return durations
 
 
-def ball_shown(scene: bpy.types.Scene) -> bpy.types.Object | None:
+def find_ball(scene: bpy.types.Scene) -> bpy.types.Object | None:
     """Find the ball of the displayed match; None if there is none."""
-    return next(iter(ours.meshes(scene, "ball")), None)
+    return next(iter(ours.find_meshes(scene, "ball")), None)
 
 
-def frame_of(scene: bpy.types.Scene, start: float, first: int, seconds: float) -> float:
+def compute_frame(scene: bpy.types.Scene, start: float, first: int, seconds: float) -> float:
     """Compute the scene frame (fractional) of a second on the match's clock, where `start` s is frame `first`."""
     return first + (seconds - start) * frames_per_second(scene)
 
 
-def bake_person(scene: bpy.types.Scene, person: Person, worn: list[bpy.types.Object], start: float, first: int,
+def bake_character(scene: bpy.types.Scene, character: Character, objects: list[bpy.types.Object], start: float, first: int,
                 last: int) -> None:
     """Bake a character's motion to its armature, and hide its objects outside its stretches.
 
@@ -78,30 +78,30 @@ def bake_person(scene: bpy.types.Scene, person: Person, worn: list[bpy.types.Obj
         first: scene frame of that time.
         last: last displayed frame.
     """
-    who = worn[0]
-    parts = [action.keyed(who, motion, scene, frame_of(scene, start, first, begins)) for begins,
-             motion in person.motions]
+    body = objects[0]
+    parts = [action.build_keys(body, motion, scene, compute_frame(scene, start, first, begins)) for begins,
+             motion in character.motions]
     frames = np.concatenate([frames for frames, _ in parts])
-    kept = np.concatenate([[True], np.diff(frames) > 0])  # consecutive stretches may share a frame
-    curves = {path: (group, np.concatenate([curves[path][1] for _, curves in parts])[kept]) for path,
+    is_new = np.concatenate([[True], np.diff(frames) > 0])  # consecutive stretches may share a frame
+    curves = {path: (group, np.concatenate([curves[path][1] for _, curves in parts])[is_new]) for path,
               (group, _) in parts[0][1].items()}
-    done = channels.animate(who, f"{who.name} match", frames[kept], curves)
-    done[action.PLACED] = [number for row in who.matrix_world for number in row]
-    ours.mark(done)
-    there = np.zeros(last - first + 1, bool)
-    there[np.clip(frames.astype(int) - first, 0, last - first)] = True
-    if not there.all():
-        hide_outside(worn, there, first)
+    done = channels.create_action(body, f"{body.name} match", frames[is_new], curves)
+    done[action.PLACEMENT] = [number for row in body.matrix_world for number in row]
+    ours.mark_object(done)
+    is_present = np.zeros(last - first + 1, bool)
+    is_present[np.clip(frames.astype(int) - first, 0, last - first)] = True
+    if not is_present.all():
+        hide_outside(objects, is_present, first)
 
 
-def hide_outside(worn: list[bpy.types.Object], there: np.ndarray, first: int) -> None:
+def hide_outside(objects: list[bpy.types.Object], is_present: np.ndarray, first: int) -> None:
     """Hide objects, in views and renders, on the frames from `first` where `is_present` (F,) is False."""
-    turns = np.flatnonzero(np.diff(there.astype(int)))
+    turns = np.flatnonzero(np.diff(is_present.astype(int)))
     at = np.unique(np.concatenate([[0], turns, turns + 1]))
-    hidden = np.where(there[at], 0.0, 1.0)[:, None]
-    curves = {name: (SHOWN, hidden) for name in ("hide_viewport", "hide_render")}
-    for thing in worn[1:]:  # an armature has its own keys, and no surface
-        ours.mark(channels.animate(thing, f"{thing.name} shown", first + at, curves))
+    hidden = np.where(is_present[at], 0.0, 1.0)[:, None]
+    curves = {name: (VISIBILITY_GROUP, hidden) for name in ("hide_viewport", "hide_render")}
+    for thing in objects[1:]:  # an armature has its own keys, and no surface
+        ours.mark_object(channels.create_action(thing, f"{thing.name} shown", first + at, curves))
 
 
 def bake_ball(context: bpy.types.Context, path: BallPath, start: float, first: int, last: int) -> bpy.types.Object:
@@ -116,56 +116,56 @@ def bake_ball(context: bpy.types.Context, path: BallPath, start: float, first: i
     Returns:
         The ball.
     """
-    scene, home = context.scene, ours.part(context.scene, "ball")
-    thing = ours.mark(ball.create(context, "Match ball", home))
-    ours.mark(ball.write(thing, path, scene, frame_of(scene, start, first, float(path.times[0]))))
-    home.objects.link(ours.mark(_course(scene, path)))
+    scene, home = context.scene, ours.create_collection(context.scene, "ball")
+    thing = ours.mark_object(ball.create_ball(context, "Match ball", home))
+    ours.mark_object(ball.write_trajectory(thing, path, scene, compute_frame(scene, start, first, float(path.times[0]))))
+    home.objects.link(ours.mark_object(_create_trajectory_curve(scene, path)))
     return thing
 
 
 @contextmanager
-def _clock(took: dict[str, float], name: str):
+def _measure_seconds(durations: dict[str, float], name: str):
     """Measure the seconds of a step."""
     began = perf_counter()
     yield
-    took[name] = perf_counter() - began
+    durations[name] = perf_counter() - began
 
 
-def _pitch(scene: bpy.types.Scene, scenery: Scenery) -> None:
+def _create_pitch(scene: bpy.types.Scene, section: MatchSection) -> None:
     """Create grass, lines, goals and daylight; the "Stage" of single players is removed while a match is displayed."""
-    stage.remove(scene)
-    home, units, size = ours.part(scene, "pitch"), units_per_metre(scene), (scenery.length, scenery.width)
-    surface = stage.lay_grass(home, units, size), stage.lay_lines(home, units, size)
-    for thing in (*surface, *stage.set_goals(home, units, size[0]), stage.sun(home)):
-        ours.mark(thing)
+    stage.remove_stage(scene)
+    home, units, size = ours.create_collection(scene, "pitch"), units_per_metre(scene), (section.length, section.width)
+    surface = stage.create_grass(home, units, size), stage.create_lines(home, units, size)
+    for thing in (*surface, *stage.create_goals(home, units, size[0]), stage.create_sun(home)):
+        ours.mark_object(thing)
     if scene.world is None:
-        scene.world = stage.sky()
+        scene.world = stage.create_sky()
 
 
-def _dressed(context: bpy.types.Context, scenery: Scenery):
+def _create_characters(context: bpy.types.Context, section: MatchSection):
     """Create all characters with their objects."""
-    wardrobe = Wardrobe(context, scenery.colours)
-    return [(person, wardrobe.dress(person, ours.part(context.scene, person.team))) for person in scenery.people]
+    wardrobe = CharacterBuilder(context, section.colours)
+    return [(person, wardrobe.create_character(person, ours.create_collection(context.scene, person.team))) for person in section.characters]
 
 
-def _followed(scene: bpy.types.Scene, scenery: Scenery, frames: np.ndarray, first: int) -> np.ndarray:
+def _compute_camera_targets(scene: bpy.types.Scene, section: MatchSection, frames: np.ndarray, first: int) -> np.ndarray:
     """Compute what the stand's camera follows, (F, 2) m: the ball, or the mean position of all players."""
-    seconds = scenery.start + (frames - first) / frames_per_second(scene)
-    if scenery.ball is not None:
-        path = scenery.ball
-        return interpolate(seconds, path.times, path.positions[:, :2])
+    seconds = section.start + (frames - first) / frames_per_second(scene)
+    if section.ball is not None:
+        path = section.ball
+        return interpolate_columns(seconds, path.times, path.positions[:, :2])
     total, count = np.zeros((len(frames), 2)), np.zeros(len(frames))
-    for person in scenery.people:
+    for person in section.characters:
         for begins, motion in person.motions:
             times = begins + np.arange(len(motion)) / motion.fps
-            there = (seconds >= times[0]) & (seconds <= times[-1])
+            is_present = (seconds >= times[0]) & (seconds <= times[-1])
             for axis in range(2):
-                total[there, axis] += np.interp(seconds[there], times, motion.root_positions[:, axis])
-            count += there
+                total[is_present, axis] += np.interp(seconds[is_present], times, motion.root_positions[:, axis])
+            count += is_present
     return total / np.maximum(count, 1.0)[:, None]
 
 
-def _course(scene: bpy.types.Scene, path: BallPath) -> bpy.types.Object:
+def _create_trajectory_curve(scene: bpy.types.Scene, path: BallPath) -> bpy.types.Object:
     """Create the ball's trajectory as a thin curve for the views, hidden at first: a minute of it is hard to read."""
     data = bpy.data.curves.new("Match ball course", "CURVE")
     data.dimensions = "3D"

@@ -12,8 +12,8 @@ YELLOW, ORANGE, VERMILION = (0.941, 0.894, 0.259), (0.902, 0.624, 0.0), (0.835, 
 PURPLE, GREY = (0.800, 0.475, 0.655), (0.62, 0.62, 0.62)
 
 LEFT, RIGHT, MIDDLE = SKY, PURPLE, WHITE
-SEAM, BALL, STRIKE, GAP = WHITE, ORANGE, GREEN, VERMILION
-ASKED, PLAYED = SKY, ORANGE
+TRANSITION, BALL, STRIKE, GAP = WHITE, ORANGE, GREEN, VERMILION
+TRACK_SPEED, BODY_SPEED = SKY, ORANGE
 SCALE = (BLUE, SKY, YELLOW, ORANGE, VERMILION)
 """From good to bad; the middle one is the limit of the target."""
 
@@ -24,7 +24,7 @@ SLIDE_STOPS = (0.0, 0.005, 0.021, 0.05, 0.1)
 """Metres that a stance slides, at the colours of SCALE: the target of the median, and what eyes notice."""
 
 
-def scaled(values: np.ndarray, stops: tuple[float, ...], alpha: float = 1.0) -> np.ndarray:
+def map_to_colours(values: np.ndarray, stops: tuple[float, ...], alpha: float = 1.0) -> np.ndarray:
     """Map values to colours between `stops`; NaN is grey.
 
     Args:
@@ -44,6 +44,6 @@ def scaled(values: np.ndarray, stops: tuple[float, ...], alpha: float = 1.0) -> 
     return out
 
 
-def repeated(colour: tuple[float, float, float], count: int, alpha: float = 1.0) -> np.ndarray:
+def repeat_colour(colour: tuple[float, float, float], count: int, alpha: float = 1.0) -> np.ndarray:
     """Repeat one colour for `count` vertices: (N, 4) float32."""
     return np.tile(np.array((*colour, alpha), np.float32), (count, 1))

@@ -17,9 +17,9 @@ from mathutils import Matrix, Vector
 
 from ..core import window
 from ..core.live import Watcher
-from ..core.settings import active_player
+from ..core.settings import find_active_player
 from . import ball_paths, colours, rides, shapes, store
-from .prepare import Mesh, Prepared
+from .prepare import Mesh, PreparedTake
 
 BIAS = 1e-5
 DISC, LIFT = 0.12, 0.034  # metres: radius of a contact's disc, its height above the ground
@@ -30,11 +30,11 @@ FONT = 0
 GROUND = (0.03, 0.03, 0.03, 0.72)  # background of texts
 
 _batches: dict[tuple, list] = {}
-_owners: dict[str, Prepared] = {}
+_owners: dict[str, PreparedTake] = {}
 _square: list = []
 
 
-class Shown(NamedTuple):
+class DrawnTake(NamedTuple):
     """One player as drawn.
 
     Attributes:
@@ -46,20 +46,20 @@ class Shown(NamedTuple):
     """
 
     take: str
-    prepared: Prepared
+    prepared: PreparedTake
     world: Matrix
     seconds: float
     active: bool
 
 
-def free() -> None:
+def clear_batches() -> None:
     """Free all cached batches."""
     _batches.clear()
     _owners.clear()
     _square.clear()
 
 
-def write_lines(x: float, y: float, lines, scale: float, strength: float = 1.0) -> None:
+def draw_lines(x: float, y: float, lines, scale: float, strength: float = 1.0) -> None:
     """Draw lines of text, the first on top, on a dark background whose lower left corner is at pixel x, y."""
     size, margin, text = SIZE * scale, MARGIN * scale, "\n".join(lines)
     blf.size(FONT, size)
@@ -92,44 +92,44 @@ def draw_legend(context, on: list[str]) -> None:
     if not rows:
         return
     scale = context.preferences.system.ui_scale
-    left, bottom, _, _ = window.free_region(context.area, context.region)
+    left, bottom, _, _ = window.find_free_region(context.area, context.region)
     x, y = left + 8 * scale, bottom + 8 * scale
     for row in reversed(rows):
         y += row(x, y, scale) + 4 * scale
 
 
-def _shown(context) -> list[Shown]:
+def _list_takes(context) -> list[DrawnTake]:
     """List the takes to draw in this view; [] if overlays are off or nothing is prepared."""
     settings = getattr(context.scene, "beyond_mocap", None)
     space = context.space_data
     if settings is None or not settings.view.on() or not space.overlay.show_overlays:
         return []
-    active, seconds = active_player(settings), store.seconds_at(context.scene)
+    active, seconds = find_active_player(settings), store.seconds_at(context.scene)
     found = []
-    for player in store.shown_players(settings):
-        prepared = store.prepared(player.take)
+    for player in store.list_shown_players(settings):
+        prepared = store.find_prepared(player.take)
         if prepared is not None:
             world = store.take_to_world(context.scene, player.body)
-            found.append(Shown(player.take, prepared, world, seconds, player == active))
-    _forget({shown.take: shown.prepared for shown in found})
+            found.append(DrawnTake(player.take, prepared, world, seconds, player == active))
+    _free_unused({shown.take: shown.prepared for shown in found})
     return found
 
 
-def _forget(now: dict[str, Prepared]) -> None:
+def _free_unused(now: dict[str, PreparedTake]) -> None:
     """Free the batches of takes that are no longer drawn."""
-    gone = {take for take, owner in _owners.items() if store.prepared(take) is not owner}
-    for key in [key for key in _batches if key[0] in gone]:
+    unused = {take for take, owner in _owners.items() if store.find_prepared(take) is not owner}
+    for key in [key for key in _batches if key[0] in unused]:
         del _batches[key]
-    for take in gone:
+    for take in unused:
         del _owners[take]
     _owners.update(now)
 
 
-def _riding(context) -> list[rides.Item]:
+def _list_path_items(context) -> list[rides.DrawItem]:
     """List the path and ball overlays of this view, and free the batches of those no longer drawn."""
     items = []
     if context.space_data.overlay.show_overlays and getattr(context.scene, "beyond_mocap", None) is not None:
-        items = [*rides.items(context.scene), *ball_paths.items(context.scene)]
+        items = [*rides.list_items(context.scene), *ball_paths.list_items(context.scene)]
     now = {item.key for item in items}
     for key in [key for key in _batches if not isinstance(key[0], str) and key not in now]:
         del _batches[key]
@@ -139,8 +139,8 @@ def _riding(context) -> list[rides.Item]:
 def _draw_shapes():
     """Draw all shapes of the view: overlays of takes, then those of paths and balls."""
     context = bpy.context
-    found, riding = _shown(context), _riding(context)
-    if not found and not riding:
+    found, path_items = _list_takes(context), _list_path_items(context)
+    if not found and not path_items:
         return
     view = context.scene.beyond_mocap.view
     with gpu.matrix.push_pop_projection():
@@ -151,63 +151,63 @@ def _draw_shapes():
         gpu.state.depth_test_set("NONE" if view.in_front else "LESS_EQUAL")
         gpu.state.depth_mask_set(False)
         try:
-            for shown in found:
+            for drawn in found:
                 with gpu.matrix.push_pop():
-                    gpu.matrix.multiply_matrix(shown.world)
+                    gpu.matrix.multiply_matrix(drawn.world)
                     for name in view.on():
-                        _draw_overlay(context, view, name, shown)
-            for item in riding:
+                        _draw_overlay(context, view, name, drawn)
+            for item in path_items:
                 with gpu.matrix.push_pop():
                     gpu.matrix.multiply_matrix(item.world)
-                    _draw_batches(context, _made(item.key, item.meshes))
+                    _draw_batches(context, _build_batches(item.key, item.meshes))
         finally:
             gpu.state.depth_mask_set(True)
             gpu.state.depth_test_set("NONE")
             gpu.state.blend_set("NONE")
 
 
-def _draw_overlay(context, view, name: str, shown: Shown) -> None:
+def _draw_overlay(context, view, name: str, shown: DrawnTake) -> None:
     if name == "contacts":
         _draw_contacts(shown)
     elif name == "ghosts":
         for frame in _ghost_frames(view, shown):
-            _draw_batches(context, _made((shown.take, "ghost", frame), lambda: [_figure(shown.prepared, frame)]))
+            _draw_batches(context, _build_batches((shown.take, "ghost", frame), lambda: [_build_figure(shown.prepared, frame)]))
     else:
-        _draw_batches(context, _made((shown.take, name), lambda: shown.prepared.meshes.get(name, ())))
+        _draw_batches(context, _build_batches((shown.take, name), lambda: shown.prepared.meshes.get(name, ())))
 
 
-def _ghost_frames(view, shown: Shown) -> list[int]:
+def _ghost_frames(view, shown: DrawnTake) -> list[int]:
     """List the frames of the figures near the playhead, without that of the body itself."""
     prepared = shown.prepared
-    first, now, last = (prepared.frame(shown.seconds + side * view.reach) for side in (-1, 0, 1))
+    first, now, last = (prepared.find_frame(shown.seconds + side * view.reach) for side in (-1, 0, 1))
     if view.ghosts_at == "SEAMS":
-        return [frame for frame in prepared.seams if first <= frame <= last]
+        return [frame for frame in prepared.transitions if first <= frame <= last]
     step = max(1, round(view.ghost_step * prepared.fps))
     return [frame for frame in range(-(-first // step) * step, last + 1, step) if frame != now]
 
 
-def _figure(prepared: Prepared, frame: int) -> Mesh:
+def _build_figure(prepared: PreparedTake, frame: int) -> Mesh:
     points = prepared.figures[frame][prepared.pairs].reshape(-1, 3)
     return Mesh("LINES", points, prepared.pair_colours, 2.0)
 
 
-def _made(key: tuple, meshes) -> list:
+def _build_batches(key: tuple, meshes) -> list:
     """Build the batches of one overlay when it is first drawn."""
     if key not in _batches:
         _batches[key] = [
-            (batch_for_shader(_shader(mesh.kind), mesh.kind, {"pos": mesh.points, "color": mesh.colours}), mesh)
+            (batch_for_shader(_find_shader(mesh.kind), mesh.kind, {"pos": mesh.points, "color": mesh.colours}), mesh)
             for mesh in meshes()
         ]
     return _batches[key]
 
 
-def _shader(kind: str):
+def _find_shader(kind: str):
     return gpu.shader.from_builtin("POLYLINE_FLAT_COLOR" if kind == "LINES" else "SMOOTH_COLOR")
 
 
 def _draw_batches(context, batches) -> None:
     for batch, mesh in batches:
-        shader = _shader(mesh.kind)
+        shader = _find_shader(mesh.kind)
         shader.bind()
         if mesh.kind == "LINES":
             shader.uniform_float("viewportSize", (context.region.width, context.region.height))
@@ -215,31 +215,31 @@ def _draw_batches(context, batches) -> None:
         batch.draw(shader)
 
 
-def _draw_contacts(shown: Shown) -> None:
+def _draw_contacts(shown: DrawnTake) -> None:
     """Draw a disc under each foot in contact."""
-    prepared, frame = shown.prepared, shown.prepared.frame(shown.seconds)
+    prepared, frame = shown.prepared, shown.prepared.find_frame(shown.seconds)
     shader = gpu.shader.from_builtin("UNIFORM_COLOR")
     for side, rgb in enumerate((colours.LEFT, colours.RIGHT)):
-        if prepared.stands[frame, side]:
+        if prepared.contacts[frame, side]:
             x, y, _ = prepared.toes[frame, side].tolist()
             with gpu.matrix.push_pop():
                 gpu.matrix.translate((x, y, LIFT))
                 shader.bind()
                 shader.uniform_float("color", (*rgb, 0.75))
-                _made(("", "disc"), _disc)[0][0].draw(shader)
+                _build_batches(("", "disc"), _build_disc)[0][0].draw(shader)
 
 
-def _disc() -> list[Mesh]:
-    points = shapes.disc(DISC)
-    return [Mesh("TRIS", points, colours.repeated(colours.WHITE, len(points)))]
+def _build_disc() -> list[Mesh]:
+    points = shapes.build_disc(DISC)
+    return [Mesh("TRIS", points, colours.repeat_colour(colours.WHITE, len(points)))]
 
 
 def _draw_texts():
     """Draw all texts of the view and the legend."""
     context = bpy.context
-    found, over = _shown(context), context.space_data.overlay.show_overlays
-    riding, shot = over and rides.seen(context.scene), over and ball_paths.any_seen(context.scene)
-    if not found and not riding and not shot:
+    found, over = _list_takes(context), context.space_data.overlay.show_overlays
+    has_paths, has_balls = over and rides.list_visible_edits(context.scene), over and ball_paths.has_items(context.scene)
+    if not found and not has_paths and not has_balls:
         return
     view = context.scene.beyond_mocap.view
     on = view.on()
@@ -247,46 +247,46 @@ def _draw_texts():
     try:
         for shown in found:
             if "moments" in on:
-                _near_labels(context, view, shown)
+                _draw_labels(context, view, shown)
             if "seams" in on:
-                _why(context, view, shown)
-        draw_legend(context, [*(on if found else ()), *(["rides"] if riding else ()), *(["shots"] if shot else ())])
+                _draw_reasons(context, view, shown)
+        draw_legend(context, [*(on if found else ()), *(["rides"] if has_paths else ()), *(["shots"] if has_balls else ())])
     finally:
         gpu.state.blend_set("NONE")
 
 
-def _near_labels(context, view, shown: Shown) -> None:
+def _draw_labels(context, view, shown: DrawnTake) -> None:
     near = [label for label in shown.prepared.labels if abs(label.time - shown.seconds) <= view.reach]
     for label in near[:MOST_LABELS]:
-        _text(context, shown.world @ Vector(label.place), (label.text,), 1.0, (8, 26))
+        _draw_text(context, shown.world @ Vector(label.place), (label.text,), 1.0, (8, 26))
 
 
-def _why(context, view, shown: Shown) -> None:
+def _draw_reasons(context, view, shown: DrawnTake) -> None:
     """Draw clip names at the cuts around the playhead, and the reasons for the active body's clip beside it."""
-    prepared, now = shown.prepared, shown.prepared.piece(shown.seconds)
+    prepared, now = shown.prepared, shown.prepared.find_piece(shown.seconds)
     near = [p for p in prepared.pieces if p is not now and abs(p.start - shown.seconds) <= view.reach]
     for piece in near[:MOST_LABELS]:
-        _text(context, shown.world @ Vector(piece.place), (piece.name,), 0.8, (0, -10))
+        _draw_text(context, shown.world @ Vector(piece.place), (piece.name,), 0.8, (0, -10))
     if now is not None:
-        x, y, z = prepared.pelvis[prepared.frame(shown.seconds)].tolist()
+        x, y, z = prepared.pelvis[prepared.find_frame(shown.seconds)].tolist()
         lines = now.lines if shown.active else now.lines[:1]
-        _text(context, shown.world @ Vector((x, y, z)), lines, 1.0, (60, 60))
+        _draw_text(context, shown.world @ Vector((x, y, z)), lines, 1.0, (60, 60))
 
 
-def _text(context, where: Vector, lines, strength: float, shift: tuple[float, float]) -> None:
+def _draw_text(context, where: Vector, lines, strength: float, shift: tuple[float, float]) -> None:
     """Draw lines `shift` points from a place in the world; nothing if it is behind the eye or outside the view."""
     region = context.region
     at = location_3d_to_region_2d(region, context.region_data, where)
     if at is None or not (-50 < at.x < region.width + 50 and -50 < at.y < region.height + 50):
         return
     scale = context.preferences.system.ui_scale
-    write_lines(at.x + shift[0] * scale, at.y + shift[1] * scale, lines, scale, strength)
+    draw_lines(at.x + shift[0] * scale, at.y + shift[1] * scale, lines, scale, strength)
 
 
-def _scale(title: str, stops, factor: float, unit: str):
+def _build_scale_row(title: str, stops, factor: float, unit: str):
     """Build a legend row with a colour scale and its numbers."""
 
-    def row(x: float, y: float, scale: float) -> float:
+    def draw_row(x: float, y: float, scale: float) -> float:
         """Draw the row at pixel x, y; returns its height."""
         size, margin = SIZE * scale, MARGIN * scale
         step, width = LINE * size, SWATCH * scale
@@ -297,18 +297,18 @@ def _scale(title: str, stops, factor: float, unit: str):
         for number, (stop, rgb) in enumerate(zip(stops, colours.SCALE)):
             left = x + margin + number * part
             draw_box(left, y + margin + step, part, 0.6 * size, (*rgb, 1.0))
-            _write_line(left, y + margin + 0.2 * size, f"{factor * stop:g}", size)
-        _write_line(x + margin + width, y + margin + 0.2 * size, unit, size)
-        _write_line(x + margin, y + margin + step + 0.9 * size, title, size)
+            _draw_line(left, y + margin + 0.2 * size, f"{factor * stop:g}", size)
+        _draw_line(x + margin + width, y + margin + 0.2 * size, unit, size)
+        _draw_line(x + margin, y + margin + step + 0.9 * size, title, size)
         return height
 
-    return row
+    return draw_row
 
 
-def _keys(*entries: tuple[str, tuple]):
+def _build_key_row(*entries: tuple[str, tuple]):
     """Build a legend row of coloured squares with labels."""
 
-    def row(x: float, y: float, scale: float) -> float:
+    def draw_row(x: float, y: float, scale: float) -> float:
         """Draw the row at pixel x, y; returns its height."""
         size, margin = SIZE * scale, MARGIN * scale
         blf.size(FONT, size)
@@ -318,30 +318,30 @@ def _keys(*entries: tuple[str, tuple]):
         left = x + margin
         for (text, rgb), width in zip(entries, widths):
             draw_box(left, y + margin + 0.25 * size, 0.8 * size, 0.8 * size, (*rgb, 1.0))
-            _write_line(left + 1.2 * size, y + margin + 0.3 * size, text, size)
+            _draw_line(left + 1.2 * size, y + margin + 0.3 * size, text, size)
             left += width
         return height
 
-    return row
+    return draw_row
 
 
-def _write_line(x: float, y: float, text: str, size: float) -> None:
+def _draw_line(x: float, y: float, text: str, size: float) -> None:
     blf.size(FONT, size)
     blf.color(FONT, 1.0, 1.0, 1.0, 1.0)
     blf.position(FONT, x, y, 0.0)
     blf.draw(FONT, text)
 
 
-WATCHER = Watcher(name="Drawing of overlays", ends=free, draws=((bpy.types.SpaceView3D, _draw_shapes, "POST_VIEW"),
+WATCHER = Watcher(name="Drawing of overlays", ends=clear_batches, draws=((bpy.types.SpaceView3D, _draw_shapes, "POST_VIEW"),
                                                                 (bpy.types.SpaceView3D, _draw_texts, "POST_PIXEL")))
 ROWS = {
-    "track": _scale("Distance to track", colours.ROOT_STOPS, 100.0, "cm"),
-    "footprints": _scale("Foot slide", colours.SLIDE_STOPS, 1000.0, "mm"),
-    "speed": _keys(("track speed", colours.ASKED), ("body speed", colours.PLAYED), ("1 m high: 5 m/s", colours.GREY)),
-    "contacts": _keys(("left", colours.LEFT), ("right", colours.RIGHT)),
-    "rides": _keys(("original", colours.SKY), ("new path", colours.ORANGE), ("tick: 1 s", colours.GREY)),
-    "shots": _keys(("ball trajectory", colours.WHITE), ("other candidates", colours.BLACK),
+    "track": _build_scale_row("Distance to track", colours.ROOT_STOPS, 100.0, "cm"),
+    "footprints": _build_scale_row("Foot slide", colours.SLIDE_STOPS, 1000.0, "mm"),
+    "speed": _build_key_row(("track speed", colours.TRACK_SPEED), ("body speed", colours.BODY_SPEED), ("1 m high: 5 m/s", colours.GREY)),
+    "contacts": _build_key_row(("left", colours.LEFT), ("right", colours.RIGHT)),
+    "rides": _build_key_row(("original", colours.SKY), ("new path", colours.ORANGE), ("tick: 1 s", colours.GREY)),
+    "shots": _build_key_row(("ball trajectory", colours.WHITE), ("other candidates", colours.BLACK),
                    ("after the target", colours.VERMILION), ("striking part", colours.SKY),
                    ("strike", colours.STRIKE), ("bounce", colours.ORANGE)),
-    "moments": _keys(("strike point", colours.STRIKE), ("ball", colours.BALL), ("gap", colours.GAP)),
+    "moments": _build_key_row(("strike point", colours.STRIKE), ("ball", colours.BALL), ("gap", colours.GAP)),
 }

@@ -13,11 +13,11 @@ if TYPE_CHECKING:  # the core's modules are slow to import, and enabling the ext
     from ...beyond_mocap.evaluation.per_frame import Footprint, PerFrame, Strike
     from ...beyond_mocap.library.library import Library
     from ...beyond_mocap.synthesis.plan import Plan
-    from ...beyond_mocap.synthesis.search.why import Reason
+    from ...beyond_mocap.synthesis.search.why import ChoiceReason
     from ...beyond_mocap.synthesis.take import Take
 
-RAIL, SOLE, SOLE_EDGE, SEAM = 0.020, 0.024, 0.027, 0.030  # metres above the ground, each above the one before
-RAILS, HALF_SEAM = (0.13, 0.17), 0.35
+RAIL, SOLE, SOLE_EDGE, TRANSITION = 0.020, 0.024, 0.027, 0.030  # metres above the ground, each above the one before
+RAILS, HALF_TRANSITION = (0.13, 0.17), 0.35
 SPEED_FOOT, PER_SPEED = 0.05, 0.2  # metres of the speed curtain's lower edge, and of its height for each m/s
 BALL_SECONDS = 1.0
 MOST_PARTS = 4
@@ -40,20 +40,20 @@ class Mesh:
     width: float = 1.0
 
 
-def line_mesh(points: np.ndarray, colour, width: float, alpha: float = 1.0) -> Mesh:
+def build_line_mesh(points: np.ndarray, colour, width: float, alpha: float = 1.0) -> Mesh:
     """Build a polyline through points (T, 3) m."""
-    return repeated_mesh(shapes.along(points), colour, width, alpha)
+    return build_uniform_mesh(shapes.build_polyline(points), colour, width, alpha)
 
 
-def segments_mesh(start: np.ndarray, end: np.ndarray, colour, width: float, alpha: float = 1.0) -> Mesh:
+def build_segments_mesh(start: np.ndarray, end: np.ndarray, colour, width: float, alpha: float = 1.0) -> Mesh:
     """Build lines from start to end, both (..., 3) m."""
     points = np.stack([start, end], axis=-2).reshape(-1, 3).astype(np.float32)
-    return repeated_mesh(points, colour, width, alpha)
+    return build_uniform_mesh(points, colour, width, alpha)
 
 
-def repeated_mesh(points: np.ndarray, colour, width: float, alpha: float = 1.0) -> Mesh:
+def build_uniform_mesh(points: np.ndarray, colour, width: float, alpha: float = 1.0) -> Mesh:
     """Build lines of one colour between pairs of points (2 N, 3) m."""
-    return Mesh("LINES", points, colours.repeated(colour, len(points), alpha), width)
+    return Mesh("LINES", points, colours.repeat_colour(colour, len(points), alpha), width)
 
 
 @dataclass(frozen=True)
@@ -91,7 +91,7 @@ class Label:
 
 
 @dataclass(frozen=True, eq=False)
-class Prepared:
+class PreparedTake:
     """Everything to draw of one take.
 
     Attributes:
@@ -116,24 +116,24 @@ class Prepared:
     meshes: dict[str, tuple[Mesh, ...]]
     pelvis: np.ndarray
     toes: np.ndarray
-    stands: np.ndarray
+    contacts: np.ndarray
     figures: np.ndarray
     pairs: np.ndarray
     pair_colours: np.ndarray
-    seams: tuple[int, ...]
+    transitions: tuple[int, ...]
     pieces: tuple[Piece, ...]
     labels: tuple[Label, ...]
 
-    def frame(self, seconds: float) -> int:
+    def find_frame(self, seconds: float) -> int:
         """Find the output frame nearest to a second, within the take."""
         return min(max(round((seconds - self.start) * self.fps), 0), self.count - 1)
 
-    def piece(self, seconds: float) -> Piece | None:
+    def find_piece(self, seconds: float) -> Piece | None:
         """Find the piece that is played at a second."""
         return next((p for p in self.pieces if p.start <= seconds < p.end), None)
 
 
-def prepare(plan: "Plan", take: "Take", library: "Library | None") -> Prepared:
+def prepare_take(plan: "Plan", take: "Take", library: "Library | None") -> PreparedTake:
     """Build everything to draw of one take.
 
     Args:
@@ -143,136 +143,136 @@ def prepare(plan: "Plan", take: "Take", library: "Library | None") -> Prepared:
     Returns:
         Meshes and texts.
     """
-    from ...beyond_mocap.evaluation.per_frame import footprints, per_frame, strikes
+    from ...beyond_mocap.evaluation.per_frame import find_footprints, measure_per_frame, find_strikes
     from ...beyond_mocap.evaluation.reference import View
-    from ...beyond_mocap.synthesis.quality.played import played_from_take
+    from ...beyond_mocap.synthesis.quality.played import playback_from_take
 
-    view = View(played_from_take(take), plan.track, take.timeline, library)
-    figures, met = per_frame(view), strikes(view)
+    view = View(playback_from_take(take), plan.track, take.timeline, library)
+    figures, strike_list = measure_per_frame(view), find_strikes(view)
     positions = view.played.positions.astype(np.float32)
-    ground = view.played.pelvis if view.wanted is None else figures.track
+    ground = view.played.pelvis if view.target is None else figures.track
     skeleton = take.motion.skeleton
-    pairs = shapes.figure_pairs(skeleton.parents)
-    meshes = {"track": _track(figures),
-              "footprints": _footprints(footprints(view)),
-              "seams": _seams(view.played.pelvis, take.seams),
-              "moments": _moments(met, take),
-              "speed": _speed(ground, figures)}
-    return Prepared(start=float(take.start_time), fps=float(take.motion.fps), count=len(take.motion),
+    pairs = shapes.list_figure_pairs(skeleton.parents)
+    meshes = {"track": _build_track(figures),
+              "footprints": _build_footprints(find_footprints(view)),
+              "seams": _build_transitions(view.played.pelvis, take.seams),
+              "moments": _build_moments(strike_list, take),
+              "speed": _build_speed(ground, figures)}
+    return PreparedTake(start=float(take.start_time), fps=float(take.motion.fps), count=len(take.motion),
                     meshes={name: found for name, found in meshes.items() if found},
                     pelvis=positions[:, view.played.body.hips], toes=view.played.feet[:, :, 1].astype(np.float32),
-                    stands=view.played.contacts, figures=positions, pairs=pairs,
-                    pair_colours=_pair_colours(skeleton.names, pairs), seams=tuple(int(seam) for seam in take.seams),
-                    pieces=_pieces(plan, take, library, view.played.pelvis),
-                    labels=tuple(_label(strike) for strike in met))
+                    contacts=view.played.contacts, figures=positions, pairs=pairs,
+                    pair_colours=_build_pair_colours(skeleton.names, pairs), transitions=tuple(int(seam) for seam in take.seams),
+                    pieces=_build_pieces(plan, take, library, view.played.pelvis),
+                    labels=tuple(_build_label(strike) for strike in strike_list))
 
 
-def _track(figures: "PerFrame") -> tuple[Mesh, ...]:
+def _build_track(figures: "PerFrame") -> tuple[Mesh, ...]:
     """Build rails along the measured track, coloured by root error, with footprints visible in between."""
     if len(figures.times) < 2 or not np.isfinite(figures.track).all():
         return ()
-    points, owner = shapes.rails(figures.track, *RAILS, RAIL)
-    return (Mesh("TRIS", points, colours.scaled(figures.root_error, colours.ROOT_STOPS, 0.9)[owner]),)
+    points, owner = shapes.build_rails(figures.track, *RAILS, RAIL)
+    return (Mesh("TRIS", points, colours.map_to_colours(figures.root_error, colours.ROOT_STOPS, 0.9)[owner]),)
 
 
-def _footprints(found: tuple["Footprint", ...]) -> tuple[Mesh, ...]:
+def _build_footprints(found: tuple["Footprint", ...]) -> tuple[Mesh, ...]:
     """Build soles coloured by slide, with edges coloured by side."""
     if not found:
         return ()
     side = np.array([p.side for p in found])
     places = [np.array([getattr(p, name) for p in found]) for name in ("heel", "toe", "direction")]
-    fill, edge = shapes.soles(*places, side, SOLE)
-    slide = colours.scaled(np.array([p.slide for p in found]), colours.SLIDE_STOPS, 0.8)
+    fill, edge = shapes.build_soles(*places, side, SOLE)
+    slide = colours.map_to_colours(np.array([p.slide for p in found]), colours.SLIDE_STOPS, 0.8)
     sides = np.array([(*colours.LEFT, 1.0), (*colours.RIGHT, 1.0)], np.float32)[side]
     edge[:, 2] = SOLE_EDGE
     return (Mesh("TRIS", fill, slide.repeat(len(fill) // len(found), axis=0)),
             Mesh("LINES", edge, sides.repeat(len(edge) // len(found), axis=0), 2.0))
 
 
-def _seams(pelvis: np.ndarray, seams: np.ndarray) -> tuple[Mesh, ...]:
+def _build_transitions(pelvis: np.ndarray, seams: np.ndarray) -> tuple[Mesh, ...]:
     """Build a bar across the path at every transition, light on dark."""
     if not len(seams):
         return ()
-    points = shapes.bars(pelvis, np.asarray(seams, int), HALF_SEAM, SEAM)
-    return repeated_mesh(points, colours.BLACK, 5.0, 0.8), repeated_mesh(points, colours.SEAM, 2.5)
+    points = shapes.build_bars(pelvis, np.asarray(seams, int), HALF_TRANSITION, TRANSITION)
+    return build_uniform_mesh(points, colours.BLACK, 5.0, 0.8), build_uniform_mesh(points, colours.TRANSITION, 2.5)
 
 
-def _moments(found: tuple["Strike", ...], take: "Take") -> tuple[Mesh, ...]:
+def _build_moments(found: tuple["Strike", ...], take: "Take") -> tuple[Mesh, ...]:
     """Build strike points, the ball and its trajectory around them, and the gap between both."""
     from ...beyond_mocap.motion.track import BALL_RADIUS
 
     lines: list[tuple[np.ndarray, tuple]] = []
     for strike in found:
-        lines.append((shapes.cross(strike.part, 0.06), colours.STRIKE))
+        lines.append((shapes.build_cross(strike.part, 0.06), colours.STRIKE))
         if strike.ball is None:
             continue
-        lines.append((shapes.circle(strike.ball, BALL_RADIUS, up=True), colours.BALL))
+        lines.append((shapes.build_circle(strike.ball, BALL_RADIUS, up=True), colours.BALL))
         lines.append((np.array([strike.part, strike.ball], np.float32), colours.GAP))
         near = np.abs(take.ball.times - strike.time) <= BALL_SECONDS
         if near.sum() > 1:
-            lines.append((shapes.along(take.ball.positions[near]), colours.BALL))
+            lines.append((shapes.build_polyline(take.ball.positions[near]), colours.BALL))
     if not lines:
         return ()
     points = np.concatenate([points for points, _ in lines]).astype(np.float32)
-    return (Mesh("LINES", points, np.concatenate([colours.repeated(rgb, len(p)) for p, rgb in lines]), 2.0),)
+    return (Mesh("LINES", points, np.concatenate([colours.repeat_colour(rgb, len(p)) for p, rgb in lines]), 2.0),)
 
 
-def _speed(path: np.ndarray, figures: "PerFrame") -> tuple[Mesh, ...]:
+def _build_speed(path: np.ndarray, figures: "PerFrame") -> tuple[Mesh, ...]:
     """Build the track's speed as a curtain, and the body's as a line."""
-    if len(path) < 2 or not np.isfinite(figures.asked_speed).all() or not np.isfinite(path).all():
+    if len(path) < 2 or not np.isfinite(figures.requested_speed).all() or not np.isfinite(path).all():
         return ()
-    asked, played = (SPEED_FOOT + PER_SPEED * values for values in (figures.asked_speed, figures.speed))
-    fill = shapes.curtain(path, asked, SPEED_FOOT)
-    over = [np.concatenate([path, top[:, None]], axis=1) for top in (asked, played)]
-    return (Mesh("TRIS", fill, colours.repeated(colours.ASKED, len(fill), 0.22)),
-            line_mesh(over[0], colours.ASKED, 1.5), line_mesh(over[1], colours.PLAYED, 2.0))
+    track_height, played = (SPEED_FOOT + PER_SPEED * values for values in (figures.requested_speed, figures.speed))
+    fill = shapes.build_curtain(path, track_height, SPEED_FOOT)
+    over = [np.concatenate([path, top[:, None]], axis=1) for top in (track_height, played)]
+    return (Mesh("TRIS", fill, colours.repeat_colour(colours.TRACK_SPEED, len(fill), 0.22)),
+            build_line_mesh(over[0], colours.TRACK_SPEED, 1.5), build_line_mesh(over[1], colours.BODY_SPEED, 2.0))
 
 
-def _pair_colours(names: tuple[str, ...], pairs: np.ndarray) -> np.ndarray:
-    from ...beyond_mocap.motion.humanoid import side_and_part
+def _build_pair_colours(names: tuple[str, ...], pairs: np.ndarray) -> np.ndarray:
+    from ...beyond_mocap.motion.humanoid import split_joint_name
 
     table = {"left": colours.LEFT, "right": colours.RIGHT}
-    of_joint = [table.get(side_and_part(names[joint])[0], colours.MIDDLE) for _, joint in pairs]
+    of_joint = [table.get(split_joint_name(names[joint])[0], colours.MIDDLE) for _, joint in pairs]
     return np.array([(*rgb, 0.75) for rgb in of_joint], np.float32).repeat(2, axis=0)
 
 
-def _label(strike: "Strike") -> Label:
-    gap = f"  gap {1000 * strike.gap:.0f} mm" if np.isfinite(strike.gap) else ""
+def _build_label(strike: "Strike") -> Label:
+    gap_text = f"  gap {1000 * strike.gap:.0f} mm" if np.isfinite(strike.gap) else ""
     place = strike.part if strike.ball is None else strike.ball
-    return Label(strike.time, tuple(map(float, place)), f"{strike.time:.2f} s  {' '.join(strike.words)}{gap}")
+    return Label(strike.time, tuple(map(float, place)), f"{strike.time:.2f} s  {' '.join(strike.words)}{gap_text}")
 
 
-def _pieces(plan: "Plan", take: "Take", library: "Library | None", pelvis: np.ndarray) -> tuple[Piece, ...]:
+def _build_pieces(plan: "Plan", take: "Take", library: "Library | None", pelvis: np.ndarray) -> tuple[Piece, ...]:
     """Build the pieces, with the reasons of the search if the library is known."""
     last = len(pelvis) - 1
     return tuple(Piece(take.start_time + start, take.start_time + end,
-                       (*map(float, pelvis[min(int(round(start * take.motion.fps)), last)]), SEAM), name, lines)
-                 for start, end, name, lines in _told(plan, take, library))
+                       (*map(float, pelvis[min(int(round(start * take.motion.fps)), last)]), TRANSITION), name, lines)
+                 for start, end, name, lines in _iter_pieces(plan, take, library))
 
 
-def _told(plan: "Plan", take: "Take", library: "Library | None"):
+def _iter_pieces(plan: "Plan", take: "Take", library: "Library | None"):
     """Iterate over start and end (seconds from the take's first), name and lines of every piece."""
     if library is None or take.edit is None:
         edges = [0, *map(int, take.seams), len(take.clip)]
         for low, high in zip(edges, edges[1:]):
-            name = short(take.clips[take.clip[low]], bool(take.mirrored[low]))
-            shown = take.clip_frame[[low, high - 1]]
+            name = shorten_clip_name(take.clips[take.clip[low]], bool(take.mirrored[low]))
+            clip_frames = take.clip_frame[[low, high - 1]]
             yield low / take.motion.fps, high / take.motion.fps, name, (name,
-                                                                        f"frames {shown[0]:.0f} to {shown[1]:.0f}")
+                                                                        f"frames {clip_frames[0]:.0f} to {clip_frames[1]:.0f}")
         return
-    for reason in _reasons(plan, take, library):
-        name = short(reason.path, reason.mirrored)
-        yield reason.first / library.fps, reason.end / library.fps, name, reason_lines(reason, name)
+    for reason in _explain_pieces(plan, take, library):
+        name = shorten_clip_name(reason.path, reason.mirrored)
+        yield reason.first / library.fps, reason.end / library.fps, name, describe_reason(reason, name)
 
 
-def _reasons(plan: "Plan", take: "Take", library: "Library") -> list["Reason"]:
+def _explain_pieces(plan: "Plan", take: "Take", library: "Library") -> list["ChoiceReason"]:
     from ...beyond_mocap.synthesis.resolve_plan import resolve_plan
     from ...beyond_mocap.synthesis.search.why import explain_choices
 
-    return explain_choices(library, resolve_plan(plan, library, course=take.solved), take.edit)
+    return explain_choices(library, resolve_plan(plan, library, trajectory=take.solved), take.edit)
 
 
-def reason_lines(reason: "Reason", name: str) -> tuple[str, ...]:
+def describe_reason(reason: "ChoiceReason", name: str) -> tuple[str, ...]:
     """Describe why a piece was chosen.
 
     Args:
@@ -283,20 +283,20 @@ def reason_lines(reason: "Reason", name: str) -> tuple[str, ...]:
     """
     from ...beyond_mocap.synthesis.search.path_costs import TERMS
 
-    lines = [name, f"frames {reason.shown[0]:.0f} to {reason.shown[1]:.0f}, played at {reason.rate:.2f} x"]
+    lines = [name, f"frames {reason.clip_range[0]:.0f} to {reason.clip_range[1]:.0f}, played at {reason.rate:.2f} x"]
     lines.append(
-        f"cost {reason.cost:.2f}" + (f", {sum(reason.seam.values()):.2f} of it for the cut" if reason.seam else "")
+        f"cost {reason.cost:.2f}" + (f", {sum(reason.cut_costs.values()):.2f} of it for the cut" if reason.cut_costs else "")
     )
-    both = {part: reason.costs.get(part, 0.0) + reason.seam.get(part, 0.0) for part in TERMS}
-    dear = sorted((p for p in both.items() if abs(p[1]) >= 0.005), key=lambda part: -abs(part[1]))[:MOST_PARTS]
-    lines += [f"{value:.2f}  {TERMS[part]}" for part, value in dear]
+    both = {part: reason.costs.get(part, 0.0) + reason.cut_costs.get(part, 0.0) for part in TERMS}
+    costliest = sorted((p for p in both.items() if abs(p[1]) >= 0.005), key=lambda part: -abs(part[1]))[:MOST_PARTS]
+    lines += [f"{value:.2f}  {TERMS[part]}" for part, value in costliest]
     if reason.others:
         lines.append("next candidates:")
-        lines += [f"{other.more:+.2f}  {short(other.path, other.mirrored)}" for other in reason.others]
+        lines += [f"{other.extra_cost:+.2f}  {shorten_clip_name(other.path, other.mirrored)}" for other in reason.others]
     return tuple(lines)
 
 
-def short(path: str, mirrored: bool) -> str:
+def shorten_clip_name(path: str, mirrored: bool) -> str:
     """Shorten a clip's path to its name, with a note if it is mirrored."""
     name = path.rpartition("/")[2].removesuffix(".bvh")
     return f"{name} (mirrored)" if mirrored else name

@@ -16,22 +16,22 @@ PATH_OVERLAYS = ("path_source", "path_new", "path_trackers", "path_residuals", "
 """The overlays of path editing, likewise; they show every armature that follows a path."""
 
 
-def _changed(_settings, context):
+def _update_overlays(_settings, context):
     """Prepare what is missing and redraw the views."""
     if context.scene is not None and not bpy.app.background:
-        store.sync(context.scene)
-        window.redraw()
+        store.update_store(context.scene)
+        window.redraw_editors()
 
 
-@with_settings("view", update=_changed)
+@with_settings("view", update=_update_overlays)
 class BeyondMocapView(bpy.types.PropertyGroup):
     """The overlays' switches."""
 
-    def on(self) -> list[str]:
+    def list_overlays(self) -> list[str]:
         """List the names of the overlays to draw."""
         return [name for name in OVERLAYS if getattr(self, name)] if self.show else []
 
-    def on_path(self) -> list[str]:
+    def list_path_overlays(self) -> list[str]:
         """List the names of the path overlays to draw."""
         return [name for name in PATH_OVERLAYS if getattr(self, name)] if self.show else []
 

@@ -15,7 +15,7 @@ USUAL = 0.28  # metres of a shoe without toe joints
 CIRCLE = 24  # segments
 
 
-def soles(heel: np.ndarray, toe: np.ndarray, direction: np.ndarray, side: np.ndarray, height: float):
+def build_soles(heel: np.ndarray, toe: np.ndarray, direction: np.ndarray, side: np.ndarray, height: float):
     """Build shoe soles of N stances with K corners each.
 
     Args:
@@ -37,11 +37,11 @@ def soles(heel: np.ndarray, toe: np.ndarray, direction: np.ndarray, side: np.nda
     corners = heel[:, None] + x[..., None] * ahead[:, None] + y[..., None] * aside[:, None]
     middle = np.broadcast_to((heel + 0.3 * length[:, None] * ahead)[:, None], corners.shape)
     after = np.roll(corners, -1, axis=1)
-    return (on_ground(np.stack([middle, corners, after], axis=2).reshape(-1, 2), height),
-            on_ground(np.stack([corners, after], axis=2).reshape(-1, 2), height))
+    return (place_on_ground(np.stack([middle, corners, after], axis=2).reshape(-1, 2), height),
+            place_on_ground(np.stack([corners, after], axis=2).reshape(-1, 2), height))
 
 
-def rails(path: np.ndarray, inner: float, outer: float, height: float) -> tuple[np.ndarray, np.ndarray]:
+def build_rails(path: np.ndarray, inner: float, outer: float, height: float) -> tuple[np.ndarray, np.ndarray]:
     """Build two bands along a path.
 
     Args:
@@ -52,64 +52,64 @@ def rails(path: np.ndarray, inner: float, outer: float, height: float) -> tuple[
     Returns:
         Triangles (12 (T - 1), 3), and the path point of each corner.
     """
-    aside = across(path)
-    bands = [_band(path + sign * inner * aside, path + sign * outer * aside, height) for sign in (1.0, -1.0)]
+    aside = compute_left(path)
+    bands = [_build_band(path + sign * inner * aside, path + sign * outer * aside, height) for sign in (1.0, -1.0)]
     return tuple(np.concatenate(parts) for parts in zip(*bands))
 
 
-def _band(left: np.ndarray, right: np.ndarray, height: float) -> tuple[np.ndarray, np.ndarray]:
+def _build_band(left: np.ndarray, right: np.ndarray, height: float) -> tuple[np.ndarray, np.ndarray]:
     a, b = np.arange(len(left) - 1), np.arange(1, len(left))
     corners = np.stack([left[a], right[a], right[b], left[a], right[b], left[b]], axis=1)
     owner = np.stack([a, a, b, a, b, b], axis=1)
-    return on_ground(corners.reshape(-1, 2), height), owner.ravel()
+    return place_on_ground(corners.reshape(-1, 2), height), owner.ravel()
 
 
-def curtain(path: np.ndarray, top: np.ndarray, foot: float) -> np.ndarray:
+def build_curtain(path: np.ndarray, top: np.ndarray, foot: float) -> np.ndarray:
     """Build an upright band along path (T, 2) m from height `foot` to top (T,) m: triangles (6 (T - 1), 3)."""
-    low = on_ground(path, foot)
+    low = place_on_ground(path, foot)
     high = np.concatenate([path, top[:, None]], axis=1).astype(np.float32)
     a, b = slice(None, -1), slice(1, None)
     return np.stack([low[a], low[b], high[b], low[a], high[b], high[a]], axis=1).reshape(-1, 3)
 
 
-def along(points: np.ndarray) -> np.ndarray:
+def build_polyline(points: np.ndarray) -> np.ndarray:
     """Build lines (2 (T - 1), 3) through points (T, 3) m."""
     return np.stack([points[:-1], points[1:]], axis=1).reshape(-1, 3).astype(np.float32)
 
 
-def bars(path: np.ndarray, at: np.ndarray, half_width: float, height: float) -> np.ndarray:
+def build_bars(path: np.ndarray, at: np.ndarray, half_width: float, height: float) -> np.ndarray:
     """Build bars across path (T, 2) m at its points `at` (S,): lines (2 S, 3)."""
-    aside = across(path)[at] * half_width
-    return on_ground(np.stack([path[at] - aside, path[at] + aside], axis=1).reshape(-1, 2), height)
+    aside = compute_left(path)[at] * half_width
+    return place_on_ground(np.stack([path[at] - aside, path[at] + aside], axis=1).reshape(-1, 2), height)
 
 
-def circle(centre, radius: float, up: bool = False) -> np.ndarray:
+def build_circle(centre, radius: float, up: bool = False) -> np.ndarray:
     """Build a circle about centre (3,) m, flat, or also upright in two planes: lines (n, 3)."""
     angle = np.linspace(0.0, 2.0 * np.pi, CIRCLE + 1)
     c, s, zero = radius * np.cos(angle), radius * np.sin(angle), np.zeros(CIRCLE + 1)
     rings = [np.stack(parts, axis=1) for parts in ((c, s, zero), (c, zero, s), (zero, c, s))]
-    return np.concatenate([along(ring + centre) for ring in (rings if up else rings[:1])])
+    return np.concatenate([build_polyline(ring + centre) for ring in (rings if up else rings[:1])])
 
 
-def disc(radius: float) -> np.ndarray:
+def build_disc(radius: float) -> np.ndarray:
     """Build a flat disc about the origin: triangles (3 CIRCLE, 3)."""
     angle = np.linspace(0.0, 2.0 * np.pi, CIRCLE + 1)
     rim = np.stack([radius * np.cos(angle), radius * np.sin(angle), 0.0 * angle], axis=1)
     return np.stack([0.0 * rim[:-1], rim[:-1], rim[1:]], axis=1).reshape(-1, 3).astype(np.float32)
 
 
-def cross(centre, size: float) -> np.ndarray:
+def build_cross(centre, size: float) -> np.ndarray:
     """Build a three-dimensional cross: lines (6, 3)."""
     arms = np.eye(3).repeat(2, axis=0) * np.tile([size, -size], 3)[:, None]
     return (arms + centre).astype(np.float32)
 
 
-def figure_pairs(parents) -> np.ndarray:
+def list_figure_pairs(parents) -> np.ndarray:
     """List the joints (B, 2) that the lines of a stick figure join, without the root's own line."""
     return np.array([(parent, joint) for joint, parent in enumerate(parents) if parent >= 0])
 
 
-def across(path: np.ndarray) -> np.ndarray:
+def compute_left(path: np.ndarray) -> np.ndarray:
     """Compute unit vectors (T, 2) to the left of a path (T, 2); where it stays in place, those of the frame before."""
     step = np.gradient(path, axis=0) if len(path) > 1 else np.ones((1, 2))
     length = np.linalg.norm(step, axis=1)
@@ -122,6 +122,6 @@ def across(path: np.ndarray) -> np.ndarray:
     return np.stack([-step[:, 1], step[:, 0]], axis=1)
 
 
-def on_ground(points: np.ndarray, height: float) -> np.ndarray:
+def place_on_ground(points: np.ndarray, height: float) -> np.ndarray:
     """Build points (N, 3) float32 from points (N, 2) m at one height."""
     return np.concatenate([points, np.full((len(points), 1), height)], axis=1).astype(np.float32)

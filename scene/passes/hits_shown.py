@@ -14,8 +14,8 @@ import numpy as np
 from ..core import action, channels
 from ..core.live import Watcher
 from ..path_editing.carrier import check_finite
-from ..path_editing.rigs import carrier_of, rides_as_rig
-from .settings import BeyondMocapHits, found_of, picture_name, pictures
+from ..path_editing.rigs import choose_adapter, is_edited_as_rig
+from .settings import BeyondMocapHits, parse_hits, name_picture, pictures
 
 if TYPE_CHECKING:
     from ...beyond_mocap.motion.motion import Motion
@@ -31,7 +31,7 @@ _STRETCH, _MOTION = (0.95, 0.25, 0.22), (0.28, 0.45, 0.95)
 _EDGE, _BARS = 6, 44  # pixels around the curves, and of the bars at the bottom
 
 
-def motion_of(scene: bpy.types.Scene, body: bpy.types.Object) -> tuple["Motion", int]:
+def read_motion(scene: bpy.types.Scene, body: bpy.types.Object) -> tuple["Motion", int]:
     """Read the motion of an armature.
 
     Args:
@@ -43,13 +43,13 @@ def motion_of(scene: bpy.types.Scene, body: bpy.types.Object) -> tuple["Motion",
     Raises:
         InputError: if the armature does not move.
     """
-    if body.beyond_mocap_ride.on or (channels.playing(body)[0] is not None and not rides_as_rig(body)):
-        return action.read(body, scene), action.first_frame(body)
-    read = carrier_of(body).read(scene)
-    return read.motion, read.first
+    if body.beyond_mocap_ride.on or (channels.find_playing_action(body)[0] is not None and not is_edited_as_rig(body)):
+        return action.read_motion(body, scene), action.find_first_frame(body)
+    carrier_motion = choose_adapter(body).read_motion(scene)
+    return carrier_motion.motion, carrier_motion.first
 
 
-def analyse(
+def analyse_armature(
     scene: bpy.types.Scene, body: bpy.types.Object, part: str, side: str, threshold: float = 0.0, bone: str = "",
     markers: bool = True,
 ) -> "Hits":
@@ -65,26 +65,26 @@ def analyse(
     Returns:
         The hit analysis.
     """
-    from ...beyond_mocap.passes.hits import analyse as find
+    from ...beyond_mocap.passes.hits import detect_hits as find
 
     channels.check_local(body)
-    motion, first = motion_of(scene, body)
+    motion, first = read_motion(scene, body)
     check_finite(body, motion)
-    found = find(motion, part, side, threshold or None, bone or None)
+    hits_found = find(motion, part, side, threshold or None, bone or None)
     hits = body.beyond_mocap_hits
     hits.part, hits.side, hits.bone, hits.threshold = part, side or "right", bone, threshold
-    hits.found = json.dumps(summary(found, first))
-    hits.lines = "\n".join(lines(found, first))
-    played = channels.playing(body)[0]
-    if played is not None and played.library is None:
-        unmark(played)
+    hits.found = json.dumps(summarize_hits(hits_found, first))
+    hits.lines = "\n".join(describe_hits(hits_found, first))
+    played_action = channels.find_playing_action(body)[0]
+    if played_action is not None and played_action.library is None:
+        remove_markers(played_action)
         if markers:
-            mark(played, found, first)
-    paint(hits)
-    return found
+            set_markers(played_action, hits_found, first)
+    paint_picture(hits)
+    return hits_found
 
 
-def summary(found: "Hits", first: int) -> dict:
+def summarize_hits(found: "Hits", first: int) -> dict:
     """Build what is stored of an analysis: curves of `_COLUMNS` values at most, and frames of the motion.
 
     Args:
@@ -97,65 +97,65 @@ def summary(found: "Hits", first: int) -> dict:
               for name in ("height", "speed")}
     return {"first": int(first), "count": count, "fps": round(float(found.fps), 4),
             "threshold": round(float(found.threshold), 4), **curves, "highs": [int(frame) for frame in found.highs],
-            "fasts": [int(frame) for frame in found.fasts], "stretches": _pairs(found.ball_stretches),
-            "links": _pairs(found.links), "motions": [[int(one.first), int(one.last)] for one in found.motions],
+            "fasts": [int(frame) for frame in found.fasts], "stretches": _list_pairs(found.ball_stretches),
+            "links": _list_pairs(found.links), "motions": [[int(one.first), int(one.last)] for one in found.motions],
             "keys": [int(one.key) for one in found.motions]}
 
 
-def lines(found: "Hits", first: int) -> list[str]:
+def describe_hits(found: "Hits", first: int) -> list[str]:
     """Describe each hit motion in a line: scene frame of its strike, a tab, its speed, and when a ball can be hit."""
-    told = []
+    rows = []
     for one in found.motions:
         low, high = (first + frame for frame in one.ball_stretch)
-        told.append(f"{first + one.key}\t{one.max_speed:.1f} m/s, ball {low} to {high}")
-    return told
+        rows.append(f"{first + one.key}\t{one.max_speed:.1f} m/s, ball {low} to {high}")
+    return rows
 
 
-def mark(played: bpy.types.Action, found: "Hits", first: int) -> None:
+def set_markers(played_action: bpy.types.Action, found: "Hits", first: int) -> None:
     """Set markers on an action: at the strike, and where its ball stretch begins and ends."""
     name = " ".join(filter(None, (found.side, found.part)))
     for one in found.motions:
         low, high = one.ball_stretch
         for frame, text in ((low, f"{MARKER} from"), (high, f"{MARKER} to"), (one.key, f"{MARKER} {name}")):
-            marker = played.pose_markers.new(text)
+            marker = played_action.pose_markers.new(text)
             marker.frame, marker.beyond_mocap.shown = int(first + frame), marker.name
 
 
-def unmark(played: bpy.types.Action) -> None:
+def remove_markers(played_action: bpy.types.Action) -> None:
     """Remove the markers that a hit analysis has set on an action; other and renamed markers stay."""
-    for marker in list(played.pose_markers):
+    for marker in list(played_action.pose_markers):
         record = marker.beyond_mocap
         if record.kind == "none" and record.shown == marker.name and marker.name.startswith(MARKER):
-            played.pose_markers.remove(marker)
+            played_action.pose_markers.remove(marker)
 
 
-def repaint() -> None:
+def repaint_all() -> None:
     """Paint all analyses if there is a window, after a file was opened or an undo."""
     for thing in () if bpy.app.background else bpy.data.objects:
         if thing.type == "ARMATURE" and thing.beyond_mocap_hits.found:
-            paint(thing.beyond_mocap_hits)
+            paint_picture(thing.beyond_mocap_hits)
 
 
-def _pairs(stretches) -> list[list[int]]:
+def _list_pairs(stretches) -> list[list[int]]:
     return [[int(first), int(last)] for first, last in stretches]
 
 
-def paint(hits: BeyondMocapHits) -> None:
+def paint_picture(hits: BeyondMocapHits) -> None:
     """Paint the picture of an analysis, unless it is painted already."""
-    name = picture_name(hits)
+    name = name_picture(hits)
     if bpy.app.background or not hits.found:
         return
     if "graphs" not in pictures:
         pictures["graphs"] = bpy.utils.previews.new()
     if name in pictures["graphs"]:
         return
-    pixels = picture(found_of(hits))
+    pixels = build_picture(parse_hits(hits))
     preview = pictures["graphs"].new(name)
     preview.image_size = pixels.shape[1], pixels.shape[0]
     preview.image_pixels_float = pixels.ravel().tolist()
 
 
-def picture(found: dict) -> np.ndarray:
+def build_picture(found: dict) -> np.ndarray:
     """Build the picture of an analysis.
 
     The upper curve is the part's height, the lower one its speed. Thin red lines mark the high frames, magenta ones the
@@ -171,17 +171,17 @@ def picture(found: dict) -> np.ndarray:
     count, middle = max(found["count"] - 1, 1), _BARS + (SIZE - _BARS) // 2
     panes = ((middle + _EDGE, SIZE - _EDGE), (_BARS + _EDGE, middle - _EDGE))
 
-    def column(frame: float) -> int:
+    def column_of(frame: float) -> int:
         """Column of the picture for a frame."""
         return int(round(_EDGE + frame / count * (SIZE - 1 - 2 * _EDGE)))
 
     for second in np.arange(0.0, found["count"], found["fps"]):
-        image[_BARS:, column(second), :3] = _GRID
+        image[_BARS:, column_of(second), :3] = _GRID
     image[middle, :, :3] = _GRID
     for first, last in found["motions"]:
-        image[6:16, column(first) : column(last) + 1, :3] = _MOTION
+        image[6:16, column_of(first) : column_of(last) + 1, :3] = _MOTION
     for first, last in found["stretches"]:
-        image[22:38, column(first) - 1 : column(last) + 2, :3] = _STRETCH
+        image[22:38, column_of(first) - 1 : column_of(last) + 2, :3] = _STRETCH
     for (low, high), name, frames, colour, mark in (
         (panes[0], "height", "highs", _HEIGHT, _HIGH), (panes[1], "speed", "fasts", _SPEED, _FAST)
     ):
@@ -189,7 +189,7 @@ def picture(found: dict) -> np.ndarray:
         top = max(float(values.max()), found["threshold"] if name == "height" else 0.0, 1e-6)
         bottom = min(float(values.min()), 0.0)
         for frame in found[frames]:
-            image[low:high, column(frame), :3] = mark
+            image[low:high, column_of(frame), :3] = mark
         if name == "height":
             level = int(low + (found["threshold"] - bottom) / (top - bottom) * (high - low - 1))
             image[level, _EDGE : SIZE - _EDGE : 3, :3] = _LEVEL
@@ -197,10 +197,10 @@ def picture(found: dict) -> np.ndarray:
     return image
 
 
-def forget_pictures() -> None:
+def remove_pictures() -> None:
     """Remove all pictures."""
-    for kept in pictures.values():
-        bpy.utils.previews.remove(kept)
+    for preview in pictures.values():
+        bpy.utils.previews.remove(preview)
     pictures.clear()
 
 
@@ -218,4 +218,4 @@ def _draw_curve(image: np.ndarray, heights: np.ndarray, colour) -> None:
     image[:, _EDGE : SIZE - _EDGE, :3] += cover * (np.array(colour) - image[:, _EDGE : SIZE - _EDGE, :3])
 
 
-WATCHER = Watcher(name="Hit analysis", restored=repaint, loaded=repaint, ends=forget_pictures)
+WATCHER = Watcher(name="Hit analysis", restored=repaint_all, loaded=repaint_all, ends=remove_pictures)

@@ -22,13 +22,13 @@ _seen = {"begun": "", "drawn": ""}
 _running: list[background.Job] = []  # at most one
 
 
-def edited(scene: bpy.types.Scene) -> str:
+def find_edit(scene: bpy.types.Scene) -> str:
     """Compute the digest of the requested scene if it differs from the scene that is shown, otherwise ""."""
     settings = scene.beyond_mocap_passes
     if not settings.live or settings.made_of in ("", PLAYED):
         return ""
     try:
-        digest = make.order_of(scene).digest
+        digest = make.build_order(scene).digest
     except BeyondMocapError as error:
         if settings.told != str(error):
             settings.told = str(error)
@@ -36,21 +36,21 @@ def edited(scene: bpy.types.Scene) -> str:
     return digest if digest != settings.made_of else ""
 
 
-def look_at(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+def mark_edit(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     """Mark the scene as possibly edited."""
     settings = scene.beyond_mocap_passes
     if settings.live and settings.made_of and any(isinstance(one.id, bpy.types.Object) for one in depsgraph.updates):
-        WATCHER.mark()
+        WATCHER.mark_dirty()
 
 
-def settle(scene: bpy.types.Scene) -> bool:
+def settle_edit(scene: bpy.types.Scene) -> bool:
     """Start an update if the scene was edited; return whether that has to wait."""
-    if _busy():
+    if _is_busy():
         return True
-    _rest()
-    digest = edited(scene)
+    _stop_drag()
+    digest = find_edit(scene)
     if not digest:
-        make.show_dragged(None)
+        make.show_drag(None)
     # each request starts once, also if it fails or is cancelled
     if digest and digest != _seen["begun"]:
         _seen["begun"] = digest
@@ -59,13 +59,13 @@ def settle(scene: bpy.types.Scene) -> bool:
     return False
 
 
-def _busy() -> bool:
+def _is_busy() -> bool:
     return is_playing() or bpy.context.window_manager.beyond_mocap_work.kind not in ("", "passes")
 
 
-def _drag(scene) -> None:
+def _update_drag(scene) -> None:
     """Draw the flights that are planned, and start to plan those of the current places."""
-    if _busy():
+    if _is_busy():
         return
     if _running:
         if not _running[0].poll():
@@ -73,33 +73,33 @@ def _drag(scene) -> None:
         job = _running.pop()
         # None: the job was cancelled or failed
         if job.result is not None:
-            make.show_dragged(job.result)
-            window.redraw()
+            make.show_drag(job.result)
+            window.redraw_editors()
     settings = scene.beyond_mocap_passes
     if not settings.live or settings.made_of in ("", PLAYED):
         return
     try:
-        order = make.order_of(scene)
+        order = make.build_order(scene)
     except BeyondMocapError:  # the player is at an impossible place just now
         return
     if order.library is not None and order.digest != _seen["drawn"]:
         _seen["drawn"] = order.digest
-        _running.append(background.Job(KIND, lambda _progress, cancelled, _hurry: make.flights(order, cancelled)))
+        _running.append(background.Job(KIND, lambda _progress, cancelled, _hurry: make.plan_flights(order, cancelled)))
 
 
-def _rest() -> None:
+def _stop_drag() -> None:
     """Stop planning flights for a drag."""
     if _running:
         _running.pop().cancel()
     _seen["drawn"] = ""
 
 
-def forget() -> None:
+def clear_updates() -> None:
     """Stop updates and remove what is drawn."""
     _seen["begun"] = ""
-    _rest()
-    make.forget_rallies()
+    _stop_drag()
+    make.clear_trajectories()
 
 
-WATCHER = Watcher(name="Passing scene", changed=look_at, settle=settle, dragged=_drag, loaded=make.forget_rallies,
-                  ends=forget)
+WATCHER = Watcher(name="Passing scene", changed=mark_edit, settle=settle_edit, dragged=_update_drag, loaded=make.clear_trajectories,
+                  ends=clear_updates)

@@ -20,11 +20,11 @@ from mathutils import Matrix, Quaternion, Vector
 
 from ...beyond_mocap.base.easing import smoothstep
 from ...beyond_mocap.base.errors import InputError
-from ...beyond_mocap.motion.humanoid import identify
+from ...beyond_mocap.motion.humanoid import identify_joints
 from ..core import channels
 from ..core.measure import frames_per_second, units_per_metre
-from ..core.set_aside import bring_back, put_aside
-from ..path_editing.rig_look import alone, channel_of, turns
+from ..core.set_aside import restore_playback, save_playback
+from ..path_editing.rig_look import create_private_scene, find_rotation_channel, to_rotations
 from ..result.result import BeyondMocapBefore
 from ..rigs import armature
 from .settings import KEPT, BeyondMocapHold
@@ -32,20 +32,20 @@ from .settings import KEPT, BeyondMocapHold
 CONSTANT = 0  # value of Keyframe.interpolation for foreach_set
 FASTEST = 8.0  # m/s with which a ball moves to its carried position; over a long distance it takes longer than set
 JUST_BEFORE = 0.02  # frames; Blender merges keys within 0.01
-SURFACE = {"hand": 0.03, "foot": 0.045, "head": 0.1, "chest": 0.12}  # m from a bone to the skin over it
+SKIN_DISTANCES = {"hand": 0.03, "foot": 0.045, "head": 0.1, "chest": 0.12}  # m from a bone to the skin over it
 
 
-def bone_of(scene: bpy.types.Scene, body: bpy.types.Object, part: str, side: str) -> str:
+def find_bone(scene: bpy.types.Scene, body: bpy.types.Object, part: str, side: str) -> str:
     """Find the bone of a part.
 
     Raises:
         InputError: if the skeleton lacks it.
     """
-    skeleton = armature.skeleton_of(body, scene)
-    found = identify(skeleton)
-    limb = getattr(found, side)
+    skeleton = armature.build_skeleton(body, scene)
+    humanoid = identify_joints(skeleton)
+    limb = getattr(humanoid, side)
     joint = {
-        "foot": limb.toe_or_foot, "hand": limb.hand, "tool": limb.hand, "head": found.head, "chest": found.chest,
+        "foot": limb.toe_or_foot, "hand": limb.hand, "tool": limb.hand, "head": humanoid.head, "chest": humanoid.chest,
     }[part]  # fmt: skip
     if joint is None:
         raise InputError(f"armature {body.name}", f"no bone for the {part}", "a humanoid skeleton",
@@ -53,9 +53,9 @@ def bone_of(scene: bpy.types.Scene, body: bpy.types.Object, part: str, side: str
     return skeleton.names[joint]
 
 
-def take(
+def add_hold(
     scene: bpy.types.Scene, ball: bpy.types.Object, body: bpy.types.Object, bone: str, first: int, last: int,
-    how: str = "KEEP", settle: int = 4, skin: float = 0.03,
+    mode: str = "KEEP", settle: int = 4, skin: float = 0.03,
 ) -> BeyondMocapHold:
     """Attach the ball to a bone.
 
@@ -74,31 +74,31 @@ def take(
     Raises:
         InputError: if the ball cannot be carried; nothing is changed then.
     """
-    _check(ball, body, bone, first, last)
+    _check_hold(ball, body, bone, first, last)
     for other in ball.beyond_mocap_ball.holds:
         if first < other.last and other.first < last:
             raise InputError(f"ball {ball.name}",
-                             f"already carried by {holder_name(other)} on frames {other.first} to {other.last}",
+                             f"already carried by {describe_holder(other)} on frames {other.first} to {other.last}",
                              "other frames", "free the ball there first")
     if not ball.beyond_mocap_ball.before.kept:
-        put_aside(ball.beyond_mocap_ball.before, ball)
+        save_playback(ball.beyond_mocap_ball.before, ball)
     hold = ball.beyond_mocap_ball.holds.add()
     hold.body, hold.bone, hold.first, hold.last = body, bone, first, last
-    hold.how, hold.settle, hold.skin = how, settle, skin
+    hold.how, hold.settle, hold.skin = mode, settle, skin
     constraint = ball.constraints.new("CHILD_OF")
     constraint.name = f"Carried by {body.name}"
     constraint.target, constraint.subtarget = body, bone
     constraint.use_scale_x = constraint.use_scale_y = constraint.use_scale_z = False
     constraint.influence = 0.0
     hold.name = constraint.name
-    rebuild(scene, ball)
+    rebuild_action(scene, ball)
     return hold
 
 
-def free(scene: bpy.types.Scene, ball: bpy.types.Object, number: int | None = None) -> None:
+def remove_holds(scene: bpy.types.Scene, ball: bpy.types.Object, number: int | None = None) -> None:
     """Remove one stretch in which the ball is carried, or all; after the last one it plays its own action again."""
     channels.check_local(ball)
-    channels.check_free(ball)
+    channels.check_editable(ball)
     check_unaimed(ball)
     own = ball.beyond_mocap_ball
     for index in reversed(range(len(own.holds)) if number is None else [number]):
@@ -106,49 +106,49 @@ def free(scene: bpy.types.Scene, ball: bpy.types.Object, number: int | None = No
         if constraint is not None:
             ball.constraints.remove(constraint)
         own.holds.remove(index)
-    if any(_holds(ball, hold) for hold in own.holds):
-        rebuild(scene, ball)
+    if any(_is_valid_hold(ball, hold) for hold in own.holds):
+        rebuild_action(scene, ball)
     elif own.before.kept:
-        bring_back(own.before, ball, KEPT)
+        restore_playback(own.before, ball, KEPT)
 
 
-def rebuild(scene: bpy.types.Scene, ball: bpy.types.Object) -> None:
+def rebuild_action(scene: bpy.types.Scene, ball: bpy.types.Object) -> None:
     """Build the ball's action from its own path and all stretches in which it is carried.
 
     Stretches whose armature, bone or constraint no longer exists are ignored; at least one is left.
     """
-    holds = sorted((hold for hold in ball.beyond_mocap_ball.holds if _holds(ball, hold)), key=lambda hold: hold.first)
-    frames, way, ends = own_way(scene, ball, holds)
-    own, lets_go = list(way), []
+    holds = sorted((hold for hold in ball.beyond_mocap_ball.holds if _is_valid_hold(ball, hold)), key=lambda hold: hold.first)
+    frames, own_places, ends = sample_own_path(scene, ball, holds)
+    own, releases = list(own_places), []
     for hold in holds:
         a, b = hold.first - frames[0], hold.last - frames[0]
-        bones = _bones(scene, hold)
-        seen = _carried(scene, hold, bones, start=own[a],
+        bones = _sample_bone(scene, hold)
+        carried = _compute_carried(scene, hold, bones, start=own[a],
                         end=own[b] if ends is not None and ends[1] > hold.last else None, ball=ball)
         # the constraint's inverse is that of the bone on the first frame, so there is no jump there
         inverse = bones[0]
         ball.constraints[hold.name].inverse_matrix = inverse.inverted()
-        lets_go.append((hold, inverse @ seen[-1]))
+        releases.append((hold, inverse @ carried[-1]))
         # no path of its own after this stretch
         if ends is None or ends[1] <= hold.last:  # it stays where it was released
-            own[b:] = [bones[-1] @ seen[-1]] * (len(own) - b)
-        own[a:b] = [inverse @ place for place in seen[:-1]]
-    _write(ball, frames, own, lets_go)
+            own[b:] = [bones[-1] @ carried[-1]] * (len(own) - b)
+        own[a:b] = [inverse @ place for place in carried[:-1]]
+    _write_action(ball, frames, own, releases)
 
 
-def anew(scene: bpy.types.Scene, ball: bpy.types.Object, write) -> None:
+def replace_own_action(scene: bpy.types.Scene, ball: bpy.types.Object, write) -> None:
     """Replace the ball's own action by calling `write()`; stretches in which it is carried apply to its new path."""
     own, name = ball.beyond_mocap_ball, ball.name
-    carried = any(_holds(ball, hold) for hold in own.holds)
+    carried = any(_is_valid_hold(ball, hold) for hold in own.holds)
     if own.before.kept:
-        bring_back(own.before, ball, KEPT)
+        restore_playback(own.before, ball, KEPT)
     write()
     if carried and bpy.data.objects.get(name) == ball and not own.before.kept:  # `write` may have called this
-        put_aside(own.before, ball)
-        rebuild(scene, ball)
+        save_playback(own.before, ball)
+        rebuild_action(scene, ball)
 
 
-def own_way(
+def sample_own_path(
     scene: bpy.types.Scene, ball: bpy.types.Object, holds
 ) -> tuple[np.ndarray, list[Matrix], tuple[int, int] | None]:
     """Sample the ball's own path.
@@ -158,16 +158,16 @@ def own_way(
         places: the ball's matrix on each of them.
         ends: first and last frame with a key of its own action, or None.
     """
-    curves, stance = played_before(ball.beyond_mocap_ball.before)
-    ends = channels.keyed_range(curves)
+    curves, stance = find_own_curves(ball.beyond_mocap_ball.before)
+    ends = channels.find_key_range(curves)
     first, last = min(hold.first for hold in holds) - 1, max(hold.last for hold in holds) + 1
     if ends is not None:
         first, last = min(first, ends[0]), max(last, ends[1])
     frames = np.arange(first, last + 1)
-    return frames, way_of(curves, stance, frames), ends
+    return frames, sample_places(curves, stance, frames), ends
 
 
-def played_before(before: BeyondMocapBefore) -> tuple[dict, list]:
+def find_own_curves(before: BeyondMocapBefore) -> tuple[dict, list]:
     """Find the curves of the ball's own action, and its rest transform as `set_aside.stance_of` stores it."""
     return curves_before(before), json.loads(before.stance)[""]
 
@@ -176,21 +176,21 @@ def curves_before(before: BeyondMocapBefore) -> dict:
     """Find the curves that an object played before, by data path and index."""
     slots = before.action.slots if before.action is not None else ()
     slot = next((one for one in slots if one.identifier == before.slot), None)
-    return channels.curves(before.action, slot) if slot is not None else {}
+    return channels.collect_curves(before.action, slot) if slot is not None else {}
 
 
-def way_of(curves: dict, stance: list, frames: np.ndarray) -> list[Matrix]:
+def sample_places(curves: dict, stance: list, frames: np.ndarray) -> list[Matrix]:
     """Sample the ball's matrix on frames (F,), units, from its curves and its transform without them."""
     mode, paths = stance[0], ("location", "rotation_quaternion", "rotation_euler", "rotation_axis_angle")
     still = dict(zip(paths, stance[1:]))
-    places, turned = (sample_property(curves, path, frames, still[path]) for path in ("location", channel_of(mode)))
-    return [Matrix.LocRotScale(place, Quaternion(turns(mode, turn[None])[0]), None)
-            for place, turn in zip(places, turned)]
+    places, rotations = (sample_property(curves, path, frames, still[path]) for path in ("location", find_rotation_channel(mode)))
+    return [Matrix.LocRotScale(place, Quaternion(to_rotations(mode, turn[None])[0]), None)
+            for place, turn in zip(places, rotations)]
 
 
 def sample_property(curves: dict, path: str, frames: np.ndarray, still) -> np.ndarray:
     """Sample values (F, n) of a property on frames (F,); where it has no curve as in `still` (n,)."""
-    columns = [channels.sample(curves[path, i], frames) if (path, i) in curves else np.full(len(frames), value)
+    columns = [channels.sample_curve(curves[path, i], frames) if (path, i) in curves else np.full(len(frames), value)
                for i, value in enumerate(still)]
     return np.stack(columns, axis=1)
 
@@ -209,10 +209,10 @@ def check_unaimed(ball: bpy.types.Object) -> None:
         raise InputError(f"ball {ball.name}", "it is aimed", "a ball that is not aimed", "press Leave Aim first")
 
 
-def _check(ball, body, bone: str, first: int, last: int) -> None:
+def _check_hold(ball, body, bone: str, first: int, last: int) -> None:
     """Check that a bone can carry the ball on these frames."""
     channels.check_local(ball)
-    channels.check_free(ball)
+    channels.check_editable(ball)
     check_unaimed(ball)
     if bone not in body.data.bones:
         raise InputError(f"armature {body.name}", f"no bone {bone!r}", "one of its bones",
@@ -232,15 +232,15 @@ def _check(ball, body, bone: str, first: int, last: int) -> None:
         raise InputError(f"object {ball.name}", "an armature", "a ball", "select the ball and the armature")
 
 
-def _holds(ball, hold) -> bool:
+def _is_valid_hold(ball, hold) -> bool:
     """Whether a stretch still has its armature, bone and constraint."""
     return hold.body is not None and hold.bone in hold.body.pose.bones and hold.name in ball.constraints
 
 
-def _bones(scene, hold) -> list[Matrix]:
+def _sample_bone(scene, hold) -> list[Matrix]:
     """Sample the bone's matrices in the world on the frames of a stretch, without scale."""
     found = []
-    with alone(hold.body, scene) as side:
+    with create_private_scene(hold.body, scene) as side:
         for frame in range(hold.first, hold.last + 1):
             side.frame_set(frame)
             shown = hold.body.evaluated_get(side.view_layers[0].depsgraph)
@@ -249,33 +249,33 @@ def _bones(scene, hold) -> list[Matrix]:
     return found
 
 
-def _carried(scene, hold, bones: list[Matrix], start: Matrix, end: Matrix | None, ball) -> list[Matrix]:
+def _compute_carried(scene, hold, bones: list[Matrix], start: Matrix, end: Matrix | None, ball) -> list[Matrix]:
     """Compute the ball's matrix in the bone's frame on each frame of a stretch.
 
     It moves from `start` to its carried position, and to `end`, both in the world; `end` None: it ends where it is
     carried.
     """
     begins = bones[0].inverted() @ start
-    held = begins if hold.how == "KEEP" else _touching(scene, hold, begins, ball)
+    held = begins if hold.how == "KEEP" else _place_touching(scene, hold, begins, ball)
     ends = held if end is None else bones[-1].inverted() @ end
     count = len(bones) - 1
-    way = max((held.to_translation() - place.to_translation()).length for place in (begins, ends))
+    distance = max((held.to_translation() - place.to_translation()).length for place in (begins, ends))
     # frames that the ball needs at FASTEST for the longer one of both movements
-    least = way / units_per_metre(scene) / FASTEST * frames_per_second(scene)
+    least = distance / units_per_metre(scene) / FASTEST * frames_per_second(scene)
     settle, found = 0, []
     if hold.how != "KEEP" or end is not None:
         settle = max(1, min(max(hold.settle, int(np.ceil(least))), count // 2))
     for row in range(count + 1):
         place = held
         if hold.how != "KEEP" and row < settle:
-            place = _between(begins, held, row / settle)
+            place = _blend_matrices(begins, held, row / settle)
         if end is not None and row > count - settle:
-            place = _between(held, ends, (row - count + settle) / settle)
+            place = _blend_matrices(held, ends, (row - count + settle) / settle)
         found.append(place)
     return found
 
 
-def _touching(scene, hold, begins: Matrix, ball) -> Matrix:
+def _place_touching(scene, hold, begins: Matrix, ball) -> Matrix:
     """Compute the matrix at which the ball touches the bone, on the side on which it is."""
     units = units_per_metre(scene)
     length = hold.body.pose.bones[hold.bone].length * float(np.mean(hold.body.matrix_world.to_scale()))
@@ -287,43 +287,43 @@ def _touching(scene, hold, begins: Matrix, ball) -> Matrix:
     return Matrix.LocRotScale(nearest + reach * away, begins.to_quaternion(), None)
 
 
-def _between(one: Matrix, other: Matrix, share: float) -> Matrix:
+def _blend_matrices(one: Matrix, other: Matrix, share: float) -> Matrix:
     """Blend smoothly from one matrix to another."""
     smooth = float(smoothstep(share))
     place = one.to_translation().lerp(other.to_translation(), smooth)
     return Matrix.LocRotScale(place, one.to_quaternion().slerp(other.to_quaternion(), smooth), None)
 
 
-def _write(ball, frames: np.ndarray, own: list[Matrix], lets_go: list) -> None:
+def _write_action(ball, frames: np.ndarray, own: list[Matrix], releases: list) -> None:
     """Write keys on every frame, and one more just before each release.
 
     Nothing moves between these two: before a release places are in the constraint's frame, afterwards in the world.
     """
     rows = [(float(frame), place) for frame, place in zip(frames, own)]
-    rows += [(hold.last - JUST_BEFORE, place) for hold, place in lets_go]
+    rows += [(hold.last - JUST_BEFORE, place) for hold, place in releases]
     rows.sort(key=lambda row: row[0])
     at = np.array([frame for frame, _ in rows])
     mode = ball.rotation_mode
-    path = channel_of(mode)
+    path = find_rotation_channel(mode)
     curves = {"location": ("Object Transforms", np.array([place.to_translation() for _, place in rows])),
-              path: ("Object Transforms", _turns(mode, [place.to_quaternion() for _, place in rows]))}
-    for hold, _ in lets_go:
+              path: ("Object Transforms", _to_channel_values(mode, [place.to_quaternion() for _, place in rows]))}
+    for hold, _ in releases:
         # influence 1 from the first frame to just before the release
         held = (at >= hold.first) & (at < hold.last)
         influence = f'constraints["{bpy.utils.escape_identifier(hold.name)}"].influence'
         curves[influence] = ("Possession", held[:, None].astype(float))
-    channels.discard(ball, KEPT)
-    made = channels.animate(ball, f"{ball.name} carried", at, curves)
-    made[KEPT] = True
-    ends = np.isin(at, [hold.last - JUST_BEFORE for hold, _ in lets_go])
-    for (name, _), curve in channels.curves(made, ball.animation_data.action_slot).items():
+    channels.remove_marked_action(ball, KEPT)
+    written = channels.create_action(ball, f"{ball.name} carried", at, curves)
+    written[KEPT] = True
+    ends = np.isin(at, [hold.last - JUST_BEFORE for hold, _ in releases])
+    for (name, _), curve in channels.collect_curves(written, ball.animation_data.action_slot).items():
         # keys of the influence, and those just before a release, hold their value until the next key
         still = np.ones(len(at), bool) if name.endswith("influence") else ends
         curve.keyframe_points.foreach_set("interpolation", np.where(still, CONSTANT, channels.LINEAR).astype(np.int32))
         curve.update()
 
 
-def _turns(mode: str, quaternions: list[Quaternion]) -> np.ndarray:
+def _to_channel_values(mode: str, quaternions: list[Quaternion]) -> np.ndarray:
     """Convert rotations to values (F, n) of a rotation mode's channel, each continuous with the one before."""
     found, before = [], None
     for turn in quaternions:
@@ -342,6 +342,6 @@ def _turns(mode: str, quaternions: list[Quaternion]) -> np.ndarray:
     return np.array(found)
 
 
-def holder_name(hold) -> str:
+def describe_holder(hold) -> str:
     """Name of the armature that carries the ball."""
     return hold.body.name if hold.body is not None else "a missing armature"

@@ -17,7 +17,7 @@ from bpy.props import (
 
 from ...beyond_mocap.base.digest import byte_digest
 from ..core import live
-from ..core.properties import active_row, with_settings
+from ..core.properties import find_active_row, with_settings
 from ..result.result import BeyondMocapBefore
 
 pictures: dict = {}
@@ -31,12 +31,12 @@ PLAYED = "live"  # `made_of` of a scene that was played live: edits of the lists
 KEPT = "beyond_mocap_scene_ball"  # custom property of objects and actions created here; no property group has this name
 
 
-def touch_live(_settings, _context) -> None:
+def mark_edited(_settings, _context) -> None:
     """Report a change that the shown scene may have to follow."""
-    live.mark("Passing scene")
+    live.mark_watcher("Passing scene")
 
 
-def renamed(player, context) -> None:
+def update_name(player, context) -> None:
     """Write a player's new name to all passes; a name that another player has is refused."""
     if player.known and any(
         row != player and row.name == player.name for row in player.id_data.beyond_mocap_passes.players
@@ -50,22 +50,22 @@ def renamed(player, context) -> None:
             one.to = player.name if one.to == player.known else one.to
         settings.serve = player.name if settings.serve == player.known else settings.serve
     player.known = player.name
-    touch_live(player, context)
+    mark_edited(player, context)
 
 
-def chosen(one, context) -> None:
+def store_actor_name(one, context) -> None:
     """Store the name of the armature that shows a strike, for when it has been deleted."""
     one.actor_known = one.actor.name if one.actor is not None else ""
 
 
-@with_settings("passes.player", update=touch_live)
+@with_settings("passes.player", update=mark_edited)
 class BeyondMocapPasser(bpy.types.PropertyGroup):
     """One player of a passing scene."""
 
-    name: StringProperty(name="Name", description="What this player is called", update=renamed)
+    name: StringProperty(name="Name", description="What this player is called", update=update_name)
     known: StringProperty(name="Known As", options={"HIDDEN"}, description="The name that the passes use")
     place: PointerProperty(
-        name="Place", type=bpy.types.Object, update=touch_live,
+        name="Place", type=bpy.types.Object, update=mark_edited,
         description="Object that marks where the player stands and, by its local X, which way they face; move it "
         "with G, rotate it with R",
     )
@@ -78,26 +78,26 @@ class BeyondMocapPasser(bpy.types.PropertyGroup):
     before: PointerProperty(type=BeyondMocapBefore, description="What the character played before the scene")
 
 
-@with_settings("passes.pass", update=touch_live)
+@with_settings("passes.pass", update=mark_edited)
 class BeyondMocapPass(bpy.types.PropertyGroup):
     """One pass: passer, receiver and settings. Players are stored by name, so that the list can be sorted."""
 
-    who: StringProperty(name="From", description="Player who passes the ball", update=touch_live)
-    to: StringProperty(name="To", description="Player who receives the ball", update=touch_live)
-    at: PointerProperty(name="Meet At", type=bpy.types.Object, update=touch_live,
+    who: StringProperty(name="From", description="Player who passes the ball", update=mark_edited)
+    to: StringProperty(name="To", description="Player who receives the ball", update=mark_edited)
+    at: PointerProperty(name="Meet At", type=bpy.types.Object, update=mark_edited,
                         description="Object to which the receiver goes to meet the ball; leave empty to stay in place")
     actor: PointerProperty(
-        name="Like Armature", type=bpy.types.Object, poll=lambda _own, thing: thing.type == "ARMATURE", update=chosen,
+        name="Like Armature", type=bpy.types.Object, poll=lambda _own, thing: thing.type == "ARMATURE", update=store_actor_name,
         description="Armature whose motion shows the strike; the most similar strike of the library is played, "
         "and Like Clip is ignored",
     )
     actor_known: StringProperty(
-        name="Missing", update=touch_live,
+        name="Missing", update=mark_edited,
         description="The armature that showed the strike no longer exists; clear this field to go on without it",
     )
 
 
-@with_settings("passes.weights", update=touch_live)
+@with_settings("passes.weights", update=mark_edited)
 class BeyondMocapWeights(bpy.types.PropertyGroup):
     """Weights of eq. 1 (two poses) and eq. 2 (two strikes)."""
 
@@ -143,7 +143,7 @@ class BeyondMocapHits(bpy.types.PropertyGroup):
     lines: StringProperty(name="Lines", options={"HIDDEN"}, description="One line for each hit motion: frame and text")
 
 
-@with_settings("passes", update=touch_live)
+@with_settings("passes", update=mark_edited)
 @with_settings("ball.hold")
 class BeyondMocapPasses(bpy.types.PropertyGroup):
     """A passing scene and its ball."""
@@ -156,7 +156,7 @@ class BeyondMocapPasses(bpy.types.PropertyGroup):
     active_pass: IntProperty(name="Pass", min=0, description="Pass whose settings are shown below the list")
     weights: PointerProperty(type=BeyondMocapWeights, description="Weights for comparing motions")
     library_folder: StringProperty(
-        name="Library", subtype="DIR_PATH", options={"PATH_SUPPORTS_BLEND_RELATIVE"}, update=touch_live,
+        name="Library", subtype="DIR_PATH", options={"PATH_SUPPORTS_BLEND_RELATIVE"}, update=mark_edited,
         description="Folder of clips with standing strikes; leave empty for the library of step 1",
     )
     rally: PointerProperty(name="Ball Object", type=bpy.types.Object,
@@ -164,7 +164,7 @@ class BeyondMocapPasses(bpy.types.PropertyGroup):
     ball_before: PointerProperty(type=BeyondMocapBefore, description="What the ball played before the scene was made")
     made_of: StringProperty(name="Made Of", options={"HIDDEN"},
                             description="Digest of the settings of the shown scene")
-    told: StringProperty(name="Messages", options={"HIDDEN"}, description="Warnings and messages about the scene")
+    messages: StringProperty(name="Messages", options={"HIDDEN"}, description="Warnings and messages about the scene")
     figures: StringProperty(name="Figures", options={"HIDDEN"}, description="Figures of the shown scene")
     strikes: StringProperty(name="Strikes", options={"HIDDEN"}, description="One line for each strike: frame and text")
     touches: CollectionProperty(type=BeyondMocapTouch, description="Touches that were solved from tracking data")
@@ -172,17 +172,17 @@ class BeyondMocapPasses(bpy.types.PropertyGroup):
     solved: StringProperty(name="Solved", options={"HIDDEN"}, description="Figures of the solved ball")
 
 
-def subject(context: bpy.types.Context) -> bpy.types.Object | None:
+def find_armature(context: bpy.types.Context) -> bpy.types.Object | None:
     """Find the armature to work on: the active object, otherwise the character of the active player."""
     active = context.view_layer.objects.active
     if active is not None and active.type == "ARMATURE":
         return active
     settings = context.scene.beyond_mocap_passes
-    player = active_row(settings.players, settings.active_player)
+    player = find_active_row(settings.players, settings.active_player)
     return player.body if player is not None else None
 
 
-def ball_of(context: bpy.types.Context) -> bpy.types.Object | None:
+def find_ball(context: bpy.types.Context) -> bpy.types.Object | None:
     """Find the ball to work on: a selected one, otherwise that of the passing scene, otherwise one named Ball."""
     chosen = [thing for thing in context.selected_objects if thing.type in {"MESH", "EMPTY"}]
     marked = [thing for thing in chosen if thing.get(KEPT) or "ball" in thing.name.lower()] or chosen[:1]
@@ -194,23 +194,23 @@ def ball_of(context: bpy.types.Context) -> bpy.types.Object | None:
     return context.scene.objects.get("Ball")
 
 
-def told_lines(text: str) -> list[tuple[int, str]]:
+def parse_lines(text: str) -> list[tuple[int, str]]:
     """Parse frame and text of the lines stored in `lines` and `strikes`."""
     rows = (line.partition("\t") for line in text.splitlines())
-    return [(int(frame), said) for frame, _, said in rows]
+    return [(int(frame), text_of_line) for frame, _, text_of_line in rows]
 
 
-def found_of(hits: BeyondMocapHits) -> dict:
+def parse_hits(hits: BeyondMocapHits) -> dict:
     """Parse the stored hit analysis; empty if there is none."""
     return json.loads(hits.found or "{}")
 
 
-def picture_name(hits: BeyondMocapHits) -> str:
+def name_picture(hits: BeyondMocapHits) -> str:
     """Compute the name of an analysis' picture; other curves give another name."""
     return byte_digest(hits.found, size=8).hex()
 
 
-def picture_icon(hits: BeyondMocapHits) -> int:
+def find_picture_icon(hits: BeyondMocapHits) -> int:
     """Find the picture's icon number for a layout; 0 until it is painted."""
-    kept, name = pictures.get("graphs"), picture_name(hits)
-    return kept[name].icon_id if kept is not None and name in kept else 0
+    previews, name = pictures.get("graphs"), name_picture(hits)
+    return previews[name].icon_id if previews is not None and name in previews else 0

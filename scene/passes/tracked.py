@@ -12,13 +12,13 @@ import numpy as np
 from ...beyond_mocap.ball.tracked.kinds import TOUCH_KINDS
 from ...beyond_mocap.base.errors import InputError
 from ..core import channels
-from ..core.measure import frames_per_second, scene_clock
-from ..core.settings import BeyondMocapPlayer, absolute, active_player
+from ..core.measure import frames_per_second, build_scene_clock
+from ..core.settings import BeyondMocapPlayer, to_absolute_path, find_active_player
 from ..player import dots, tracks
 from ..result import bake
 from ..stage import ball
 from ..timeline import lanes, lay_strips, strips
-from ..timeline.strip_lines import said
+from ..timeline.strip_lines import parse_labels
 from . import possession
 from .settings import KEPT
 
@@ -26,11 +26,11 @@ if TYPE_CHECKING:
     from ...beyond_mocap.ball.tracked.solve import SolvedBall
 
 BALL = "Solved Ball"
-WORDS = {kind.name: " ".join(kind.labels) for kind in TOUCH_KINDS if kind.labels and kind.ball != "carries"}
+TOUCH_LABELS = {kind.name: " ".join(kind.labels) for kind in TOUCH_KINDS if kind.labels and kind.ball != "carries"}
 """Kind of a touch -> labels of its key moment. Dribbles are stretches and deflections are unintended: they have none.
 """
 
-NEAR = 0.4  # s between a touch and an existing key moment within which no moment is added
+NEAR_SECONDS = 0.4  # s between a touch and an existing key moment within which no moment is added
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,37 +54,37 @@ class Order:
     end: float | None = None
 
 
-def order_of(scene: bpy.types.Scene) -> Order:
+def build_order(scene: bpy.types.Scene) -> Order:
     """Build the order: the match of the active player, or the tracks of all selected players with files of their own.
 
     Raises:
         InputError: if no player has a file.
     """
     settings = scene.beyond_mocap
-    player = active_player(settings)
+    player = find_active_player(settings)
     if player is None or not player.tracking_file:
         raise InputError("tracking", "no file", "players with a tracking file", "import one in step 2")
     if player.feed_id:
         end = settings.section_end if settings.section_end > settings.section_start else None
-        path, metadata = absolute(player.tracking_file), absolute(player.metadata_file)
+        path, metadata = to_absolute_path(player.tracking_file), to_absolute_path(player.metadata_file)
         return Order((), path, metadata, provider=player.provider, start=settings.section_start, end=end)
     others = [one for one in settings.players if one.use and one != player and one.tracking_file and not one.feed_id]
     return Order(tuple((one.name, tracks.read_track(settings, one)) for one in (player, *others)))
 
 
-def work(order: Order, progress, cancelled, _hurry) -> "SolvedBall":
+def run_order(order: Order, progress, cancelled, _hurry) -> "SolvedBall":
     """Read the files and solve the ball. Does not use bpy."""
     from ...beyond_mocap.ball.tracked.solve import solve_ball
 
     if order.tracks:
-        source = together(order.tracks)
+        source = join_tracks(order.tracks)
     else:
         progress(0.0, "Reading the match")
-        source = tracks.match_of(order.path, order.metadata, order.provider)
+        source = tracks.read_match(order.path, order.metadata, order.provider)
     return solve_ball(source, progress, cancelled, order.start, order.end)
 
 
-def together(named: tuple):
+def join_tracks(named: tuple):
     """Join the tracks of several players, (name, track) each, to a match at the first one's times; one track stays a
     track.
     """
@@ -105,7 +105,7 @@ def together(named: tuple):
                  provider="csv", periods=((float(times[0]), float(times[-1])),))
 
 
-def write(scene: bpy.types.Scene, solved: "SolvedBall") -> bpy.types.Object:
+def write_ball(scene: bpy.types.Scene, solved: "SolvedBall") -> bpy.types.Object:
     """Create or update the solved ball on every frame of the scene, and list its touches.
 
     Returns:
@@ -113,68 +113,68 @@ def write(scene: bpy.types.Scene, solved: "SolvedBall") -> bpy.types.Object:
     """
     from ...beyond_mocap.motion.track.ball_path import BallPath
 
-    settings, room = scene.beyond_mocap_passes, bake.collection(scene)
+    settings, room = scene.beyond_mocap_passes, bake.find_or_create_collection(scene)
     own = next((thing for thing in room.objects if thing.get(KEPT) == BALL), None)
-    target = own or ball.create(bpy.context, BALL, room)
+    target = own or ball.create_ball(bpy.context, BALL, room)
     channels.check_local(target)
-    channels.check_free(target)
+    channels.check_editable(target)
     possession.check_unaimed(target)
-    clock, (start, end) = scene_clock(scene), (float(solved.times[0]), float(solved.times[-1]))
-    frames = np.arange(np.ceil(clock.frame(start) - 1e-4), np.floor(clock.frame(end) + 1e-4) + 1)
+    clock, (start, end) = build_scene_clock(scene), (float(solved.times[0]), float(solved.times[-1]))
+    frames = np.arange(np.ceil(clock.to_frame(start) - 1e-4), np.floor(clock.to_frame(end) + 1e-4) + 1)
     # seconds of the scene's frames on the track's clock
     times = clock.start_time + (frames - clock.start_frame) / frames_per_second(scene)
     path = BallPath(times, solved.ball.at(times), np.ones(len(times), bool))
     target[KEPT] = BALL  # marks it, whatever its name is
 
-    def lay() -> None:
+    def write_path() -> None:
         """Write the path to the ball's action."""
-        channels.discard(target, KEPT)
-        ball.write(target, path, scene, bake.frame_at(scene, float(times[0])))[KEPT] = True
+        channels.remove_marked_action(target, KEPT)
+        ball.write_trajectory(target, path, scene, bake.compute_frame(scene, float(times[0])))[KEPT] = True
 
-    possession.anew(scene, target, lay)
-    _list(scene, solved)
-    settings.solved = "\n".join(lines(solved))
+    possession.replace_own_action(scene, target, write_path)
+    _list_touches(scene, solved)
+    settings.solved = "\n".join(list_figures(solved))
     return target
 
 
-def accept(context: bpy.types.Context, only: str = "") -> tuple[int, list[str]]:
+def accept_touches(context: bpy.types.Context, only: str = "") -> tuple[int, list[str]]:
     """Add key moments for the selected touches, of one player or of all.
 
     Returns:
         count: number of key moments added.
         messages: one line for each touch that was not used.
     """
-    settings, told, count = context.scene.beyond_mocap, [], 0
-    found = {player.name: player for player in settings.players}
+    settings, messages, count = context.scene.beyond_mocap, [], 0
+    players = {player.name: player for player in settings.players}
     for touch in context.scene.beyond_mocap_passes.touches:
-        if not touch.use or not touch.words or touch.name not in found or (only and touch.name != only):
+        if not touch.use or not touch.words or touch.name not in players or (only and touch.name != only):
             continue
-        player = found[touch.name]
+        player = players[touch.name]
         try:
-            line = _in_the_way(context, player, touch)
+            line = _find_obstacle(context, player, touch)
         except InputError as error:  # this player's track or labels cannot be read; go on with the others
             line = str(error)
         if line:
-            told.append(line)
+            messages.append(line)
             continue
-        lay_strips.add_moment(player.dot, said(touch.words, round(touch.time, 3)), scene_clock(context.scene))
+        lay_strips.add_moment(player.dot, parse_labels(touch.words, round(touch.time, 3)), build_scene_clock(context.scene))
         touch.use = False
         count += 1
-    return count, told
+    return count, messages
 
 
-def lines(solved: "SolvedBall") -> list[str]:
+def list_figures(solved: "SolvedBall") -> list[str]:
     """List lines about a solved ball for the panel."""
     residual = solved.residuals[solved.measured & np.isfinite(solved.residuals)]
-    told = [f"Touches: {len(solved.touches)}", f"Confidence: {solved.confidence:.0%}"]
+    figures = [f"Touches: {len(solved.touches)}", f"Confidence: {solved.confidence:.0%}"]
     if len(residual):
-        told.append(f"Median residual: {100 * np.median(residual):.0f} cm")
-    told += [f"Filled samples: {solved.filled.mean():.0%}", f"Outliers: {int(solved.outlier.sum())}"]
-    told += [f"{end.kind.capitalize()}: {end.time:.2f} s" for end in solved.ends]
-    return told + list(solved.notes)
+        figures.append(f"Median residual: {100 * np.median(residual):.0f} cm")
+    figures += [f"Filled samples: {solved.filled.mean():.0%}", f"Outliers: {int(solved.outlier.sum())}"]
+    figures += [f"{end.kind.capitalize()}: {end.time:.2f} s" for end in solved.ends]
+    return figures + list(solved.notes)
 
 
-def _list(scene, solved: "SolvedBall") -> None:
+def _list_touches(scene, solved: "SolvedBall") -> None:
     """List the touches as rows; players are named by their ids in the feed."""
     names = {player.feed_id: player.name for player in scene.beyond_mocap.players if player.feed_id}
     rows = scene.beyond_mocap_passes.touches
@@ -183,20 +183,20 @@ def _list(scene, solved: "SolvedBall") -> None:
         row = rows.add()
         row.name = names.get(touch.player, touch.player)
         row.player, row.time, row.part, row.kind = touch.player, touch.time, touch.part, touch.kind
-        row.words, row.confidence = WORDS.get(touch.kind, ""), touch.confidence
+        row.words, row.confidence = TOUCH_LABELS.get(touch.kind, ""), touch.confidence
         row.use = bool(row.words) and row.name in {player.name for player in scene.beyond_mocap.players}
     scene.beyond_mocap_passes.active_touch = 0
 
 
-def _in_the_way(context, player: BeyondMocapPlayer, touch) -> str:
+def _find_obstacle(context, player: BeyondMocapPlayer, touch) -> str:
     """Describe why a touch becomes no key moment of a player, or return ""; the player has a timeline afterwards."""
-    target = strips.with_lanes(context, player)
-    clock = scene_clock(context.scene)
-    first, last = (clock.seconds(frame) for frame in dots.keyed_frames(player.dot) or (-np.inf, np.inf))
+    target = strips.ensure_label_tracks(context, player)
+    clock = build_scene_clock(context.scene)
+    first, last = (clock.to_seconds(frame) for frame in dots.find_key_range(player.dot) or (-np.inf, np.inf))
     if not first <= touch.time <= last:
         return f"{player.name}: the touch at {touch.time:.2f} s is outside the player's track"
-    near = [moment for moment in lanes.moments(target) if abs(moment.key.time - touch.time) < NEAR]
+    near = [moment for moment in lanes.list_moments(target) if abs(moment.key.time - touch.time) < NEAR_SECONDS]
     if near:
-        there = f"{player.name}: there is a key moment at {near[0].key.time:.2f} s"
-        return f"{there}, so the touch at {touch.time:.2f} s adds none"
+        existing = f"{player.name}: there is a key moment at {near[0].key.time:.2f} s"
+        return f"{existing}, so the touch at {touch.time:.2f} s adds none"
     return ""

@@ -18,21 +18,21 @@ from ...beyond_mocap.motion import quaternion
 from ...beyond_mocap.motion.motion import Motion
 from ..core import action, channels
 from ..core.measure import frames_per_second, units_per_metre
-from ..core.set_aside import bring_back, put_aside
+from ..core.set_aside import restore_playback, save_playback
 from ..rigs import armature
 from . import keys
 
 MARK = "beyond_mocap_ride"  # custom property of an edited body's action: a digest of its inputs
-MADE_OF = ("fit", "degree", "frame")  # settings on which the original's own path and the offsets from it depend
+SOURCE_SETTINGS = ("fit", "degree", "frame")  # settings on which the original's own path and the offsets from it depend
 
-_sources: dict[int, Source] = {}  # by session_uid of the armature
+_sources: dict[int, OriginalMotion] = {}  # by session_uid of the armature
 # likewise: the original action and its keys' digest, until they may have changed
 _keys: dict[int, tuple[int, bytes]] = {}
 _refused: dict[int, tuple[bytes, str]] = {}  # likewise: digest of inputs that could not be read, and the error
 
 
 @dataclass(frozen=True, eq=False)
-class Read:
+class ReadMotion:
     """A motion in metres of the scene's world at the scene's rate.
 
     Attributes:
@@ -45,13 +45,13 @@ class Read:
     motion: Motion
     first: int
     standing: np.ndarray | None = None
-    told: tuple[str, ...] = ()
+    messages: tuple[str, ...] = ()
 
 
-def original_of(body: bpy.types.Object) -> tuple[bpy.types.Action | None, object]:
+def find_original(body: bpy.types.Object) -> tuple[bpy.types.Action | None, object]:
     """Find action and slot of an armature's own motion: the stored ones of an edited body, else those that play."""
     if not body.beyond_mocap_ride.on:
-        return channels.playing(body)
+        return channels.find_playing_action(body)
     before = body.beyond_mocap_ride.before
     if before.action is None:
         return None, None
@@ -59,7 +59,7 @@ def original_of(body: bpy.types.Object) -> tuple[bpy.types.Action | None, object
     return before.action, next((slot for slot in slots if slot.identifier == before.slot), slots[0] if slots else None)
 
 
-def no_motion(body: bpy.types.Object) -> InputError:
+def build_no_motion_error(body: bpy.types.Object) -> InputError:
     """Build the error for an armature that plays nothing."""
     return InputError(f"armature {body.name}", "plays no action", "a motion", "import one, or choose an action")
 
@@ -71,83 +71,83 @@ def check_finite(body: bpy.types.Object, motion: Motion) -> None:
                          "check its keys")
 
 
-def refuse_system_override(body: bpy.types.Object, what: str = "armature") -> None:
+def check_editable_override(body: bpy.types.Object, what: str = "armature") -> None:
     """Raise InputError if an object is a library override that cannot be edited."""
     if body.override_library is not None and body.override_library.is_system_override:
         raise InputError(f"{what} {body.name}", "is an override that cannot be edited", "an editable override",
                          "make it editable: Outliner, Library Override, Make")
 
 
-class Carrier(ABC):
+class ArmatureAdapter(ABC):
     """Reads and writes the motion of one armature during one event; it keeps no Blender data longer than that."""
 
     def __init__(self, body: bpy.types.Object):
         self.body = body
 
     @property
-    def ride(self):
+    def edit(self):
         """The stored state of the armature's path edit."""
         return self.body.beyond_mocap_ride
 
-    def source(self) -> tuple[bpy.types.Action | None, object]:
+    def find_source(self) -> tuple[bpy.types.Action | None, object]:
         """Find action and slot of the original motion."""
-        return original_of(self.body)
+        return find_original(self.body)
 
     def check(self) -> None:
         """Raise InputError if the armature cannot follow a path."""
         body = self.body
         channels.check_local(body)
-        refuse_system_override(body)
+        check_editable_override(body)
         if body.mode == "EDIT":
             raise InputError(f"armature {body.name}", "is in edit mode", "object or pose mode",
                              "leave edit mode (Tab)")
-        channels.check_free(body)
+        channels.check_editable(body)
 
     @abstractmethod
-    def stamp(self, scene: bpy.types.Scene) -> bytes:
+    def compute_input_digest(self, scene: bpy.types.Scene) -> bytes:
         """Compute a fast digest of all inputs of `read_motion` except the original's keys."""
 
     @abstractmethod
-    def read(self, scene: bpy.types.Scene) -> Read:
+    def read_motion(self, scene: bpy.types.Scene) -> ReadMotion:
         """Read the original motion. Raises InputError if there is none."""
 
     @abstractmethod
-    def begin(self) -> None:
+    def start_edit(self) -> None:
         """Store the original and play an action of ours, with MARK."""
 
     @abstractmethod
-    def write(self, scene: bpy.types.Scene, read: Read, ridden, digest: str) -> None:
+    def write_motion(self, scene: bpy.types.Scene, original: ReadMotion, edited, digest: str) -> None:
         """Write the edited motion to our action and its digest to MARK.
 
         Everything is computed before anything is written. Raises InputError, and changes nothing, if it cannot be
         written.
         """
 
-    def end(self) -> None:
+    def revert_edit(self) -> None:
         """Play the original again, bit for bit, in its previous state."""
-        bring_back(self.ride.before, self.body, MARK)
+        restore_playback(self.edit.before, self.body, MARK)
 
     @abstractmethod
-    def settle(self) -> None:
+    def detach_action(self) -> None:
         """Make our action independent of the path edit, for it is to stay."""
 
-    def keys_digest(self) -> bytes:
+    def compute_keys_digest(self) -> bytes:
         """Compute a digest of the original's keys."""
-        found, slot = self.source()
+        found, slot = self.find_source()
         if found is None or slot is None:
             return b""
         parts = []
-        for (path, index), curve in channels.curves(found, slot).items():
-            parts += [f"{path} {index} {len(curve.modifiers)}", keys.places(curve)]
+        for (path, index), curve in channels.collect_curves(found, slot).items():
+            parts += [f"{path} {index} {len(curve.modifiers)}", keys.read_keys(curve)]
         return byte_digest(*parts)
 
-    def ours(self) -> tuple[bpy.types.Action, object]:
+    def find_edit_action(self) -> tuple[bpy.types.Action, object]:
         """Find our action and its slot, as a copy if another object plays it too: a duplicated body has its own path
         edit.
 
         Raises InputError if the armature plays another action.
         """
-        found, slot = channels.playing(self.body)
+        found, slot = channels.find_playing_action(self.body)
         if found is None or not found.get(MARK):
             raise InputError(f"armature {self.body.name}", "plays another action than that of its path edit",
                              "that action", "choose it again in the Action Editor, or press Revert")
@@ -156,24 +156,24 @@ class Carrier(ABC):
             return found, slot
         copy = found.copy()
         copy.use_fake_user = False
-        channels.assign(self.body, copy, next(one for one in copy.slots if one.identifier == slot.identifier))
-        return channels.playing(self.body)
+        channels.assign_action(self.body, copy, next(one for one in copy.slots if one.identifier == slot.identifier))
+        return channels.find_playing_action(self.body)
 
 
-class PlainCarrier(Carrier):
+class PlainAdapter(ArmatureAdapter):
     """An armature whose motion is the channels of its bones, in any rotation mode."""
 
     def check(self) -> None:
         super().check()
-        self._original()
+        self._check_original()
 
-    def _original(self) -> tuple[bpy.types.Action, object]:
-        found, slot = self.source()
+    def _check_original(self) -> tuple[bpy.types.Action, object]:
+        found, slot = self.find_source()
         if found is None:
-            raise no_motion(self.body)
+            raise build_no_motion_error(self.body)
         return found, slot
 
-    def stamp(self, scene: bpy.types.Scene) -> bytes:
+    def compute_input_digest(self, scene: bpy.types.Scene) -> bytes:
         body, bones = self.body, self.body.data.bones
         rest = np.empty(16 * len(bones), np.float32)
         bones.foreach_get("matrix_local", rest)
@@ -181,70 +181,70 @@ class PlainCarrier(Carrier):
         form = f"{frames_per_second(scene)!r} {units_per_metre(scene)!r} {modes}"
         return byte_digest(np.array(body.matrix_world), rest, form)
 
-    def read(self, scene: bpy.types.Scene) -> Read:
+    def read_motion(self, scene: bpy.types.Scene) -> ReadMotion:
         """Read the motion of the bones' channels."""
-        found, slot = self._original()
-        motion = action.read(self.body, scene, found, slot)
+        found, slot = self._check_original()
+        motion = action.read_motion(self.body, scene, found, slot)
         if not (np.isfinite(motion.root_positions).all() and np.isfinite(motion.rotations).all()):
             raise InputError(f"action {found.name}", "a key with NaN or infinite values", "finite values",
                              "delete that key")
-        ends = channels.keyed_range({
-            key: curve for key, curve in channels.curves(found, slot).items() if key[0].startswith("pose.bones")
+        ends = channels.find_key_range({
+            key: curve for key, curve in channels.collect_curves(found, slot).items() if key[0].startswith("pose.bones")
         })
-        return Read(motion, ends[0])
+        return ReadMotion(motion, ends[0])
 
-    def begin(self) -> None:
-        original, slot = self.source()
-        put_aside(self.ride.before, self.body)
+    def start_edit(self) -> None:
+        original, slot = self.find_source()
+        save_playback(self.edit.before, self.body)
         identifier = slot.identifier
-        made = original.copy()
-        made.name, made.use_fake_user = f"{self.body.name} path motion", False
-        keys.begin(made, identifier, MARK)
-        channels.assign(self.body, made, next(slot for slot in made.slots if slot.identifier == identifier))
+        edit_action = original.copy()
+        edit_action.name, edit_action.use_fake_user = f"{self.body.name} path motion", False
+        keys.prepare_action(edit_action, identifier, MARK)
+        channels.assign_action(self.body, edit_action, next(slot for slot in edit_action.slots if slot.identifier == identifier))
 
-    def write(self, scene: bpy.types.Scene, read: Read, ridden, digest: str) -> None:
+    def write_motion(self, scene: bpy.types.Scene, original: ReadMotion, edited, digest: str) -> None:
         """Write the changed channels, and the original ones resampled where other source frames are displayed."""
-        made, slot = self.ours()
-        sheet = keys.Sheet.of(made, slot, *self.source())
-        wanted = self._wanted(scene, read, ridden, sheet)
-        whole = np.arange(len(read.motion), dtype=float)
-        if not np.array_equal(ridden.frames, whole):
-            others = [place for place in sheet.sources if place not in wanted]
-            wanted |= keys.sampled(sheet, others, read.first + whole, read.first + ridden.frames)
-        if not all(np.isfinite(values).all() for values in wanted.values()):
+        action_to_write, slot = self.find_edit_action()
+        sheet = keys.ActionPair.from_actions(action_to_write, slot, *self.find_source())
+        targets = self._compute_channels(scene, original, edited, sheet)
+        whole = np.arange(len(original.motion), dtype=float)
+        if not np.array_equal(edited.frames, whole):
+            others = [place for place in sheet.sources if place not in targets]
+            targets |= keys.sample_channels(sheet, others, original.first + whole, original.first + edited.frames)
+        if not all(np.isfinite(values).all() for values in targets.values()):
             raise InputError("motion on the path", "a pose with NaN or infinite values", "finite values",
                              "undo the last edit")
-        keys.lay(sheet, read.first, wanted, str(made[MARK]), digest)
-        made[action.PLACED] = [number for row in self.body.matrix_world for number in row]
-        made[MARK] = digest
+        keys.write_channels(sheet, original.first, targets, str(action_to_write[MARK]), digest)
+        action_to_write[action.PLACEMENT] = [number for row in self.body.matrix_world for number in row]
+        action_to_write[MARK] = digest
 
-    def settle(self) -> None:
-        if self.source()[0] is not None:
-            keys.settle(keys.Sheet.of(*self.ours(), *self.source()))
+    def detach_action(self) -> None:
+        if self.find_source()[0] is not None:
+            keys.remove_muted_modifiers(keys.ActionPair.from_actions(*self.find_edit_action(), *self.find_source()))
 
-    def _wanted(self, scene: bpy.types.Scene, read: Read, ridden, sheet: keys.Sheet) -> dict[keys.Place, np.ndarray]:
+    def _compute_channels(self, scene: bpy.types.Scene, original: ReadMotion, edited, sheet: keys.ActionPair) -> dict[keys.Place, np.ndarray]:
         """Compute the values (N,) of the bones' channels that differ from the original."""
-        body, motion, names = self.body, ridden.motion, ridden.motion.skeleton.names
+        body, motion, names = self.body, edited.motion, edited.motion.skeleton.names
         bones = [body.pose.bones[name] for name in names]
-        changed = _changed(read.motion, motion)
+        changed = _find_changed_joints(original.motion, motion)
         joints = [
-            joint for joint, bone in enumerate(bones) if changed[joint] or sheet.added(_path(bone, bone.rotation_mode))
+            joint for joint, bone in enumerate(bones) if changed[joint] or sheet.has_added(_build_data_path(bone, bone.rotation_mode))
         ]
-        lie, rest = armature.placement_now(body, scene), armature.rest_rotations(body, names)
+        placement, rest = armature.find_current_placement(body, scene), armature.compute_rest_rotations(body, names)
         turns, at_rest = motion.rotations[:, joints], rest[joints]
         if joints and joints[0] == 0:
-            turns[:, 0] = quaternion.multiply(quaternion.inverse(lie.rotation), turns[:, 0])
+            turns[:, 0] = quaternion.multiply(quaternion.inverse(placement.rotation), turns[:, 0])
         poses = quaternion.multiply(quaternion.multiply(quaternion.inverse(at_rest), turns), at_rest)
-        shift = lie.to_armature(motion.root_positions) - np.array(bones[0].bone.head_local)
-        found = keys.columns(_path(bones[0], "location"), quaternion.rotate(quaternion.inverse(rest[0]), shift))
+        shift = placement.to_armature(motion.root_positions) - np.array(bones[0].bone.head_local)
+        found = keys.split_channels(_build_data_path(bones[0], "location"), quaternion.rotate(quaternion.inverse(rest[0]), shift))
         for number, joint in enumerate(joints):
             mode = bones[joint].rotation_mode
-            found |= keys.columns(_path(bones[joint], mode), keys.rotation(mode, poses[:, number]))
+            found |= keys.split_channels(_build_data_path(bones[joint], mode), keys.to_rotation_channel(mode, poses[:, number]))
         return found
 
 
 @dataclass(frozen=True, eq=False)
-class Source:
+class OriginalMotion:
     """An original motion, relative to its own path.
 
     Attributes:
@@ -253,24 +253,24 @@ class Source:
         digest: of all inputs.
     """
 
-    read: Read
+    read: ReadMotion
     core: object
     digest: bytes
 
 
-def forget_sources() -> None:
+def clear_source_cache() -> None:
     """Clear all caches when another file is opened."""
     _sources.clear()
-    recheck_sources()
+    invalidate_sources()
 
 
-def recheck_sources() -> None:
+def invalidate_sources() -> None:
     """Mark the keys of all originals as possibly changed, also of those that could not be read."""
     _keys.clear()
     _refused.clear()
 
 
-def read_source(carrier: Carrier, scene: bpy.types.Scene, settings) -> Source:
+def read_source(adapter: ArmatureAdapter, scene: bpy.types.Scene, settings) -> OriginalMotion:
     """Read an armature's original motion for these settings of the core, from the cache if its inputs are the same.
 
     Args:
@@ -282,23 +282,23 @@ def read_source(carrier: Carrier, scene: bpy.types.Scene, settings) -> Source:
     Raises:
         InputError: if there is no motion.
     """
-    from ...beyond_mocap.path_editing.ride import prepare
+    from ...beyond_mocap.path_editing.ride import prepare_source
 
-    uid, wishes = carrier.body.session_uid, tuple(getattr(settings, name) for name in MADE_OF)
-    original = carrier.source()[0]
+    uid, options = adapter.body.session_uid, tuple(getattr(settings, name) for name in SOURCE_SETTINGS)
+    original = adapter.find_source()[0]
     number = original.session_uid if original is not None else 0
     if uid not in _keys or _keys[uid][0] != number:
-        _keys[uid] = number, carrier.keys_digest()
-    digest = byte_digest(_keys[uid][1], carrier.stamp(scene), repr(wishes))
+        _keys[uid] = number, adapter.compute_keys_digest()
+    digest = byte_digest(_keys[uid][1], adapter.compute_input_digest(scene), repr(options))
     known = _sources.get(uid)
     if known is not None and known.digest == digest:
         return known
     if _refused.get(uid, (b"", ""))[0] == digest:
         raise BeyondMocapError(_refused[uid][1])
-    keys.refresh()
+    keys.invalidate_cache()
     try:
-        read = carrier.read(scene)
-        found = Source(read, prepare(read.motion, settings, read.standing), digest)
+        read = adapter.read_motion(scene)
+        found = OriginalMotion(read, prepare_source(read.motion, settings, read.standing), digest)
     except BeyondMocapError as error:  # sampling a rig changes the frame, which would trigger it again and again
         _refused[uid] = digest, str(error)
         raise
@@ -306,13 +306,13 @@ def read_source(carrier: Carrier, scene: bpy.types.Scene, settings) -> Source:
     return found
 
 
-def _path(bone: bpy.types.PoseBone, what: str) -> str:
+def _build_data_path(bone: bpy.types.PoseBone, what: str) -> str:
     """Build the data path of a bone's location, or of its rotation in a mode."""
     name = {"location": "location", "QUATERNION": "rotation_quaternion", "AXIS_ANGLE": "rotation_axis_angle"}
     return f'pose.bones["{bpy.utils.escape_identifier(bone.name)}"].{name.get(what, "rotation_euler")}'
 
 
-def _changed(before: Motion, after: Motion) -> np.ndarray:
+def _find_changed_joints(before: Motion, after: Motion) -> np.ndarray:
     """Compare two motions: (J,) bool, joints whose rotations differ; all if the motions differ in length."""
     if len(before) != len(after):
         return np.ones(len(after.skeleton), dtype=bool)

@@ -15,7 +15,7 @@ from ...beyond_mocap.base.errors import InputError
 from ...beyond_mocap.base.vectors import unit_vectors
 from ...beyond_mocap.motion.path.path import Path
 from ..core.measure import units_per_metre
-from ..player.drawn_track import points_of
+from ..player.drawn_track import list_points
 
 KINDS = (("BEZIER", "Bezier", "Points on the path, with handles"),
          ("NURBS", "NURBS", "Control points beside the path: a B-spline, smoother, with fewer points"))
@@ -26,15 +26,15 @@ MARK = "beyond_mocap_path"  # on curve objects that the extension created
 _STEP, _PIECES = 0.04, (8, 600)  # metres between samples of a Bezier segment; limits of their number
 _NURBS_PIECES = 48
 _COUNTS = (6, 7, 8, 10, 12, 14, 16, 20, 24, 28, 32, 40, 48, 60, 80)
-_CLOSE = 0.03  # metres between a fitted curve and the path, at most
-_APART = 5.0  # metres between two points, at most, so that there is always one to drag
-_NEAREST, _MOST = 0.08, 240  # metres between two Bezier points, at least; number of points, at most
+_FIT_TOLERANCE = 0.03  # metres between a fitted curve and the path, at most
+_MOST_SPACING = 5.0  # metres between two points, at most, so that there is always one to drag
+_LEAST_SPACING, _MOST_POINTS = 0.08, 240  # metres between two Bezier points, at least; number of points, at most
 _SPARE = 0.002  # metres by which a fitted curve is longer than the path, so that the motion does not end early
 _grounds: dict[int, tuple[bytes, object]] = {}  # by session_uid of the mesh object: digest, `Terrain`
 
 
 @dataclass(frozen=True, eq=False)
-class Drawn:
+class DrawnCurve:
     """A curve object as it is now.
 
     Attributes:
@@ -55,47 +55,47 @@ class Drawn:
     order: int
     clamped: bool
     closed: bool
-    still: bytes
+    static_bytes: bytes
     notes: tuple[str, ...]
 
     @property
     def digest(self) -> bytes:
         """A digest that changes with the path."""
-        return byte_digest(f"{self.kind} {self.order} {self.clamped} {self.closed}", self.still)
+        return byte_digest(f"{self.kind} {self.order} {self.clamped} {self.closed}", self.static_bytes)
 
-    def line(self) -> np.ndarray:
+    def sample_line(self) -> np.ndarray:
         """Sample the curve: places (N, 3) m, dense where it bends."""
-        from ...beyond_mocap.motion.track.drawn import nurbs_line
+        from ...beyond_mocap.motion.track.drawn import sample_nurbs
 
         points = self.points
         if self.kind == "BEZIER":
-            return _bezier(np.concatenate([points, points[:1]]) if self.closed else points)
+            return _sample_bezier(np.concatenate([points, points[:1]]) if self.closed else points)
         if self.kind == "POLY":
             return points[:, :3]
         degree = min(self.order, len(points)) - 1
         if self.closed:  # repeat the first points, so that the curve closes smoothly
             points = np.concatenate([points, points[:degree]])
         weights = np.maximum(points[:, 3], 1e-6)
-        return nurbs_line(points[:, :3], weights, degree + 1, self.clamped and not self.closed, _NURBS_PIECES)[0]
+        return sample_nurbs(points[:, :3], weights, degree + 1, self.clamped and not self.closed, _NURBS_PIECES)[0]
 
-    def path(self) -> Path:
+    def to_path(self) -> Path:
         """Convert the curve to a path of the core. Raises InputError if it has no length."""
-        from ...beyond_mocap.path_editing.path_line import through
+        from ...beyond_mocap.path_editing.path_line import fit_line
 
-        line = self.line()
+        line = self.sample_line()
         if self.closed and len(line) and np.linalg.norm(line[-1] - line[0]) < 1e-6:
             line = line[:-1]
-        return through(line, f"curve {self.name}", closed=self.closed)
+        return fit_line(line, f"curve {self.name}", closed=self.closed)
 
 
-def read(scene: bpy.types.Scene, drawn: bpy.types.Object | None) -> Drawn:
+def read_curve(scene: bpy.types.Scene, drawn: bpy.types.Object | None) -> DrawnCurve:
     """Read a curve object as it is drawn now. Raises InputError if it has no line."""
     if drawn is None or drawn.name not in scene.objects:
         raise InputError("new path", "its curve is not in the scene", "a curve object",
                          "choose another curve, or press New Curve")
     if drawn.type != "CURVE":
         raise InputError(f"object {drawn.name}", "is not a curve", "a curve object (Add > Curve)", "choose another")
-    lines = [spline for spline in drawn.data.splines if len(points_of(spline)) > 1]
+    lines = [spline for spline in drawn.data.splines if len(list_points(spline)) > 1]
     if not lines:
         raise InputError(f"curve {drawn.name}", "has no line", "two points or more", "add points in edit mode")
     spline, notes = lines[0], []
@@ -108,21 +108,21 @@ def read(scene: bpy.types.Scene, drawn: bpy.types.Object | None) -> Drawn:
     if animated := is_animated(drawn):
         notes.append(f"curve {drawn.name}: its animation is ignored; the motion follows its state at the last edit")
     world, units = np.array(drawn.matrix_world), units_per_metre(scene)
-    points = _control_points(spline)
+    points = _read_control_points(spline)
     places = points[:, :9] if spline.type == "BEZIER" else points[:, :3]
-    turned = (places.reshape(-1, 3) @ world[:3, :3].T + world[:3, 3]) / units
-    values = np.concatenate([turned.reshape(len(points), -1), points[:, places.shape[1]:]], axis=1)
+    transformed = (places.reshape(-1, 3) @ world[:3, :3].T + world[:3, 3]) / units
+    values = np.concatenate([transformed.reshape(len(points), -1), points[:, places.shape[1]:]], axis=1)
     if not np.isfinite(values).all():
         raise InputError(f"curve {drawn.name}", "a point with NaN or infinite values", "finite coordinates",
                          "move or delete that point")
     kind = spline.type if spline.type in {"BEZIER", "POLY"} else "NURBS"
     order = spline.order_u if kind == "NURBS" else 0
-    still = points.tobytes() + repr(units).encode() if animated else values.tobytes()
-    return Drawn(drawn.name, kind, values, order=order, clamped=spline.use_endpoint_u, closed=spline.use_cyclic_u,
-                 still=still, notes=tuple(notes))
+    static_bytes = points.tobytes() + repr(units).encode() if animated else values.tobytes()
+    return DrawnCurve(drawn.name, kind, values, order=order, clamped=spline.use_endpoint_u, closed=spline.use_cyclic_u,
+                 static_bytes=static_bytes, notes=tuple(notes))
 
 
-def create(
+def create_curve(
     context: bpy.types.Context, name: str, path: Path, straight: bool = False, count: int = 0, kind: str = "BEZIER",
     degree: int = 3,
 ) -> bpy.types.Object:
@@ -141,7 +141,7 @@ def create(
     Raises:
         InputError: for too few points for the degree.
     """
-    points, handles = _fitted(path, count, kind, degree, straight)
+    points, handles = _fit_points(path, count, kind, degree, straight)
     units = units_per_metre(context.scene)
     origin = points[0] * units
     data = bpy.data.curves.new(name, "CURVE")
@@ -161,13 +161,13 @@ def create(
         spline.points.add(len(points) - 1)
         spline.points.foreach_set("co", np.column_stack([local, np.ones(len(local), np.float32)]).ravel())
         spline.order_u, spline.use_endpoint_u = min(degree + 1, len(points)), True
-    made = bpy.data.objects.new(name, data)
-    made.location, made[MARK] = origin, True
+    created = bpy.data.objects.new(name, data)
+    created.location, created[MARK] = origin, True
     room = context.scene.collection if context.layer_collection.exclude else context.collection
-    room.objects.link(made)
+    room.objects.link(created)
     context.view_layer.update()
-    _as_long(context.scene, made, path)
-    return made
+    _extend_curve(context.scene, created, path)
+    return created
 
 
 def remove_curve(drawn: bpy.types.Object) -> None:
@@ -195,7 +195,7 @@ def is_animated(drawn: bpy.types.Object) -> bool:
     return False
 
 
-def ground_digest(scene: bpy.types.Scene, ground: bpy.types.Object | None) -> bytes:
+def compute_ground_digest(scene: bpy.types.Scene, ground: bpy.types.Object | None) -> bytes:
     """Compute a digest of the ground's evaluated mesh; the place of an animated ground is ignored.
 
     Raises InputError if the ground was deleted.
@@ -204,27 +204,27 @@ def ground_digest(scene: bpy.types.Scene, ground: bpy.types.Object | None) -> by
         return b""
     if ground.name not in scene.objects:
         raise InputError("ground", f"{ground.name} is not in the scene", "a mesh object", "choose another, or none")
-    shown = ground.evaluated_get(bpy.context.evaluated_depsgraph_get())
-    mesh = shown.to_mesh()  # also while it is being edited
-    parts = [_vertices(mesh)]
+    evaluated = ground.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    mesh = evaluated.to_mesh()  # also while it is being edited
+    parts = [_read_vertices(mesh)]
     if corners := mesh.attributes.get(".corner_vert"):  # ten times as fast as Blender's triangles
         found = np.empty(len(corners.data), np.int32)
         corners.data.foreach_get("value", found)
         parts += [found, len(mesh.polygons).to_bytes(8, "little")]
-    shown.to_mesh_clear()
+    evaluated.to_mesh_clear()
     if not is_animated(ground):
-        parts.append(np.array(shown.matrix_world))
+        parts.append(np.array(evaluated.matrix_world))
     return byte_digest(*parts)
 
 
-def ground_notes(ground: bpy.types.Object | None) -> tuple[str, ...]:
+def list_ground_messages(ground: bpy.types.Object | None) -> tuple[str, ...]:
     """List messages about the ground."""
     moves = ground is not None and is_animated(ground)
     return (f"ground {ground.name}: its animation is ignored; feet follow its state at the last edit",
             ) if moves else ()
 
 
-def ground_of(scene: bpy.types.Scene, ground: bpy.types.Object | None, digest: bytes):
+def load_ground(scene: bpy.types.Scene, ground: bpy.types.Object | None, digest: bytes):
     """Load the `Terrain` of a mesh object in metres; None without one.
 
     Args:
@@ -243,21 +243,21 @@ def ground_of(scene: bpy.types.Scene, ground: bpy.types.Object | None, digest: b
     units = units_per_metre(scene)
     digest += repr(units).encode()
     if _grounds.get(ground.session_uid, (b"", None))[0] != digest:
-        places, corners = _mesh(ground)
+        places, corners = _read_mesh(ground)
         if not len(corners):
             raise InputError(f"ground {ground.name}", "a mesh without faces", "a mesh with faces", "choose another")
         _grounds[ground.session_uid] = digest, Terrain(places / units, corners)
     return _grounds[ground.session_uid][1]
 
 
-def forget_grounds() -> None:
+def clear_ground_cache() -> None:
     """Clear the cache when another file is opened."""
     _grounds.clear()
 
 
-def _control_points(spline: bpy.types.Spline) -> np.ndarray:
+def _read_control_points(spline: bpy.types.Spline) -> np.ndarray:
     """Read control points (P, 9) or (P, 4), see `DrawnCurve`, in the curve's own space."""
-    points = points_of(spline)
+    points = list_points(spline)
     names = (("co", 3), ("handle_left", 3), ("handle_right", 3)) if spline.type == "BEZIER" else (("co", 4),)
     columns = []
     for name, size in names:
@@ -267,7 +267,7 @@ def _control_points(spline: bpy.types.Spline) -> np.ndarray:
     return np.concatenate(columns, axis=1)
 
 
-def _bezier(points: np.ndarray) -> np.ndarray:
+def _sample_bezier(points: np.ndarray) -> np.ndarray:
     """Sample places (N, 3) along Bezier points (P, 9)."""
     a, b, c, d = points[:-1, :3], points[:-1, 6:9], points[1:, 3:6], points[1:, :3]
     length = sum(np.linalg.norm(end - start, axis=1) for start, end in ((a, b), (b, c), (c, d)))
@@ -281,7 +281,7 @@ def _bezier(points: np.ndarray) -> np.ndarray:
     return np.concatenate([fine, last])
 
 
-def _fitted(path: Path, count: int, kind: str, degree: int, straight: bool) -> tuple[np.ndarray, tuple]:
+def _fit_points(path: Path, count: int, kind: str, degree: int, straight: bool) -> tuple[np.ndarray, tuple]:
     """Fit control points (P, 3) in metres and, for Bezier points, their left and right handles."""
     from ...beyond_mocap.path_editing import path_line
 
@@ -289,23 +289,23 @@ def _fitted(path: Path, count: int, kind: str, degree: int, straight: bool) -> t
     more = 2 if kind == "BEZIER" else 0  # a cubic spline of P control points is a chain of P - 2 Bezier points
     count = max(count, 2) if count else 0
     if straight:
-        points = _lengthened(path_line.straight(path, count or max(4, degree + 1)), path)
+        points = _scale_line(path_line.build_straight_points(path, count or max(4, degree + 1)), path)
         third = (points[1] - points[0]) / 3.0
         return points, (points - third, points + third)
     if kind == "BEZIER" and not count:
-        return _chain(path)
-    points = path_line.control_points(path, count + more, degree) if count else _close_enough(path, degree)
+        return _fit_bezier_chain(path)
+    points = path_line.fit_control_points(path, count + more, degree) if count else _fit_control_points(path, degree)
     if kind != "BEZIER":
         return points, ()
-    spline = path_line.b_spline(points, degree)
+    spline = path_line.build_b_spline(points, degree)
     knots = spline.breaks
-    places, pull = spline.at(knots), spline.at(knots, 1)
+    places, tangents = spline.at(knots), spline.at(knots, 1)
     gaps = np.diff(knots)[:, None] / 3.0
     before, after = np.concatenate([gaps[:1], gaps]), np.concatenate([gaps, gaps[-1:]])
-    return places, (places - pull * before, places + pull * after)
+    return places, (places - tangents * before, places + tangents * after)
 
 
-def _chain(path: Path) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray]]:
+def _fit_bezier_chain(path: Path) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray]]:
     """Fit Bezier points (P, 3) on the path and their left and right handles, denser in bends, within _FIT_TOLERANCE of
     it.
 
@@ -314,74 +314,74 @@ def _chain(path: Path) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray]]:
     from ...beyond_mocap.motion.path.arc_length import ArcLength
 
     arc = ArcLength(path)
-    pieces = max(int(np.ceil(arc.length / _APART)), 3)
+    pieces = max(int(np.ceil(arc.length / _MOST_SPACING)), 3)
     nodes = np.linspace(0.0, arc.length, pieces + 1)
-    while len(nodes) < _MOST:
+    while len(nodes) < _MOST_POINTS:
         gap = np.diff(nodes)
-        split = (_beside(path, arc, nodes) > _CLOSE) & (gap > 2.0 * _NEAREST)
+        split = (_measure_deviation(path, arc, nodes) > _FIT_TOLERANCE) & (gap > 2.0 * _LEAST_SPACING)
         if not split.any():
             break
-        worst = np.flatnonzero(split)[: _MOST - len(nodes)]
+        worst = np.flatnonzero(split)[: _MOST_POINTS - len(nodes)]
         nodes = np.sort(np.concatenate([nodes, nodes[worst] + 0.5 * gap[worst]]))
-    places, pull = _nodes(path, arc, nodes)
+    places, tangents = _compute_nodes(path, arc, nodes)
     third = np.diff(nodes)[:, None] / 3.0
     before, after = np.concatenate([third[:1], third]), np.concatenate([third, third[-1:]])
     if path.closed:  # the first point is the last one too
-        return places[:-1], ((places - pull * np.concatenate([third[-1:], third]))[:-1], (places + pull * after)[:-1])
-    return places, (places - pull * before, places + pull * after)
+        return places[:-1], ((places - tangents * np.concatenate([third[-1:], third]))[:-1], (places + tangents * after)[:-1])
+    return places, (places - tangents * before, places + tangents * after)
 
 
-def _nodes(path: Path, arc, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _compute_nodes(path: Path, arc, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Compute places (N, 3) and unit tangents (N, 3) at arc lengths s (N,) m."""
-    u = arc.parameter(s)
-    pull = path.at(u, 1)
-    return path.at(u), unit_vectors(pull)
+    u = arc.parameter_at(s)
+    tangents = path.at(u, 1)
+    return path.at(u), unit_vectors(tangents)
 
 
-def _beside(path: Path, arc, nodes: np.ndarray) -> np.ndarray:
+def _measure_deviation(path: Path, arc, nodes: np.ndarray) -> np.ndarray:
     """Measure how far (N - 1,) m the Bezier segments between nodes (N,) m are off the path."""
-    places, pull = _nodes(path, arc, nodes)
+    places, tangents = _compute_nodes(path, arc, nodes)
     gap = np.diff(nodes)[:, None, None]
     t = np.linspace(0.0, 1.0, 9)[1:-1, None]
     a, d = places[:-1, None], places[1:, None]
-    b, c = a + pull[:-1, None] * gap / 3.0, d - pull[1:, None] * gap / 3.0
+    b, c = a + tangents[:-1, None] * gap / 3.0, d - tangents[1:, None] * gap / 3.0
     drawn = (1 - t) ** 3 * a + 3 * t * (1 - t) ** 2 * b + 3 * t**2 * (1 - t) * c + t**3 * d
     s = nodes[:-1, None] + gap[..., 0] * t[:, 0]
-    return np.linalg.norm(drawn - path.at(arc.parameter(s.ravel())).reshape(drawn.shape), axis=2).max(axis=1)
+    return np.linalg.norm(drawn - path.at(arc.parameter_at(s.ravel())).reshape(drawn.shape), axis=2).max(axis=1)
 
 
-def _close_enough(path: Path, degree: int) -> np.ndarray:
+def _fit_control_points(path: Path, degree: int) -> np.ndarray:
     """Fit the fewest control points whose spline is within _FIT_TOLERANCE of the path."""
     from ...beyond_mocap.motion.path.arc_length import ArcLength
     from ...beyond_mocap.path_editing import path_line
 
     arc = ArcLength(path)
     share = np.linspace(0.0, 1.0, 400)
-    places = path.at(arc.parameter(share * arc.length * (1.0 - 1e-9)))
-    least = max(degree + 1, arc.length / _APART + 2.0)
+    places = path.at(arc.parameter_at(share * arc.length * (1.0 - 1e-9)))
+    least = max(degree + 1, arc.length / _MOST_SPACING + 2.0)
     for count in [count for count in _COUNTS if count >= least] or _COUNTS[-1:]:
-        points = path_line.control_points(path, count, degree)
-        if np.linalg.norm(path_line.b_spline(points, degree).at(share) - places, axis=1).max() <= _CLOSE:
+        points = path_line.fit_control_points(path, count, degree)
+        if np.linalg.norm(path_line.build_b_spline(points, degree).at(share) - places, axis=1).max() <= _FIT_TOLERANCE:
             break
     return points
 
 
-def _as_long(scene: bpy.types.Scene, made: bpy.types.Object, path: Path) -> None:
+def _extend_curve(scene: bpy.types.Scene, created: bpy.types.Object, path: Path) -> None:
     """Extend a new curve that is shorter than the path, so that the motion does not end early."""
     from ...beyond_mocap.motion.path.arc_length import ArcLength
 
-    spline = made.data.splines[0]
+    spline = created.data.splines[0]
     if spline.use_cyclic_u:
         return
     units, length = units_per_metre(scene), ArcLength(path).length + _SPARE
     for _ in range(3):
-        line = read(scene, made).line()
-        lacks = length - ArcLength(read(scene, made).path()).length
+        line = read_curve(scene, created).sample_line()
+        lacks = length - ArcLength(read_curve(scene, created).to_path()).length
         ahead = line[-1] - line[-2]
         if lacks <= 0.0 or np.linalg.norm(ahead) < 1e-9:
             return
         by = Vector(ahead / np.linalg.norm(ahead) * lacks * units)
-        last = points_of(spline)[-1]
+        last = list_points(spline)[-1]
         if spline.type == "BEZIER":
             last.handle_left, last.handle_right = last.handle_left + by, last.handle_right + by
             last.co = last.co + by
@@ -389,7 +389,7 @@ def _as_long(scene: bpy.types.Scene, made: bpy.types.Object, path: Path) -> None
             last.co = last.co + Vector((*by, 0.0))
 
 
-def _lengthened(points: np.ndarray, path: Path) -> np.ndarray:
+def _scale_line(points: np.ndarray, path: Path) -> np.ndarray:
     """Scale even points (P, 3) of a straight line to the length of the path."""
     from ...beyond_mocap.motion.path.arc_length import ArcLength
 
@@ -397,18 +397,18 @@ def _lengthened(points: np.ndarray, path: Path) -> np.ndarray:
     return points[0] + (points - points[0]) * ((ArcLength(path).length + _SPARE) / np.linalg.norm(whole))
 
 
-def _mesh(ground: bpy.types.Object) -> tuple[np.ndarray, np.ndarray]:
+def _read_mesh(ground: bpy.types.Object) -> tuple[np.ndarray, np.ndarray]:
     """Read an evaluated mesh object: vertices (V, 3) in the world, Blender units, and triangles (F, 3)."""
-    shown = ground.evaluated_get(bpy.context.evaluated_depsgraph_get())
-    mesh = shown.to_mesh()
-    places, corners = _vertices(mesh), np.empty(3 * len(mesh.loop_triangles), np.int32)
+    evaluated = ground.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    mesh = evaluated.to_mesh()
+    places, corners = _read_vertices(mesh), np.empty(3 * len(mesh.loop_triangles), np.int32)
     mesh.loop_triangles.foreach_get("vertices", corners)
-    shown.to_mesh_clear()
-    world = np.array(shown.matrix_world)
+    evaluated.to_mesh_clear()
+    world = np.array(evaluated.matrix_world)
     return places @ world[:3, :3].T + world[:3, 3], corners.reshape(-1, 3)
 
 
-def _vertices(mesh: bpy.types.Mesh) -> np.ndarray:
+def _read_vertices(mesh: bpy.types.Mesh) -> np.ndarray:
     """Read the vertices (V, 3) of a mesh, in its own space."""
     places = np.empty(3 * len(mesh.vertices), np.float32)
     mesh.vertices.foreach_get("co", places)

@@ -18,11 +18,11 @@ import bpy
 
 from ...beyond_mocap.base.errors import BeyondMocapError
 from ..core import background
-from ..core.live import Watcher, attempt
+from ..core.live import Watcher, call_or_describe
 from . import curve
 from . import riders as rides
-from .carrier import recheck_sources
-from .settings import riders
+from .carrier import invalidate_sources
+from .settings import list_edited_bodies
 
 MATTERS = (bpy.types.Object, bpy.types.Curve, bpy.types.Mesh, bpy.types.Armature, bpy.types.Action, bpy.types.Scene)
 KIND = "path figures"
@@ -34,102 +34,102 @@ _since: dict[int, tuple[int, float]] = {}  # likewise: number of the current edi
 _running: list[tuple[background.Job, int, int]] = []  # at most one, with the armature's session_uid and the number
 
 
-def follow(scene: bpy.types.Scene) -> int:
+def update_all(scene: bpy.types.Scene) -> int:
     """Update all live edited bodies of a scene; returns how many changed. Errors become messages of the body."""
     count = 0
-    for body in riders(scene):
+    for body in list_edited_bodies(scene):
         if not body.beyond_mocap_ride.live or body.mode == "EDIT" or body.library is not None:
             continue
         failed = f"{body.name}: the motion cannot be computed"
-        count += bool(attempt(lambda: rides.renew(scene, body), partial(rides.tell, body.beyond_mocap_ride), failed))
+        count += bool(call_or_describe(lambda: rides.update_motion(scene, body), partial(rides.store_messages, body.beyond_mocap_ride), failed))
     return count
 
 
-def measure(scene: bpy.types.Scene, body: bpy.types.Object) -> None:
+def measure_body(scene: bpy.types.Scene, body: bpy.types.Object) -> None:
     """Measure an edited body at once; nothing happens if this session has not computed it."""
-    shown = rides.shown(body)
-    if shown is not None:
-        _keep(body, _figures(shown, _ground(scene, body)))
+    computed = rides.find_computed_edit(body)
+    if computed is not None:
+        _store_figures(body, _measure_edit(computed, _load_ground(scene, body)))
 
 
-def _figures(shown, ground) -> dict:
-    from ...beyond_mocap.path_editing.path_ride import figures
+def _measure_edit(computed, ground) -> dict:
+    from ...beyond_mocap.path_editing.path_ride import measure_path_edit
 
-    return figures(shown.source, shown.ridden, shown.path, ground)
+    return measure_path_edit(computed.source, computed.edited, computed.path, ground)
 
 
-def _ground(scene: bpy.types.Scene, body: bpy.types.Object):
+def _load_ground(scene: bpy.types.Scene, body: bpy.types.Object):
     ground = body.beyond_mocap_ride.ground
-    return curve.ground_of(scene, ground, curve.ground_digest(scene, ground))
+    return curve.load_ground(scene, ground, curve.compute_ground_digest(scene, ground))
 
 
-def _keep(body: bpy.types.Object, figures: dict) -> None:
+def _store_figures(body: bpy.types.Object, figures: dict) -> None:
     """Store figures beside those that are computed while a path is dragged."""
-    ride = body.beyond_mocap_ride
-    ride.figures = json.dumps({**(json.loads(ride.figures) if ride.figures else {}), **figures})
+    edit = body.beyond_mocap_ride
+    edit.figures = json.dumps({**(json.loads(edit.figures) if edit.figures else {}), **figures})
 
 
-def _tick() -> float:
+def _run_timer() -> float:
     """Check once: start to measure a body at rest, or collect a result; returns the seconds until the next check."""
     if bpy.app.is_job_running("RENDER"):
         return LOOK
     if _running:
-        return _collect()
-    window, waiting = next(((window, body) for window, body in _seen() if _waits(body)), (None, None))
+        return _collect_result()
+    window, waiting = next(((window, body) for window, body in _list_visible_bodies() if _is_waiting(body)), (None, None))
     if waiting is None:
         return LOOK
-    shown = rides.shown(waiting)
+    computed = rides.find_computed_edit(waiting)
     try:
         with bpy.context.temp_override(window=window):  # a timer has none, and the ground is the window's
-            ground = _ground(window.scene, waiting)
+            ground = _load_ground(window.scene, waiting)
     except BeyondMocapError:  # reported where the body is updated
-        _failed[waiting.session_uid] = shown.number
+        _failed[waiting.session_uid] = computed.number
         return LOOK
-    _running.append((background.Job(KIND, lambda *_: _figures(shown, ground)), waiting.session_uid, shown.number))
+    _running.append((background.Job(KIND, lambda *_: _measure_edit(computed, ground)), waiting.session_uid, computed.number))
     return WAIT
 
 
-def _seen() -> list[tuple[bpy.types.Window, bpy.types.Object]]:
+def _list_visible_bodies() -> list[tuple[bpy.types.Window, bpy.types.Object]]:
     """List the edited bodies of the scenes of all windows."""
-    return [(window, body) for window in bpy.context.window_manager.windows for body in riders(window.scene)]
+    return [(window, body) for window in bpy.context.window_manager.windows for body in list_edited_bodies(window.scene)]
 
 
-def _waits(body: bpy.types.Object) -> bool:
+def _is_waiting(body: bpy.types.Object) -> bool:
     """Return whether an edited body has been at rest for a while and is not measured."""
-    shown, uid = rides.shown(body), body.session_uid
-    if shown is None or KNOWN in body.beyond_mocap_ride.figures or _failed.get(uid) == shown.number:
+    computed, uid = rides.find_computed_edit(body), body.session_uid
+    if computed is None or KNOWN in body.beyond_mocap_ride.figures or _failed.get(uid) == computed.number:
         return False
-    if _since.get(uid, (0, 0.0))[0] != shown.number:
-        _since[uid] = shown.number, perf_counter()
+    if _since.get(uid, (0, 0.0))[0] != computed.number:
+        _since[uid] = computed.number, perf_counter()
     return perf_counter() - _since[uid][1] > REST
 
 
-def _collect() -> float:
+def _collect_result() -> float:
     """Store the result of a finished job if its body has not changed since."""
     job, uid, number = _running[0]
     if not job.poll():
         return WAIT
     _running.clear()
-    body = next((body for _, body in _seen() if body.session_uid == uid), None)
-    shown = rides.shown(body) if body is not None else None
+    body = next((body for _, body in _list_visible_bodies() if body.session_uid == uid), None)
+    computed = rides.find_computed_edit(body) if body is not None else None
     if job.error is not None:
         _failed[uid] = number
         print(f"Beyond Mocap: cannot measure a path edit: {job.error}")
-    elif shown is not None and shown.number == number:
-        _keep(body, job.result)
+    elif computed is not None and computed.number == number:
+        _store_figures(body, job.result)
     return LOOK
 
 
-def forget() -> None:
+def stop_measuring() -> None:
     """Stop measuring."""
-    background.stop(KIND)
-    for kept in (_failed, _since, _running):
-        kept.clear()
+    background.cancel_jobs(KIND)
+    for table in (_failed, _since, _running):
+        table.clear()
 
 
 WATCHER = Watcher(
-    name="Path editing", matters=MATTERS, follow=follow, restored=recheck_sources, loaded=rides.forget,
-    ends=rides.forget,
-    framed=lambda _scene: WATCHER.mark(),  # the only report of edits that take effect with a change of frame
+    name="Path editing", watched_types=MATTERS, follow=update_all, restored=invalidate_sources, loaded=rides.clear_caches,
+    ends=rides.clear_caches,
+    framed=lambda _scene: WATCHER.mark_dirty(),  # the only report of edits that take effect with a change of frame
 )
-FIGURES = Watcher(name="Figures of path editing", look=_tick, ends=forget)
+FIGURES = Watcher(name="Figures of path editing", look=_run_timer, ends=stop_measuring)

@@ -20,7 +20,7 @@ _WIDTHS = {"location": 3, "rotation_quaternion": 4, "rotation_euler": 3, "rotati
 
 
 @dataclass(frozen=True, eq=False)
-class Look:
+class RigSamples:
     """F sampled frames of an armature.
 
     Attributes:
@@ -35,7 +35,7 @@ class Look:
     """
 
     frames: np.ndarray
-    lies: np.ndarray
+    world_matrices: np.ndarray
     basis: np.ndarray
     bones: list[str]
     poses: np.ndarray
@@ -43,33 +43,33 @@ class Look:
     channels: dict[str, np.ndarray]
     others: dict[str, np.ndarray]
 
-    def number(self, bone: str) -> int:
+    def find_bone(self, bone: str) -> int:
         """Find the index of a bone."""
         return self.bones.index(bone)
 
-    def own(self, bone: int) -> np.ndarray:
+    def compute_own_rotations(self, bone: int) -> np.ndarray:
         """Compute the rotations (F, 4) of a bone's own channels, in any rotation mode."""
         mode = self.modes[bone]
-        return turns(mode, self.channels[channel_of(mode)][:, bone])
+        return to_rotations(mode, self.channels[find_rotation_channel(mode)][:, bone])
 
 
-def channel_of(mode: str) -> str:
+def find_rotation_channel(mode: str) -> str:
     """Return the rotation channel that a rotation mode uses."""
     return TURNS.get(mode, "rotation_euler")
 
 
-def turns(mode: str, values: np.ndarray) -> np.ndarray:
+def to_rotations(mode: str, values: np.ndarray) -> np.ndarray:
     """Convert the values (F, n) of a rotation mode's channel to rotations (F, 4)."""
     if mode == "QUATERNION":
-        return quaternion.normalized(values)
+        return quaternion.normalize(values)
     if mode == "AXIS_ANGLE":
-        return quaternion.about_axis(unit_vectors(values[:, 1:]), values[:, 0])
+        return quaternion.from_axis_angle(unit_vectors(values[:, 1:]), values[:, 0])
     order = mode[::-1]  # Blender names the axes in the order in which they are applied to a point
     return quaternion.from_euler(values[:, ["XYZ".index(letter) for letter in order]], order)
 
 
 @contextmanager
-def alone(rig: bpy.types.Object, scene: bpy.types.Scene):
+def create_private_scene(rig: bpy.types.Object, scene: bpy.types.Scene):
     """Create a scene with only this object and what it depends on, at the rate of `scene`; it is removed afterwards.
 
     Hidden objects, and armatures in rest position, are posed meanwhile.
@@ -94,7 +94,7 @@ def alone(rig: bpy.types.Object, scene: bpy.types.Scene):
         bpy.data.scenes.remove(side)
 
 
-def look(rig: bpy.types.Object, side: bpy.types.Scene, frames: np.ndarray, others: list[str] = ()) -> Look:
+def sample_rig(rig: bpy.types.Object, side: bpy.types.Scene, frames: np.ndarray, others: list[str] = ()) -> RigSamples:
     """Sample an armature at scene frames.
 
     Args:
@@ -107,26 +107,26 @@ def look(rig: bpy.types.Object, side: bpy.types.Scene, frames: np.ndarray, other
     """
     count, bones = len(frames), [bone.name for bone in rig.pose.bones]
     poses = np.empty((count, len(bones), 4, 4), np.float32)
-    lies, basis = np.empty((count, 4, 4)), np.empty((count, 4, 4))
+    world_matrices, basis = np.empty((count, 4, 4)), np.empty((count, 4, 4))
     channels = {name: np.empty((count, len(bones), width), np.float32) for name, width in _WIDTHS.items()}
     more: dict[str, list] = {path: [] for path in others}
     for row, frame in enumerate(frames):
         whole = int(np.floor(frame + 1e-6))
         side.frame_set(whole, subframe=float(np.clip(frame - whole, 0.0, 0.999999)))
-        shown = rig.evaluated_get(side.view_layers[0].depsgraph)
-        shown.pose.bones.foreach_get("matrix", poses[row].reshape(-1))
+        evaluated = rig.evaluated_get(side.view_layers[0].depsgraph)
+        evaluated.pose.bones.foreach_get("matrix", poses[row].reshape(-1))
         for name, table in channels.items():
-            shown.pose.bones.foreach_get(name, table[row].reshape(-1))
-        lies[row], basis[row] = np.array(shown.matrix_world), np.array(shown.matrix_basis)
+            evaluated.pose.bones.foreach_get(name, table[row].reshape(-1))
+        world_matrices[row], basis[row] = np.array(evaluated.matrix_world), np.array(evaluated.matrix_basis)
         for path, rows in more.items():
-            rows.append(numbers_of(shown.path_resolve(path)))
+            rows.append(to_numbers(evaluated.path_resolve(path)))
     modes = [bone.rotation_mode for bone in rig.pose.bones]
-    return Look(np.asarray(frames, float), lies, basis, bones=bones, poses=poses.swapaxes(-1, -2).astype(float),
+    return RigSamples(np.asarray(frames, float), world_matrices, basis, bones=bones, poses=poses.swapaxes(-1, -2).astype(float),
                 modes=modes, channels={name: table.astype(float) for name, table in channels.items()},
                 others={path: np.array(rows, float).reshape(count, -1) for path, rows in more.items()})
 
 
-def numbers_of(value) -> list[float]:
+def to_numbers(value) -> list[float]:
     """Convert a property's value to a list of numbers."""
     try:
         return [float(one) for one in value]

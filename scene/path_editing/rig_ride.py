@@ -15,11 +15,11 @@ import bpy
 import numpy as np
 
 from ...beyond_mocap.motion import quaternion
-from ...beyond_mocap.motion.motion import Motion, at_frames, forward_kinematics
-from ..rigs.control_study import STATIC, Rides
-from .keys import rotation
-from .rig_look import Look
-from .rig_parts import Parts, in_world, rotations
+from ...beyond_mocap.motion.motion import Motion, sample_frames, forward_kinematics
+from ..rigs.control_study import STATIC, Carriers
+from .keys import to_rotation_channel
+from .rig_look import RigSamples
+from .rig_parts import RigParts, compute_world_places, to_rotations
 
 WHOLE, OBJECT = "whole", "object"
 _SAME = 1e-6
@@ -44,11 +44,11 @@ class Control:
     turn: str
     place: str
     axes: str
-    slides: bool
+    has_location: bool
 
 
 @dataclass(frozen=True, eq=False)
-class Moves:
+class GroupMotions:
     """The rigid motion of each group from the source to its present place: x -> turn (x - before) + after.
 
     Attributes:
@@ -58,40 +58,40 @@ class Moves:
         known: cache of comparisons.
     """
 
-    turn: dict[str, np.ndarray]
+    rotation: dict[str, np.ndarray]
     before: dict[str, np.ndarray]
     after: dict[str, np.ndarray]
     known: dict = field(default_factory=dict)
 
-    def point(self, group: str, points: np.ndarray) -> np.ndarray:
+    def transform_point(self, group: str, points: np.ndarray) -> np.ndarray:
         """Transform points (N, 3) that move with a group."""
-        return quaternion.rotate(self.turn[group], points - self.before[group]) + self.after[group]
+        return quaternion.rotate(self.rotation[group], points - self.before[group]) + self.after[group]
 
-    def points(self, groups: list[str], points: np.ndarray) -> np.ndarray:
+    def transform_points(self, groups: list[str], points: np.ndarray) -> np.ndarray:
         """Transform points (N, C, 3), each column with its group."""
         turn, before, after = (np.stack([table[group] for group in groups], axis=1)
-                               for table in (self.turn, self.before, self.after))
+                               for table in (self.rotation, self.before, self.after))
         return quaternion.rotate(turn, points - before) + after
 
-    def alike(self, one: str, other: str) -> bool:
+    def moves_alike(self, one: str, other: str) -> bool:
         """Return whether two groups move alike: to a ten-thousandth of a degree and of a millimetre."""
         if one == other:
             return True
         if (known := self.known.get((one, other))) is None:
-            same = np.abs(np.abs(self.between(one, other)[:, 0]) - 1.0).max() <= 1e-12
-            same = same and np.abs(self.point(one, self.before[other]) - self.after[other]).max() < 1e-7
+            same = np.abs(np.abs(self.compute_relative_rotation(one, other)[:, 0]) - 1.0).max() <= 1e-12
+            same = same and np.abs(self.transform_point(one, self.before[other]) - self.after[other]).max() < 1e-7
             known = self.known[one, other] = bool(same)
         return known
 
-    def between(self, one: str, other: str) -> np.ndarray:
+    def compute_relative_rotation(self, one: str, other: str) -> np.ndarray:
         """Compute the rotation (N, 4) of group `other` relative to group `one`."""
         if (known := self.known.get((one, other, "turn"))) is None:
-            known = quaternion.multiply(quaternion.inverse(self.turn[one]), self.turn[other])
+            known = quaternion.multiply(quaternion.inverse(self.rotation[one]), self.rotation[other])
             self.known[one, other, "turn"] = known
         return known
 
 
-class Rows:
+class SourceRows:
     """Source frames (N,) of the displayed frames, fractional in general, counted from the first sample.
 
     Attributes:
@@ -107,21 +107,21 @@ class Rows:
         self.weight = np.zeros(len(at)) if self.whole else at - self.low
         self.same = self.whole and len(at) == count and np.array_equal(self.low, np.arange(count))
 
-    def numbers(self, name, table: np.ndarray) -> np.ndarray:
+    def sample_numbers(self, name, table: np.ndarray) -> np.ndarray:
         """Interpolate a table (F, ...) of numbers; name: a unique key for the cache."""
-        return self.remembered(name, lambda: self._at(table, self._mixed))
+        return self.find_cached(name, lambda: self._select_rows(table, self._blend_rows))
 
-    def turns(self, name, table: np.ndarray) -> np.ndarray:
+    def sample_rotations(self, name, table: np.ndarray) -> np.ndarray:
         """Interpolate a table (F, 4) of rotations; name: a unique key for the cache."""
-        return self.remembered(name, lambda: self._at(table, lambda a, b: quaternion.slerp(a, b, self.weight)))
+        return self.find_cached(name, lambda: self._select_rows(table, lambda a, b: quaternion.slerp(a, b, self.weight)))
 
-    def remembered(self, name, made) -> np.ndarray:
+    def find_cached(self, name, compute) -> np.ndarray:
         """Return the cached value of a name, computed by `compute` when missing."""
         if name not in self.known:
-            self.known[name] = made()
+            self.known[name] = compute()
         return self.known[name]
 
-    def _at(self, table: np.ndarray, blend) -> np.ndarray:
+    def _select_rows(self, table: np.ndarray, blend) -> np.ndarray:
         """Select rows of a table; blend(before, after) interpolates between two rows."""
         if self.same:
             return table
@@ -129,15 +129,15 @@ class Rows:
             return table[self.low]
         return blend(table[self.low], table[np.minimum(self.low + 1, len(table) - 1)])
 
-    def _mixed(self, before: np.ndarray, after: np.ndarray) -> np.ndarray:
+    def _blend_rows(self, before: np.ndarray, after: np.ndarray) -> np.ndarray:
         weight = self.weight.reshape(-1, *[1] * (before.ndim - 1))
         return (1.0 - weight) * before + weight * after
 
 
-class Carried:
+class RigTransfer:
     """A sampled rig, with its controls and the values that they need."""
 
-    def __init__(self, rig: bpy.types.Object, parts: Parts, seen: Look, rides: Rides, object_keyed: bool,
+    def __init__(self, rig: bpy.types.Object, parts: RigParts, samples: RigSamples, dependencies: Carriers, object_keyed: bool,
                  motion: Motion, units: float):
         """Sort the controls into groups and tabulate them.
 
@@ -150,57 +150,57 @@ class Carried:
             motion: the motion that the parts show.
             units: Blender units in a metre.
         """
-        self.seen, self.parts, self.motion, self.units = seen, parts, motion, units
-        self.joint = {part: number for number, part in enumerate(parts.shown)}
+        self.samples, self.parts, self.motion, self.units = samples, parts, motion, units
+        self.joint = {part: number for number, part in enumerate(parts.visible_bones)}
         self.places, self.world = forward_kinematics(motion)
-        self.lie = rotations(seen.lies), seen.lies[:, :3, 3] / units
-        self.object_goes = object_keyed and self._travels(self.lie[1])
+        self.placement = to_rotations(samples.world_matrices), samples.world_matrices[:, :3, 3] / units
+        self.object_travels = object_keyed and self._is_travelling(self.placement[1])
         self.group: dict[str, str] = {
-            bone: part for table in (parts.shown, parts.controls) for part, bone in table.items()
+            bone: part for table in (parts.visible_bones, parts.controls) for part, bone in table.items()
         }
-        self.controls = self._sorted(rig, rides)
-        self.tables = {control.name: self._table(rig, control) for control in self.controls}
+        self.controls = self._list_controls(rig, dependencies)
+        self.tables = {control.name: self._tabulate_control(rig, control) for control in self.controls}
 
-    def _travels(self, places: np.ndarray) -> bool:
+    def _is_travelling(self, places: np.ndarray) -> bool:
         """Return whether something at places (F, 3) travels with the body."""
-        way = self.motion.root_positions[:, :2]
-        behind = np.ptp(places[:, :2] - way, axis=0).max()
-        return bool(behind <= max(_STAYS * np.ptp(way, axis=0).max(), _LEAST_WAY))
+        travel = self.motion.root_positions[:, :2]
+        behind = np.ptp(places[:, :2] - travel, axis=0).max()
+        return bool(behind <= max(_STAYS * np.ptp(travel, axis=0).max(), _LEAST_WAY))
 
-    def _sorted(self, rig: bpy.types.Object, rides: Rides) -> list[Control]:
+    def _list_controls(self, rig: bpy.types.Object, dependencies: Carriers) -> list[Control]:
         """List all firm controls with their groups."""
         known = dict(self.group)
-        places, _ = in_world(self.seen, [self.seen.number(name) for name in rides.controls], self.units)
+        places, _ = compute_world_places(self.samples, [self.samples.find_bone(name) for name in dependencies.controls], self.units)
 
-        def group(number: int, trail: tuple = ()) -> str:
+        def find_group(number: int, trail: tuple = ()) -> str:
             """Find the group of a carrier, following what it depends on."""
             if number == STATIC or number in trail:
                 return OBJECT
-            name = rides.carriers[number]
+            name = dependencies.carriers[number]
             if name in known:
                 return known[name]
-            found = group(int(rides.turn_of[number]), (*trail, number))
-            goes = self.parts.follows.get(name) or self.parts.trunk.get(name)
-            if goes is not None and (goes.endswith("toe") or goes.partition(" ")[0] != found.partition(" ")[0]):
-                found = goes
-            elif found == OBJECT and not self.object_goes and self._travels(places[:, number]):
+            found = find_group(int(dependencies.rotation_carrier[number]), (*trail, number))
+            followed_part = self.parts.follows.get(name) or self.parts.trunk.get(name)
+            if followed_part is not None and (followed_part.endswith("toe") or followed_part.partition(" ")[0] != found.partition(" ")[0]):
+                found = followed_part
+            elif found == OBJECT and not self.object_travels and self._is_travelling(places[:, number]):
                 found = WHOLE
             known[name] = found
             return found
 
         found = []
-        for number, name in enumerate(rides.controls):
-            if not rides.firm[number]:
+        for number, name in enumerate(dependencies.controls):
+            if not dependencies.is_reliable[number]:
                 continue
-            own, turn, place, axes = group(number), *(group(int(table[number])) for table in (
-                rides.turn_of, rides.place_of, rides.parent_of))
+            own, turn, place, axes = find_group(number), *(find_group(int(table[number])) for table in (
+                dependencies.rotation_carrier, dependencies.position_carrier, dependencies.parent_carrier))
             limb = name in self.parts.controls.values() and name != self.parts.controls.get("hips")
             slides = own != place and not limb and not rig.data.bones[name].use_connect
             if {turn, place} != {own}:
-                found.append(Control(name, own, turn, place=place, axes=axes, slides=slides))
-        return [*found, *self._bent(rig)]
+                found.append(Control(name, own, turn, place=place, axes=axes, has_location=slides))
+        return [*found, *self._list_ik_bones(rig)]
 
-    def _bent(self, rig: bpy.types.Object) -> list[Control]:
+    def _list_ik_bones(self, rig: bpy.types.Object) -> list[Control]:
         """List the bones of legs and arms that inverse kinematics without a pole bends.
 
         The solver starts from the bones' own rotations, so that the target pose is set as its start.
@@ -212,46 +212,46 @@ class Carried:
                     chain = [bone, *bone.parent_recursive][: one.chain_count or None]
                     for held in reversed(chain):
                         above = self.group.get(held.parent.name) if held.parent is not None else None
-                        if held.name in self.parts.shown.values() and above is not None:
+                        if held.name in self.parts.visible_bones.values() and above is not None:
                             found.append(Control(held.name, self.group[held.name], above, place=above, axes=above,
-                                                 slides=False))
-        self.held = {control.name for control in found}
+                                                 has_location=False))
+        self.ik_bones = {control.name for control in found}
         return found
 
-    def _table(self, rig: bpy.types.Object, control: Control) -> dict[str, np.ndarray]:
+    def _tabulate_control(self, rig: bpy.types.Object, control: Control) -> dict[str, np.ndarray]:
         """Tabulate a control over the source's frames.
 
         Rotation of its base and its own (F, 4); its place and the place of its zero location (F, 3) m; the matrix from
         metres to its location's units (F, 3, 3); its location (F, 3).
         """
-        number = self.seen.number(control.name)
-        places, turn = in_world(self.seen, [number], self.units)
-        own, location = self.seen.own(number), self.seen.channels["location"][:, number]
-        if control.name in self.held:
+        number = self.samples.find_bone(control.name)
+        places, turn = compute_world_places(self.samples, [number], self.units)
+        own, location = self.samples.compute_own_rotations(number), self.samples.channels["location"][:, number]
+        if control.name in self.ik_bones:
             bone = rig.data.bones[control.name]
             rest = quaternion.from_matrix(np.array((bone.parent.matrix_local.inverted() @ bone.matrix_local).to_3x3()))
-            _, above = in_world(self.seen, [self.seen.number(bone.parent.name)], self.units)
+            _, above = compute_world_places(self.samples, [self.samples.find_bone(bone.parent.name)], self.units)
             own = quaternion.multiply(quaternion.inverse(quaternion.multiply(above[:, 0], rest)), turn[:, 0])
         base = quaternion.multiply(turn[:, 0], quaternion.inverse(own))
-        axes = self.seen.lies[:, :3, :3] @ self._axes(rig, control.name, base) / self.units
+        axes = self.samples.world_matrices[:, :3, :3] @ self._compute_axes(rig, control.name, base) / self.units
         rests = places[:, 0] - np.einsum("fij,fj->fi", axes, location)
-        return {"base": quaternion.continuous(base), "own": quaternion.continuous(own), "place": places[:, 0],
+        return {"base": quaternion.unify_signs(base), "own": quaternion.unify_signs(own), "place": places[:, 0],
                 "rests": rests, "back": np.linalg.inv(axes), "location": location}  # fmt: skip
 
-    def _axes(self, rig: bpy.types.Object, name: str, base: np.ndarray) -> np.ndarray:
+    def _compute_axes(self, rig: bpy.types.Object, name: str, base: np.ndarray) -> np.ndarray:
         """Compute the axes (F, 3, 3) of a bone's location in the armature's space, as Blender composes poses."""
         bone = rig.data.bones[name]
         if len(rig.pose.bones[name].constraints):
-            return quaternion.to_matrix(quaternion.multiply(quaternion.inverse(self.lie[0]), base))
+            return quaternion.to_matrix(quaternion.multiply(quaternion.inverse(self.placement[0]), base))
         own = np.array(bone.matrix_local.to_3x3()) if bone.use_local_location else np.eye(3)
         if bone.parent is None:
             return np.broadcast_to(own, (len(base), 3, 3))
-        above = self.seen.poses[:, self.seen.number(bone.parent.name), :3, :3]
+        above = self.samples.poses[:, self.samples.find_bone(bone.parent.name), :3, :3]
         if not bone.use_local_location:
             return above
         return above @ np.linalg.inv(np.array(bone.parent.matrix_local.to_3x3())) @ own
 
-    def moves(self, motion: Motion, rigid: Motion, rows: Rows, lies: np.ndarray | None) -> Moves:
+    def compute_group_motions(self, motion: Motion, rigid: Motion, rows: SourceRows, world_matrices: np.ndarray | None) -> GroupMotions:
         """Compute the rigid motion of each group.
 
         Args:
@@ -263,7 +263,7 @@ class Carried:
             The motion of each group.
         """
         places, world = forward_kinematics(motion)
-        was, had = rows.remembered("source", lambda: self._source_at(rows))
+        was, had = rows.find_cached("source", lambda: self._source_at(rows))
         used = {group for one in self.controls for group in (one.own, one.turn, one.place, one.axes)}
         turn, before, after = {}, {}, {}
         for part in used & set(self.joint):
@@ -272,23 +272,23 @@ class Carried:
             before[part], after[part] = was[:, joint], places[:, joint]
         turn[WHOLE] = quaternion.multiply(rigid.rotations[:, 0], quaternion.inverse(had[:, 0]))
         before[WHOLE], after[WHOLE] = was[:, 0], rigid.root_positions
-        if self.object_goes:
+        if self.object_travels:
             turn[OBJECT], before[OBJECT], after[OBJECT] = turn[WHOLE], before[WHOLE], after[WHOLE]
         else:
-            then, origin = rows.turns("lie", self.lie[0]), rows.numbers("origin", self.lie[1])
-            now = then if lies is None else rotations(lies)
+            then, origin = rows.sample_rotations("lie", self.placement[0]), rows.sample_numbers("origin", self.placement[1])
+            now = then if world_matrices is None else to_rotations(world_matrices)
             turn[OBJECT] = quaternion.multiply(now, quaternion.inverse(then))
-            before[OBJECT], after[OBJECT] = origin, origin if lies is None else lies[:, :3, 3] / self.units
-        return Moves(turn, before, after)
+            before[OBJECT], after[OBJECT] = origin, origin if world_matrices is None else world_matrices[:, :3, 3] / self.units
+        return GroupMotions(turn, before, after)
 
-    def _source_at(self, rows: Rows) -> tuple[np.ndarray, np.ndarray]:
+    def _source_at(self, rows: SourceRows) -> tuple[np.ndarray, np.ndarray]:
         """Compute places (N, J, 3) and rotations (N, J, 4) of the source's joints in the world."""
         if rows.whole:
             return self.places[rows.low], self.world[rows.low]
-        root, local = at_frames(self.motion, rows.at)
+        root, local = sample_frames(self.motion, rows.at)
         return forward_kinematics(Motion(self.motion.skeleton, root, local, self.motion.fps))
 
-    def changed(self, moves: Moves, rows: Rows) -> dict[tuple[str, str], np.ndarray]:
+    def compute_changes(self, moves: GroupMotions, rows: SourceRows) -> dict[tuple[str, str], np.ndarray]:
         """Compute the channels that differ from the source.
 
         Args:
@@ -297,44 +297,44 @@ class Carried:
         Returns:
             (bone, "turn") -> continuous rotations (N, 4) of its own channels; (bone, "location") -> (N, 3).
         """
-        some = [one for one in self.controls if not all(moves.alike(one.own, other) for other in (one.turn, one.place))]
-        return (self._turned(some, moves, rows)
-                | self._slid([one for one in some if one.slides], moves, rows)) if some else {}
+        some = [one for one in self.controls if not all(moves.moves_alike(one.own, other) for other in (one.turn, one.place))]
+        return (self._compute_rotations(some, moves, rows)
+                | self._compute_locations([one for one in some if one.has_location], moves, rows)) if some else {}
 
-    def _turned(self, some: list[Control], moves: Moves, rows: Rows) -> dict[tuple[str, str], np.ndarray]:
-        back, own, pose = rows.remembered(("turns", *some), lambda: self._turns_at(some, rows))
-        between = np.stack([moves.between(one.turn, one.own) for one in some], axis=1)
-        turned = quaternion.multiply(back, quaternion.multiply(between, pose))
-        other = np.abs(np.abs(np.sum(turned * own, axis=2)) - 1.0).max(axis=0) > 1e-14
-        turned = quaternion.continuous(turned)
-        return {(one.name, "turn"): turned[:, i] for i, one in enumerate(some) if other[i] or one.name in self.held}
+    def _compute_rotations(self, some: list[Control], moves: GroupMotions, rows: SourceRows) -> dict[tuple[str, str], np.ndarray]:
+        back, own, pose = rows.find_cached(("turns", *some), lambda: self._sample_control_rotations(some, rows))
+        between = np.stack([moves.compute_relative_rotation(one.turn, one.own) for one in some], axis=1)
+        rotations = quaternion.multiply(back, quaternion.multiply(between, pose))
+        other = np.abs(np.abs(np.sum(rotations * own, axis=2)) - 1.0).max(axis=0) > 1e-14
+        rotations = quaternion.unify_signs(rotations)
+        return {(one.name, "turn"): rotations[:, i] for i, one in enumerate(some) if other[i] or one.name in self.ik_bones}
 
-    def _turns_at(self, some: list[Control], rows: Rows) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _sample_control_rotations(self, some: list[Control], rows: SourceRows) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Compute rotations (N, C, 4) of controls: the inverse of their base, their own, and base and own together."""
-        base, own = (np.stack([rows.turns((one, what), self.tables[one.name][what]) for one in some], axis=1)
+        base, own = (np.stack([rows.sample_rotations((one, what), self.tables[one.name][what]) for one in some], axis=1)
                      for what in ("base", "own"))
         return quaternion.inverse(base), own, quaternion.multiply(base, own)
 
-    def _slid(self, some: list[Control], moves: Moves, rows: Rows) -> dict[tuple[str, str], np.ndarray]:
+    def _compute_locations(self, some: list[Control], moves: GroupMotions, rows: SourceRows) -> dict[tuple[str, str], np.ndarray]:
         """Compute the locations (N, 3) of controls with their own location channel."""
         if not some:
             return {}
 
-        def all_of(what: str) -> np.ndarray:
+        def stack_tables(what: str) -> np.ndarray:
             """Stack a table of all controls: (N, C, ...)."""
-            made = lambda: np.stack([rows.numbers((one, what), self.tables[one.name][what]) for one in some],
+            made = lambda: np.stack([rows.sample_numbers((one, what), self.tables[one.name][what]) for one in some],
                                     axis=1)  # noqa: E731
-            return rows.remembered((what, *some), made)
+            return rows.find_cached((what, *some), made)
 
-        rests = moves.points([one.place for one in some], all_of("rests"))
-        away = moves.points([one.own for one in some], all_of("place")) - rests
-        turn = np.stack([moves.turn[one.axes] for one in some], axis=1)
-        location = np.einsum("ncij,ncj->nci", all_of("back"), quaternion.rotate(quaternion.inverse(turn), away))
-        other = np.abs(location - all_of("location")).max(axis=(0, 2)) > _SAME
+        rests = moves.transform_points([one.place for one in some], stack_tables("rests"))
+        away = moves.transform_points([one.own for one in some], stack_tables("place")) - rests
+        turn = np.stack([moves.rotation[one.axes] for one in some], axis=1)
+        location = np.einsum("ncij,ncj->nci", stack_tables("back"), quaternion.rotate(quaternion.inverse(turn), away))
+        other = np.abs(location - stack_tables("location")).max(axis=(0, 2)) > _SAME
         return {(one.name, "location"): location[:, i] for i, one in enumerate(some) if other[i]}
 
 
-def channel_values(mode: str, turned: np.ndarray, like: np.ndarray) -> np.ndarray:
+def to_channel_values(mode: str, rotations: np.ndarray, like: np.ndarray) -> np.ndarray:
     """Convert continuous rotations to the values of a bone's rotation channel.
 
     Args:
@@ -344,7 +344,7 @@ def channel_values(mode: str, turned: np.ndarray, like: np.ndarray) -> np.ndarra
     Returns:
         (N, n) values.
     """
-    values = turned if mode == "QUATERNION" else rotation(mode, turned)
+    values = rotations if mode == "QUATERNION" else to_rotation_channel(mode, rotations)
     if mode == "QUATERNION":
         return values if np.sum(values[0] * like) >= 0.0 else -values
     return values if mode == "AXIS_ANGLE" else values + 2.0 * np.pi * np.round((like - values[0]) / (2.0 * np.pi))

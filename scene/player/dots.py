@@ -10,8 +10,8 @@ import numpy as np
 
 from ...beyond_mocap.motion.track import Track
 from ..core import channels
-from ..core.measure import Clock, scene_clock, units_per_metre
-from ..core.settings import BeyondMocapPlayer, BeyondMocapSettings, absolute, as_setting
+from ..core.measure import Clock, build_scene_clock, units_per_metre
+from ..core.settings import BeyondMocapPlayer, BeyondMocapSettings, to_absolute_path, to_setting_path
 from ..result import bake
 from .tracks import read_track
 
@@ -36,38 +36,38 @@ class BeyondMocapDot(bpy.types.PropertyGroup):
     shirt: bpy.props.FloatVectorProperty(name="Shirt", subtype="COLOR", description="Colour of the player's shirt")
 
 
-def ensure(context: bpy.types.Context, player: BeyondMocapPlayer) -> bpy.types.Object:
+def ensure_dot(context: bpy.types.Context, player: BeyondMocapPlayer) -> bpy.types.Object:
     """Return the player's dot; create and animate it where there is none. InputError where the track cannot be read."""
-    room = bake.collection(context.scene)
+    collection = bake.find_or_create_collection(context.scene)
     if player.dot is not None:
         if player.dot.name not in context.scene.objects:  # deleted in the view; the player still refers to it
-            room.objects.link(player.dot)
+            collection.objects.link(player.dot)
         return player.dot
     track = read_track(context.scene.beyond_mocap, player)
-    dot = _empty(context.scene, f"{player.name} dot", SIZE, room)
+    dot = _create_empty(context.scene, f"{player.name} dot", SIZE, collection)
     player.dot = dot
-    show(player)
-    clock = scene_clock(context.scene)
-    seconds, places = _measured(track.times, track.positions)
-    _animate(context.scene, dot, seconds, np.pad(places, ((0, 0), (0, 1))), clock)
-    if BALL not in room.objects:
-        _ball(context.scene, track, room, clock)
+    update_dot(player)
+    clock = build_scene_clock(context.scene)
+    seconds, places = _select_measured(track.times, track.positions)
+    _animate_dot(context.scene, dot, seconds, np.pad(places, ((0, 0), (0, 1))), clock)
+    if BALL not in collection.objects:
+        _create_ball_dot(context.scene, track, collection, clock)
     return dot
 
 
-def renew(context: bpy.types.Context, player: BeyondMocapPlayer) -> None:
+def update_dot_track(context: bpy.types.Context, player: BeyondMocapPlayer) -> None:
     """Update the dot's keys to the player's current track, unless the user has given it other keys."""
     dot = player.dot
-    action = channels.playing(dot)[0] if dot is not None else None
+    action = channels.find_playing_action(dot)[0] if dot is not None else None
     if action is None or not action.get(MARK):
         return
     track = read_track(context.scene.beyond_mocap, player)
-    seconds, places = _measured(track.times, track.positions)
-    channels.discard(dot, MARK)
-    _animate(context.scene, dot, seconds, np.pad(places, ((0, 0), (0, 1))), scene_clock(context.scene))
+    seconds, places = _select_measured(track.times, track.positions)
+    channels.remove_marked_action(dot, MARK)
+    _animate_dot(context.scene, dot, seconds, np.pad(places, ((0, 0), (0, 1))), build_scene_clock(context.scene))
 
 
-def show(player: BeyondMocapPlayer) -> None:
+def update_dot(player: BeyondMocapPlayer) -> None:
     """Update the dot's name, colour and data from its player."""
     dot = player.dot
     if dot is None:
@@ -76,101 +76,101 @@ def show(player: BeyondMocapPlayer) -> None:
     dot.beyond_mocap_dot.player = player.name
     for name in ORIGIN:
         value = getattr(player, name)
-        setattr(dot.beyond_mocap_dot, name, absolute(value) if name in FILES else value)
+        setattr(dot.beyond_mocap_dot, name, to_absolute_path(value) if name in FILES else value)
 
 
-def remove(scene: bpy.types.Scene, player: BeyondMocapPlayer) -> None:
+def remove_dot(scene: bpy.types.Scene, player: BeyondMocapPlayer) -> None:
     """Remove the player's dot with its strips from the file; with the last one the ball's too."""
     dot, player.dot = player.dot, None
     if dot is not None:
-        _delete(dot)
+        _delete_dot(dot)
     if not any(other.dot for other in scene.beyond_mocap.players):
-        ball = bake.collection(scene).objects.get(BALL)
+        ball = bake.find_or_create_collection(scene).objects.get(BALL)
         if ball is not None:
-            _delete(ball)
+            _delete_dot(ball)
 
 
-def orphans(context: bpy.types.Context) -> list[bpy.types.Object]:
+def list_orphan_dots(context: bpy.types.Context) -> list[bpy.types.Object]:
     """List the selected dots of players that are in no list of this scene."""
     owned = {player.dot for player in context.scene.beyond_mocap.players}
     return [dot for dot in context.selected_objects if dot.beyond_mocap_dot.player and dot not in owned]
 
 
-def adopt(settings: BeyondMocapSettings, dot: bpy.types.Object, name: str) -> BeyondMocapPlayer:
+def add_player_for_dot(settings: BeyondMocapSettings, dot: bpy.types.Object, name: str) -> BeyondMocapPlayer:
     """Add a player to this scene who owns the dot."""
     origin = {key: getattr(dot.beyond_mocap_dot, key) for key in ORIGIN}
     player = settings.players.add()
     for key, value in origin.items():
-        setattr(player, key, as_setting(value) if key in FILES and value else value)
+        setattr(player, key, to_setting_path(value) if key in FILES and value else value)
     player.dot = dot
     player.name = name
     settings.active_player = len(settings.players) - 1
     return player
 
 
-def first_second(dot: bpy.types.Object) -> float:
+def find_first_second(dot: bpy.types.Object) -> float:
     """Return the track's time in seconds at the dot's first key."""
-    clock, frames = Clock.read(dot.beyond_mocap_dot.clock), keyed_frames(dot)
-    return clock.seconds(frames[0]) if clock and frames else 0.0
+    clock, frames = Clock.from_text(dot.beyond_mocap_dot.clock), find_key_range(dot)
+    return clock.to_seconds(frames[0]) if clock and frames else 0.0
 
 
-def relay(dot: bpy.types.Object, new: Clock) -> bool:
+def move_keys(dot: bpy.types.Object, new: Clock) -> bool:
     """Move a dot's keys to the frames of another clock; returns whether anything changed."""
-    old = Clock.read(dot.beyond_mocap_dot.clock)
-    action, slot = channels.playing(dot)
+    old = Clock.from_text(dot.beyond_mocap_dot.clock)
+    action, slot = channels.find_playing_action(dot)
     if old is None or old == new or action is None or not action.get(MARK):
         return False
-    for curve in channels.curves(action, slot).values():
+    for curve in channels.collect_curves(action, slot).values():
         keys = np.empty(2 * len(curve.keyframe_points), np.float32)
         curve.keyframe_points.foreach_get("co", keys)
         seconds = old.start_time + (keys[::2].astype(float) - old.start_frame) / old.fps
         keys[::2] = new.start_frame + (seconds - new.start_time) * new.fps
         curve.keyframe_points.foreach_set("co", keys)
         curve.update()
-    dot.beyond_mocap_dot.clock = new.spelled()
+    dot.beyond_mocap_dot.clock = new.to_text()
     return True
 
 
-def keyed_frames(dot: bpy.types.Object) -> tuple[float, float] | None:
+def find_key_range(dot: bpy.types.Object) -> tuple[float, float] | None:
     """Return the first and last frame on which the dot has a key; None where it has none."""
-    action, slot = channels.playing(dot)
-    ends = [curve.range() for curve in channels.curves(action, slot).values()] if action else []
+    action, slot = channels.find_playing_action(dot)
+    ends = [curve.range() for curve in channels.collect_curves(action, slot).values()] if action else []
     return (min(low for low, _ in ends), max(high for _, high in ends)) if ends else None
 
 
-def _ball(scene: bpy.types.Scene, track: Track, room: bpy.types.Collection, clock: Clock) -> None:
+def _create_ball_dot(scene: bpy.types.Scene, track: Track, collection: bpy.types.Collection, clock: Clock) -> None:
     places = np.where(np.isnan(track.ball), [np.nan, np.nan, BALL_SIZE], track.ball)
-    seconds, places = _measured(track.times, places)
+    seconds, places = _select_measured(track.times, places)
     if len(seconds):
-        dot = _empty(scene, BALL, BALL_SIZE, room)
+        dot = _create_empty(scene, BALL, BALL_SIZE, collection)
         dot.color = (*BALL_RGB, 1.0)
-        _animate(scene, dot, seconds, places, clock)
+        _animate_dot(scene, dot, seconds, places, clock)
 
 
-def _empty(scene: bpy.types.Scene, name: str, size: float, room: bpy.types.Collection) -> bpy.types.Object:
+def _create_empty(scene: bpy.types.Scene, name: str, size: float, collection: bpy.types.Collection) -> bpy.types.Object:
     dot = bpy.data.objects.new(name, None)
     dot.empty_display_type, dot.empty_display_size = "SPHERE", size * units_per_metre(scene)
     dot.show_name = True
-    room.objects.link(dot)
+    collection.objects.link(dot)
     return dot
 
 
-def _measured(times: np.ndarray, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _select_measured(times: np.ndarray, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Select the samples with a time and a position, each time once, in order."""
     known = np.isfinite(times) & np.isfinite(places).all(axis=1)
     seconds, first = np.unique(times[known], return_index=True)
     return seconds, places[known][first]
 
 
-def _animate(scene: bpy.types.Scene, dot: bpy.types.Object, seconds: np.ndarray, places: np.ndarray, clock: Clock):
+def _animate_dot(scene: bpy.types.Scene, dot: bpy.types.Object, seconds: np.ndarray, places: np.ndarray, clock: Clock):
     """Add a key for each sample: seconds (N,), places (N, 3) metres."""
     frames = clock.start_frame + (seconds - clock.start_time) * clock.fps
     curves = {"location": ("Object Transforms", places * units_per_metre(scene))}
-    channels.animate(dot, f"{dot.name} track", frames, curves)[MARK] = True
-    dot.beyond_mocap_dot.clock = clock.spelled()
+    channels.create_action(dot, f"{dot.name} track", frames, curves)[MARK] = True
+    dot.beyond_mocap_dot.clock = clock.to_text()
 
 
-def _delete(dot: bpy.types.Object) -> None:
+def _delete_dot(dot: bpy.types.Object) -> None:
     """Remove an object and the actions that only it plays."""
     data = dot.animation_data
     actions = {strip.action for track in data.nla_tracks for strip in track.strips} | {data.action} if data else set()

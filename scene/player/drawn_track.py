@@ -13,24 +13,24 @@ import numpy as np
 from bpy_extras.view3d_utils import location_3d_to_region_2d
 
 from ...beyond_mocap.base.errors import InputError
-from ...beyond_mocap.base.vectors import distance_along
-from ...beyond_mocap.motion.humanoid import identify
+from ...beyond_mocap.base.vectors import distances_along
+from ...beyond_mocap.motion.humanoid import identify_joints
 from ...beyond_mocap.motion.track import Track
-from ...beyond_mocap.motion.track.drawn import along, moved, nurbs_line
+from ...beyond_mocap.motion.track.drawn import build_line_track, build_moving_track, sample_nurbs
 from ..core import channels
 from ..core.live import Watcher
-from ..core.measure import scene_clock, units_per_metre
-from ..core.settings import active_player
+from ..core.measure import build_scene_clock, units_per_metre
+from ..core.settings import find_active_player
 from ..rigs import armature
 from . import drawn_track
 
-FINE = 48  # straight pieces of a Bezier segment
+BEZIER_PIECES = 48  # straight pieces of a Bezier segment
 
 LABEL_SIZE, RGBA, PIN_RGBA = 12, (1.0, 0.85, 0.2, 1.0), (0.4, 0.9, 1.0, 1.0)
 
 
 @dataclass(frozen=True, eq=False)
-class Line:
+class DrawnLine:
     """A curve on the ground.
 
     Attributes:
@@ -41,17 +41,17 @@ class Line:
     """
 
     line: np.ndarray
-    at: np.ndarray
+    point_indices: np.ndarray
     speeds: np.ndarray
     waits: np.ndarray
 
 
-NO_LINE = Line(np.empty((0, 3)), np.empty(0, int), np.empty(0), np.empty(0))
-MOST_PLAYED = 32
-_played: dict[tuple[int, int], tuple] = {}  # (scene, object) by session_uid: stamp, frames, places
+EMPTY_LINE = DrawnLine(np.empty((0, 3)), np.empty(0, int), np.empty(0), np.empty(0))
+MAX_PLAYED = 32
+_played_paths: dict[tuple[int, int], tuple] = {}  # (scene, object) by session_uid: stamp, frames, places
 
 
-def read(scene: bpy.types.Scene, drawn: bpy.types.Object, start: float = 0.0, still: bool = False) -> Track:
+def read_drawn_track(scene: bpy.types.Scene, drawn: bpy.types.Object, start: float = 0.0, still: bool = False) -> Track:
     """Read the track of a curve or a moving object.
 
     Args:
@@ -69,41 +69,41 @@ def read(scene: bpy.types.Scene, drawn: bpy.types.Object, start: float = 0.0, st
         InputError: if the object is no track.
     """
     if drawn.type == "CURVE":
-        found = line_of(scene, drawn)
-        level = found.line[:, :2]
-        way = distance_along(level)
-        return along(level, way[found.at], found.speeds, waits=found.waits, start=start, name=f"curve {drawn.name}")
+        line = build_line(scene, drawn)
+        level = line.line[:, :2]
+        distances = distances_along(level)
+        return build_line_track(level, distances[line.point_indices], line.speeds, waits=line.waits, start=start, name=f"curve {drawn.name}")
     if drawn.type == "CURVES":
         raise InputError(f"object {drawn.name}", "hair curves", "a curve (Add > Curve)", "convert it: Object > Convert")
-    frames, places = _animated(scene, drawn, still)
-    clock = scene_clock(scene)
+    frames, places = _read_moving_object(scene, drawn, still)
+    clock = build_scene_clock(scene)
     seconds = clock.start_time + (frames - clock.start_frame) / clock.fps
-    return moved(seconds, places[:, :2] / units_per_metre(scene), f"object {drawn.name}")
+    return build_moving_track(seconds, places[:, :2] / units_per_metre(scene), f"object {drawn.name}")
 
 
-def line_of(scene: bpy.types.Scene, drawn: bpy.types.Object) -> Line:
+def build_line(scene: bpy.types.Scene, drawn: bpy.types.Object) -> DrawnLine:
     """Build the line of a curve object's first spline, as it is now, also in edit mode; InputError for a closed or
     empty one.
     """
-    spline = next((spline for spline in drawn.data.splines if len(points_of(spline)) > 1), None)
+    spline = next((spline for spline in drawn.data.splines if len(list_points(spline)) > 1), None)
     if spline is None:
         raise InputError(f"curve {drawn.name}", "fewer than two points", "a line", "add points in edit mode")
     if spline.use_cyclic_u:
         raise InputError(f"curve {drawn.name}", "a closed curve", "a curve with two ends", "switch Cyclic off (Alt-C)")
-    points = points_of(spline)
+    points = list_points(spline)
     if spline.type == "BEZIER":
-        local, at = _bezier(points)
+        local, at = _sample_bezier(points)
     elif spline.type == "POLY":
-        local, at = _values(points, "co", 4)[:, :3], np.arange(len(points))
+        local, at = _read_values(points, "co", 4)[:, :3], np.arange(len(points))
     else:
-        places, weights = _values(points, "co", 4)[:, :3], _values(points, "weight", 1)
-        local, at = nurbs_line(places, weights, spline.order_u, spline.use_endpoint_u, FINE)
+        places, weights = _read_values(points, "co", 4)[:, :3], _read_values(points, "weight", 1)
+        local, at = sample_nurbs(places, weights, spline.order_u, spline.use_endpoint_u, BEZIER_PIECES)
     world = np.array(drawn.matrix_world)
     line = (local @ world[:3, :3].T + world[:3, 3]) / units_per_metre(scene)
-    return Line(line, at, _values(points, "radius", 1), _values(points, "weight_softbody", 1))
+    return DrawnLine(line, at, _read_values(points, "radius", 1), _read_values(points, "weight_softbody", 1))
 
 
-def points_of(spline: bpy.types.Spline):
+def list_points(spline: bpy.types.Spline):
     """List a spline's control points, of either kind."""
     return spline.bezier_points if spline.type == "BEZIER" else spline.points
 
@@ -114,7 +114,7 @@ def set_speed(points, speed: float, wait: float) -> None:
         point.radius, point.weight_softbody = speed, max(wait, 0.01)
 
 
-def create(context: bpy.types.Context, name: str, collection) -> bpy.types.Object:
+def create_curve(context: bpy.types.Context, name: str, collection) -> bpy.types.Object:
     """Create a Bezier curve as a start, from the 3D cursor along X: starting from rest, a bend, a stop."""
     units = units_per_metre(context.scene)
     origin = np.array(context.scene.cursor.location) * [1.0, 1.0, 0.0]
@@ -132,57 +132,57 @@ def create(context: bpy.types.Context, name: str, collection) -> bpy.types.Objec
     return drawn
 
 
-def _values(points, name: str, size: int) -> np.ndarray:
+def _read_values(points, name: str, size: int) -> np.ndarray:
     out = np.empty(size * len(points), np.float32)
     points.foreach_get(name, out)
     return out.reshape(-1, size).astype(float) if size > 1 else out.astype(float)
 
 
-def _bezier(points) -> tuple[np.ndarray, np.ndarray]:
+def _sample_bezier(points) -> tuple[np.ndarray, np.ndarray]:
     """Sample the line (N, 3) through Bezier points, and the index of each point on it."""
-    co, left, right = (_values(points, name, 3) for name in ("co", "handle_left", "handle_right"))
-    t = np.linspace(0.0, 1.0, FINE + 1)[:-1, None, None]
+    co, left, right = (_read_values(points, name, 3) for name in ("co", "handle_left", "handle_right"))
+    t = np.linspace(0.0, 1.0, BEZIER_PIECES + 1)[:-1, None, None]
     a, b, c, d = co[:-1], right[:-1], left[1:], co[1:]
     fine = (1 - t) ** 3 * a + 3 * t * (1 - t) ** 2 * b + 3 * t**2 * (1 - t) * c + t**3 * d
     line = np.concatenate([fine.transpose(1, 0, 2).reshape(-1, 3), co[-1:]])
-    return line, FINE * np.arange(len(co))
+    return line, BEZIER_PIECES * np.arange(len(co))
 
 
-def _animated(scene: bpy.types.Scene, moving: bpy.types.Object, still: bool) -> tuple[np.ndarray, np.ndarray]:
+def _read_moving_object(scene: bpy.types.Scene, moving: bpy.types.Object, still: bool) -> tuple[np.ndarray, np.ndarray]:
     """Read frames (F,) and positions (F, 3), in Blender's units, of a moving object; of an armature its hips, or first
     bone.
     """
-    own = _own_keys(moving)
+    own = _sample_own_keys(moving)
     if own is not None:
         return own
-    key, stamp = (scene.session_uid, moving.session_uid), _stamp(scene, moving)
+    key, stamp = (scene.session_uid, moving.session_uid), _compute_stamp(scene, moving)
     if still:
-        if key not in _played or _played[key][0] != stamp:
+        if key not in _played_paths or _played_paths[key][0] != stamp:
             raise InputError(f"object {moving.name}", "not played since it was opened or changed", "its motion",
                              "press Update to play it")
-        return _played[key][1:]
-    frames, places = _play(scene, moving)
-    _played.pop(key, None)
-    _played[key] = stamp, frames, places
-    if len(_played) > MOST_PLAYED:
-        del _played[next(iter(_played))]
+        return _played_paths[key][1:]
+    frames, places = _play_scene(scene, moving)
+    _played_paths.pop(key, None)
+    _played_paths[key] = stamp, frames, places
+    if len(_played_paths) > MAX_PLAYED:
+        del _played_paths[next(iter(_played_paths))]
     return frames, places
 
 
-def _stamp(scene: bpy.types.Scene, moving: bpy.types.Object) -> tuple:
+def _compute_stamp(scene: bpy.types.Scene, moving: bpy.types.Object) -> tuple:
     """Compute a value that changes when an object's own keys or the frames in which it moves change."""
-    action, slot = channels.playing(moving)
+    action, slot = channels.find_playing_action(moving)
     keys = (
-        [channels.keys_of(curve)["co"].tobytes() for curve in channels.curves(action, slot).values()] if action else []
+        [channels.read_keys(curve)["co"].tobytes() for curve in channels.collect_curves(action, slot).values()] if action else []
     )
-    return *_range(scene, moving), hash(tuple(keys))
+    return *_find_frame_range(scene, moving), hash(tuple(keys))
 
 
-def _play(scene: bpy.types.Scene, moving: bpy.types.Object) -> tuple[np.ndarray, np.ndarray]:
+def _play_scene(scene: bpy.types.Scene, moving: bpy.types.Object) -> tuple[np.ndarray, np.ndarray]:
     """Read frames and positions by playing the scene."""
-    first, last = _range(scene, moving)
+    first, last = _find_frame_range(scene, moving)
     frames = np.arange(first, last + 1, dtype=float)
-    bone = _hips(scene, moving) if moving.type == "ARMATURE" else None
+    bone = _find_hips_bone(scene, moving) if moving.type == "ARMATURE" else None
     before, places = (scene.frame_current, scene.frame_subframe), np.empty((len(frames), 3))
     try:
         for number, frame in enumerate(frames):
@@ -197,56 +197,56 @@ def _play(scene: bpy.types.Scene, moving: bpy.types.Object) -> tuple[np.ndarray,
     return frames, places
 
 
-def _own_keys(moving: bpy.types.Object) -> tuple[np.ndarray, np.ndarray] | None:
+def _sample_own_keys(moving: bpy.types.Object) -> tuple[np.ndarray, np.ndarray] | None:
     """Sample frames and positions from the object's own curves, which is quick; None where something else moves it."""
-    action, slot = channels.playing(moving)
+    action, slot = channels.find_playing_action(moving)
     data = moving.animation_data
     if action is None or moving.type == "ARMATURE" or moving.parent or moving.constraints or data.drivers:
         return None
     if data.nla_tracks or moving.delta_location.length:
         return None
-    curves = channels.curves(action, slot)
-    ends = channels.keyed_range(curves)
+    curves = channels.collect_curves(action, slot)
+    ends = channels.find_key_range(curves)
     if ends is None:
         return None
     frames = np.arange(ends[0], ends[1] + 1, dtype=float)
-    columns = [channels.sample(curves["location", axis], frames) if ("location", axis) in curves
+    columns = [channels.sample_curve(curves["location", axis], frames) if ("location", axis) in curves
                else np.full(len(frames), moving.location[axis])
                for axis in range(3)]
     return frames, np.stack(columns, axis=1)
 
 
-def _range(scene: bpy.types.Scene, moving: bpy.types.Object) -> tuple[int, int]:
+def _find_frame_range(scene: bpy.types.Scene, moving: bpy.types.Object) -> tuple[int, int]:
     """Find the frames in which it moves: those of its own keys, else the scene's."""
-    action, slot = channels.playing(moving)
-    ends = channels.keyed_range(channels.curves(action, slot)) if action else None
+    action, slot = channels.find_playing_action(moving)
+    ends = channels.find_key_range(channels.collect_curves(action, slot)) if action else None
     return ends or (scene.frame_start, scene.frame_end)
 
 
-def _hips(scene: bpy.types.Scene, moving: bpy.types.Object) -> str:
+def _find_hips_bone(scene: bpy.types.Scene, moving: bpy.types.Object) -> str:
     """Find the pelvis bone, or the first without a parent."""
     try:
-        skeleton = armature.skeleton_of(moving, scene)
-        return skeleton.names[identify(skeleton).hips]
+        skeleton = armature.build_skeleton(moving, scene)
+        return skeleton.names[identify_joints(skeleton).hips]
     except InputError:
         if not moving.data.bones:
             raise
         return next(bone.name for bone in moving.data.bones if bone.parent is None)
 
 
-def speed_labels(scene: bpy.types.Scene) -> list[tuple[tuple[float, float, float], str, tuple]]:
+def build_speed_labels(scene: bpy.types.Scene) -> list[tuple[tuple[float, float, float], str, tuple]]:
     """Build the labels in the view: (position in Blender's units, text, colour)."""
-    player, units = active_player(scene.beyond_mocap), units_per_metre(scene)
+    player, units = find_active_player(scene.beyond_mocap), units_per_metre(scene)
     if player is None:
         return []
     found = []
     drawn = player.drawn_track
     if drawn is not None and drawn.type == "CURVE" and drawn.visible_get():
         try:
-            line = drawn_track.line_of(scene, drawn)
+            line = drawn_track.build_line(scene, drawn)
         except InputError:  # reported when the track is used
-            line = drawn_track.NO_LINE
-        for at, speed, wait in zip(line.at, line.speeds, line.waits):
+            line = drawn_track.EMPTY_LINE
+        for at, speed, wait in zip(line.point_indices, line.speeds, line.waits):
             text = f"{speed:.1f} m/s" if speed > 0.0 else f"stop {wait:.1f} s"
             found.append((tuple(np.array(line.line[at]) * units), text, RGBA))
     for pin in player.pins:
@@ -263,7 +263,7 @@ def _draw_labels() -> None:
     if context.space_data is None or not context.space_data.overlay.show_overlays:
         return
     scale = context.preferences.system.ui_scale
-    for place, text, rgba in speed_labels(context.scene):
+    for place, text, rgba in build_speed_labels(context.scene):
         at = location_3d_to_region_2d(context.region, context.region_data, place)
         if at is not None:
             blf.size(0, LABEL_SIZE * scale)

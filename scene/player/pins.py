@@ -7,10 +7,10 @@ import numpy as np
 from bpy.props import EnumProperty, FloatProperty, PointerProperty
 
 from ...beyond_mocap.base.errors import InputError
-from ...beyond_mocap.motion.humanoid import identify
+from ...beyond_mocap.motion.humanoid import identify_joints
 from ...beyond_mocap.synthesis.plan import Pin
 from ..core import window
-from ..core.measure import scene_clock, units_per_metre
+from ..core.measure import build_scene_clock, units_per_metre
 from ..rigs import armature
 
 PARTS = (("left_hand", "Left Hand", "Pin the wrist of the left hand", "VIEW_PAN", 0),
@@ -19,7 +19,7 @@ PARTS = (("left_hand", "Left Hand", "Pin the wrist of the left hand", "VIEW_PAN"
          ("right_foot", "Right Foot", "Pin the ankle of the right foot", "MOD_DYNAMICPAINT", 3),
          ("gaze", "Gaze", "Pin the point that the player looks at", "HIDE_OFF", 4))
 SIZE = 0.12  # metres
-AHEAD = 3.0  # metres in front of the head at which a new gaze pin is placed
+GAZE_DISTANCE = 3.0  # metres in front of the head at which a new gaze pin is placed
 
 
 class BeyondMocapPin(bpy.types.PropertyGroup):
@@ -34,7 +34,7 @@ class BeyondMocapPin(bpy.types.PropertyGroup):
                         description="Duration for which the part stays there; 0 for a moment")
 
 
-def read(scene: bpy.types.Scene, player) -> tuple[Pin, ...]:
+def read_pins(scene: bpy.types.Scene, player) -> tuple[Pin, ...]:
     """Read a player's pins whose Empties are in the scene."""
     metres = 1.0 / units_per_metre(scene)
     found = []
@@ -45,7 +45,7 @@ def read(scene: bpy.types.Scene, player) -> tuple[Pin, ...]:
     return tuple(found)
 
 
-def add(context: bpy.types.Context, player, part: str, seconds: float, hold: float, place, room) -> bpy.types.Object:
+def add_pin(context: bpy.types.Context, player, part: str, seconds: float, hold: float, place, collection) -> bpy.types.Object:
     """Add a pin at `place` (3,) metres, world; returns its Empty, which is selected and active."""
     units = units_per_metre(context.scene)
     target = bpy.data.objects.new(f"{player.name} {part.replace('_', ' ')}", None)
@@ -53,8 +53,8 @@ def add(context: bpy.types.Context, player, part: str, seconds: float, hold: flo
     target.empty_display_size, target.show_name = SIZE * units, True
     target.color = (*player.shirt, 1.0)
     target.location = np.asarray(place) * units
-    room.objects.link(target)
-    pin = player.pins.add()
+    collection.objects.link(target)
+    pin = player.pins.add_pin()
     pin.name, pin.target, pin.part, pin.time, pin.hold = target.name, target, part, seconds, hold
     player.active_pin = len(player.pins) - 1
     context.view_layer.update()
@@ -63,30 +63,30 @@ def add(context: bpy.types.Context, player, part: str, seconds: float, hold: flo
     return target
 
 
-def remove(player, number: int) -> None:
+def remove_pin(player, number: int) -> None:
     """Remove a pin and its Empty from the file."""
     target = player.pins[number].target
-    player.pins.remove(number)
+    player.pins.remove_pin(number)
     player.active_pin = max(0, min(player.active_pin, len(player.pins) - 1))
     if target is not None:
         bpy.data.objects.remove(target)
 
 
-def remove_all(player) -> None:
+def remove_all_pins(player) -> None:
     """Remove all of a player's pins from the file."""
     for number in reversed(range(len(player.pins))):
-        remove(player, number)
+        remove_pin(player, number)
 
 
-def body_place(context: bpy.types.Context, player, part: str) -> np.ndarray:
+def find_part_position(context: bpy.types.Context, player, part: str) -> np.ndarray:
     """Find the world position (3,) in metres of the player's part on the current frame, or GAZE_DISTANCE in front of
     the face.
     """
     if player.body is None:
         raise InputError(f"player {player.name}", "no body", "a body to pin",
                          "Synthesize first, or pin at the 3D cursor")
-    skeleton = armature.skeleton_of(player.body, context.scene)
-    body = identify(skeleton)
+    skeleton = armature.build_skeleton(player.body, context.scene)
+    body = identify_joints(skeleton)
     sides = {"left": body.left, "right": body.right}
     side, _, what = part.partition("_")
     joint = body.head if part == "gaze" else getattr(sides[side], what)
@@ -95,16 +95,16 @@ def body_place(context: bpy.types.Context, player, part: str) -> np.ndarray:
     shown = player.body.evaluated_get(context.evaluated_depsgraph_get())
     units = units_per_metre(context.scene)
 
-    def place(number: int) -> np.ndarray:
+    def find_bone_position(number: int) -> np.ndarray:
         return np.array(shown.matrix_world @ shown.pose.bones[skeleton.names[number]].head) / units
 
     if part != "gaze":
-        return place(joint)
-    across = place(body.left.upper_leg) - place(body.right.upper_leg)
+        return find_bone_position(joint)
+    across = find_bone_position(body.left.upper_leg) - find_bone_position(body.right.upper_leg)
     ahead = np.array([across[1], -across[0], 0.0])
-    return place(joint) + AHEAD * ahead / max(np.linalg.norm(ahead), 1e-9)
+    return find_bone_position(joint) + GAZE_DISTANCE * ahead / max(np.linalg.norm(ahead), 1e-9)
 
 
-def second_now(scene: bpy.types.Scene) -> float:
+def find_current_second(scene: bpy.types.Scene) -> float:
     """Return the track's time in seconds on the scene's current frame."""
-    return scene_clock(scene).seconds(scene.frame_current_final)
+    return build_scene_clock(scene).to_seconds(scene.frame_current_final)

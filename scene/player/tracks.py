@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from ...beyond_mocap.base.errors import InputError
 from ...beyond_mocap.files.tracking import tracking
-from ..core.settings import BeyondMocapPlayer, BeyondMocapSettings, absolute
+from ..core.settings import BeyondMocapPlayer, BeyondMocapSettings, to_absolute_path
 from . import drawn_track
 
 if TYPE_CHECKING:
     from ...beyond_mocap.motion.track import Track
 
 
-class Found(NamedTuple):
+class PlayerInFile(NamedTuple):
     """One player in a file.
 
     Attributes:
@@ -33,33 +33,33 @@ class Found(NamedTuple):
     end: float
 
 
-def players_in(path: str, metadata: str = "", provider: str = "") -> tuple[list[Found], tuple[str, ...]]:
+def list_players(path: str, metadata: str = "", provider: str = "") -> tuple[list[PlayerInFile], tuple[str, ...]]:
     """List the players of a tracking file, and notes on assumptions; InputError where it cannot be read."""
-    if is_plain(path):
-        track = _plain(path)
-        return [Found(Path(path).stem, "", "home", float(track.times.min()), float(track.times.max()))], ()
-    match = match_of(path, metadata, provider)
+    if is_plain_csv(path):
+        track = _read_plain_track(path)
+        return [PlayerInFile(Path(path).stem, "", "home", float(track.times.min()), float(track.times.max()))], ()
+    match = read_match(path, metadata, provider)
     start, end = float(match.times[0]), float(match.times[-1])
-    found = [Found(_spoken(player), player.id, player.team, start, end) for player in match.players]
+    found = [PlayerInFile(_build_player_name(player), player.id, player.team, start, end) for player in match.players]
     return found, match.notes
 
 
 def read_track(settings: BeyondMocapSettings, player: BeyondMocapPlayer, still: bool = False) -> "Track":
     """Read the samples of one player, within the settings' section for a whole match; still: see `read_drawn_track`."""
     if player.drawn_track is not None:
-        return drawn_track.read(player.id_data, player.drawn_track, player.drawn_start, still)
-    path = absolute(player.tracking_file)
+        return drawn_track.read_drawn_track(player.id_data, player.drawn_track, player.drawn_start, still)
+    path = to_absolute_path(player.tracking_file)
     if not path:
         step = "choose one in step 2 or draw a track"
         raise InputError(f"player {player.name}", "no tracking file", "a file with positions", step)
     if not player.feed_id:
-        return _plain(path)
-    match = match_of(path, absolute(player.metadata_file), player.provider)
+        return _read_plain_track(path)
+    match = read_match(path, to_absolute_path(player.metadata_file), player.provider)
     end = settings.section_end if settings.section_end > settings.section_start else None
     return match.track(player.feed_id, settings.section_start, end)
 
 
-def is_plain(path: str) -> bool:
+def is_plain_csv(path: str) -> bool:
     """Whether this is a file of one player in our own form: its first line names the column time_s."""
     try:
         with open(path, "rb") as file:
@@ -68,30 +68,30 @@ def is_plain(path: str) -> bool:
         raise InputError(path, error.strerror or "cannot be read", "a tracking file", "check the path") from None
 
 
-def _plain(path: str) -> "Track":
-    return _read_plain(path, _stamp(path))
+def _read_plain_track(path: str) -> "Track":
+    return _read_plain_cached(path, _read_stamp(path))
 
 
 @lru_cache(maxsize=32)
-def _read_plain(path: str, _changed: tuple[int, int]) -> "Track":
+def _read_plain_cached(path: str, _changed: tuple[int, int]) -> "Track":
     return tracking.read_track_csv(path)
 
 
-def match_of(path: str, metadata: str = "", provider: str = "") -> tracking.Match:
+def read_match(path: str, metadata: str = "", provider: str = "") -> tracking.Match:
     """Read a whole match as its feed has it, once; InputError where it cannot be read."""
-    return _read_match(path, metadata or None, provider or None, _stamp(path))
+    return _read_match_cached(path, metadata or None, provider or None, _read_stamp(path))
 
 
-def _stamp(path: str) -> tuple[int, int]:
+def _read_stamp(path: str) -> tuple[int, int]:
     """Return a value that changes when a file is written again."""
     found = os.stat(path) if os.path.exists(path) else None
     return (found.st_mtime_ns, found.st_size) if found else (0, 0)
 
 
 @lru_cache(maxsize=1)
-def _read_match(path: str, metadata: str | None, provider: str | None, _changed) -> tracking.Match:
+def _read_match_cached(path: str, metadata: str | None, provider: str | None, _changed) -> tracking.Match:
     return tracking.read_match(path, metadata, provider)
 
 
-def _spoken(player: tracking.MatchPlayer) -> str:
+def _build_player_name(player: tracking.MatchPlayer) -> str:
     return player.name or f"{player.team} {player.number if player.number >= 0 else player.id}"

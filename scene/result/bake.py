@@ -5,14 +5,14 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from ...beyond_mocap.base.time_series import interpolate
-from ...beyond_mocap.motion.track import sample
+from ...beyond_mocap.base.time_series import interpolate_columns
+from ...beyond_mocap.motion.track import sample_track
 from ...beyond_mocap.motion.track.ball_path import BallPath
 from ...beyond_mocap.synthesis.take import Take
 from ..core import action, channels
-from ..core.material import colour
+from ..core.material import get_material
 from ..core.measure import frames_per_second, units_per_metre, whole_frames
-from ..core.session import Made
+from ..core.session import StoredTake
 from ..core.settings import BeyondMocapPlayer, BeyondMocapSettings
 from ..rigs import armature
 from ..stage import ball, body, stage
@@ -24,13 +24,13 @@ MARK = "beyond_mocap_take"  # on datablocks created for a take, which the next o
 RIBBON_HEIGHT, RIBBON_WIDTH = 0.015, 0.03  # metres above the ground, half the ribbon's width
 
 
-def frame_at(scene: bpy.types.Scene, seconds: float) -> float:
+def compute_frame(scene: bpy.types.Scene, seconds: float) -> float:
     """Compute the (fractional) scene frame of a time `seconds` on the tracking file's clock."""
     settings = scene.beyond_mocap
     return settings.start_frame + (seconds - settings.start_time) * frames_per_second(scene)
 
 
-def player(context: bpy.types.Context, order: BeyondMocapPlayer, made: Made) -> bpy.types.Object:
+def write_take(context: bpy.types.Context, owner: BeyondMocapPlayer, result: StoredTake) -> bpy.types.Object:
     """Write a take to the player's armature; creates armature and body if none fits.
 
     Args:
@@ -40,50 +40,50 @@ def player(context: bpy.types.Context, order: BeyondMocapPlayer, made: Made) -> 
     Returns:
         The armature.
     """
-    take, scene, settings = made.take, context.scene, context.scene.beyond_mocap
-    room = collection(scene)
-    target = order.body
-    if target is None or not fits(target, take, scene):
-        target = armature.create(context, take.motion.skeleton, order.name, room)
+    take, scene, settings = result.take, context.scene, context.scene.beyond_mocap
+    room = find_or_create_collection(scene)
+    target = owner.body
+    if target is None or not is_matching(target, take, scene):
+        target = armature.create_armature(context, take.motion.skeleton, owner.name, room)
         target[MARK] = True
-        order.body = target
+        owner.body = target
     if settings.make_bodies and not any(child.type == "MESH" for child in target.children):
-        body.create(target, order.name, tuple(order.shirt), collection=room, scene=scene,
+        body.create_character(target, owner.name, tuple(owner.shirt), collection=room, scene=scene,
                     example=take.motion)[MARK] = True
-    channels.discard(target, MARK)
-    start = frame_at(scene, take.start_time)
-    action.write(target, take.motion, scene, start, f"{order.name} take", generated=True)[MARK] = True
+    channels.remove_marked_action(target, MARK)
+    start = compute_frame(scene, take.start_time)
+    action.write_motion(target, take.motion, scene, start, f"{owner.name} take", generated=True)[MARK] = True
     if settings.make_paths:
-        ground = sample(made.plan.track, made.plan.fps).positions
-        write_ribbon(context, track_name(order), ground, tuple(order.shirt), room)
-    lengthen(scene, start + take.motion.duration * frames_per_second(scene))
+        ground = sample_track(result.plan.track, result.plan.fps).positions
+        write_ribbon(context, build_track_name(owner), ground, tuple(owner.shirt), room)
+    extend_scene(scene, start + take.motion.duration * frames_per_second(scene))
     return target
 
 
-def the_ball(context: bpy.types.Context, path: BallPath) -> bpy.types.Object:
+def write_ball(context: bpy.types.Context, path: BallPath) -> bpy.types.Object:
     """Write the ball's trajectory to the scene's ball."""
     scene = context.scene
-    room = collection(scene)
-    target = room.objects.get(BALL) or ball.create(context, BALL, room)
-    channels.discard(target, MARK)
-    ball.write(target, path, scene, frame_at(scene, float(path.times[0])))[MARK] = True
+    room = find_or_create_collection(scene)
+    target = room.objects.get(BALL) or ball.create_ball(context, BALL, room)
+    channels.remove_marked_action(target, MARK)
+    ball.write_trajectory(target, path, scene, compute_frame(scene, float(path.times[0])))[MARK] = True
     return target
 
 
-def camera(scene: bpy.types.Scene, takes: list[Take]) -> None:
+def write_camera(scene: bpy.types.Scene, takes: list[Take]) -> None:
     """Let the stage's camera follow the middle of all players smoothly, with all of them in view."""
     start = min(take.start_time for take in takes)
     end = max(take.start_time + take.motion.duration for take in takes)
     fps = frames_per_second(scene)
-    frames = whole_frames(frame_at(scene, start), end - start, fps)
-    seconds = start + (frames - frame_at(scene, start)) / fps
-    places = np.array([_places(take, seconds) for take in takes])
-    middle = _smooth(0.5 * (places.min(axis=0) + places.max(axis=0)), fps)
+    frames = whole_frames(compute_frame(scene, start), end - start, fps)
+    seconds = start + (frames - compute_frame(scene, start)) / fps
+    places = np.array([_sample_places(take, seconds) for take in takes])
+    middle = _smooth_places(0.5 * (places.min(axis=0) + places.max(axis=0)), fps)
     reach = np.linalg.norm(places - middle, axis=-1).max(axis=0)
-    stage.follow(scene, frames, middle, _smooth(reach[:, None], fps)[:, 0])
+    stage.animate_camera(scene, frames, middle, _smooth_places(reach[:, None], fps)[:, 0])
 
 
-def collection(scene: bpy.types.Scene) -> bpy.types.Collection:
+def find_or_create_collection(scene: bpy.types.Scene) -> bpy.types.Collection:
     """Find or create the scene's collection for all baked objects."""
     found = scene.collection.children.get(COLLECTION)
     if found is None:
@@ -92,35 +92,35 @@ def collection(scene: bpy.types.Scene) -> bpy.types.Collection:
     return found
 
 
-def ball_of(takes: list[Take], settings: BeyondMocapSettings) -> BallPath | None:
+def find_ball(takes: list[Take], settings: BeyondMocapSettings) -> BallPath | None:
     """Find the ball of the first take that has one, if a ball is wanted."""
     return next((take.ball for take in takes if take.ball is not None), None) if settings.make_ball else None
 
 
-def track_name(order: BeyondMocapPlayer) -> str:
+def build_track_name(owner: BeyondMocapPlayer) -> str:
     """Return the name of the ribbon that shows a player's track."""
-    return f"{order.name} track"
+    return f"{owner.name} track"
 
 
-def fits(target: bpy.types.Object, take: Take, scene: bpy.types.Scene) -> bool:
+def is_matching(target: bpy.types.Object, take: Take, scene: bpy.types.Scene) -> bool:
     """Return whether the object is an armature in this scene with the take's bones."""
     if target.type != "ARMATURE" or target.name not in scene.objects or not target.data.bones:
         return False
-    return armature.skeleton_of(target, scene).same_bones(take.motion.skeleton)
+    return armature.build_skeleton(target, scene).has_same_bones(take.motion.skeleton)
 
 
-def lengthen(scene: bpy.types.Scene, last: float) -> None:
+def extend_scene(scene: bpy.types.Scene, last: float) -> None:
     """Extend the scene's frame range to `last`."""
     scene.frame_end = max(scene.frame_end, int(np.floor(last + 1e-4)))
 
 
-def _places(take: Take, seconds: np.ndarray) -> np.ndarray:
+def _sample_places(take: Take, seconds: np.ndarray) -> np.ndarray:
     """Interpolate the player's places on the ground at times on the track's clock: (N, 2) metres."""
     times = take.start_time + np.arange(len(take.motion)) / take.motion.fps
-    return interpolate(seconds, times, take.motion.root_positions[:, :2])
+    return interpolate_columns(seconds, times, take.motion.root_positions[:, :2])
 
 
-def _smooth(places: np.ndarray, fps: float) -> np.ndarray:
+def _smooth_places(places: np.ndarray, fps: float) -> np.ndarray:
     """Compute the running mean of (F, n) over two seconds, for a smooth camera."""
     half = max(1, int(fps))
     padded = np.concatenate([places[:1].repeat(half, axis=0), places, places[-1:].repeat(half, axis=0)])
@@ -140,7 +140,7 @@ def write_ribbon(context: bpy.types.Context, name: str, points: np.ndarray, rgb,
     placed[:, :2], placed[:, 2] = np.asarray(points) * units, RIBBON_HEIGHT * units
     line.points.foreach_set("co", placed.ravel())
     line.points.foreach_set("tilt", np.full(len(points), -np.pi / 2, np.float32))  # its upper side faces up
-    data.materials.append(colour(f"{name} colour", tuple(rgb), 0.9))
+    data.materials.append(get_material(f"{name} colour", tuple(rgb), 0.9))
     ribbon = collection.objects.get(name)
     if ribbon is None or ribbon.type != "CURVE":
         ribbon = bpy.data.objects.new(name, data)

@@ -15,9 +15,9 @@ import numpy as np
 
 from ...beyond_mocap.synthesis.take import Take
 from ..core import channels
-from ..core.action import PLACED
+from ..core.action import PLACEMENT
 from ..core.measure import frames_per_second
-from ..core.set_aside import purge_action
+from ..core.set_aside import remove_unused_action
 from . import bake, hand_keys
 from .bake import MARK
 
@@ -34,58 +34,58 @@ class Block:
     name: str
 
 
-def note(action: bpy.types.Action, take: Take, scene: bpy.types.Scene) -> None:
+def store_blocks(action: bpy.types.Action, take: Take, scene: bpy.types.Scene) -> None:
     """Store on an action which clips its frames show."""
-    action[BLOCKS] = json.dumps([[block.start, block.end, block.name] for block in blocks_of(take, scene)])
+    action[BLOCKS] = json.dumps([[block.start, block.end, block.name] for block in compute_blocks(take, scene)])
 
 
-def noted(action: bpy.types.Action) -> tuple[Block, ...]:
+def read_blocks(action: bpy.types.Action) -> tuple[Block, ...]:
     """Read the pieces stored on an action; none if it has none."""
     return tuple(Block(*row) for row in json.loads(action.get(BLOCKS, "[]")))
 
 
-def blocks_of(take: Take, scene: bpy.types.Scene) -> tuple[Block, ...]:
+def compute_blocks(take: Take, scene: bpy.types.Scene) -> tuple[Block, ...]:
     """Compute the pieces of a take in scene frames, with transitions on the nearest whole frame; shorter ones are
     left out.
     """
-    seams = [0, *(int(seam) for seam in take.seams), len(take.motion)]
+    transitions = [0, *(int(seam) for seam in take.seams), len(take.motion)]
     rate = frames_per_second(scene) / take.motion.fps
-    first = bake.frame_at(scene, take.start_time)
-    edges = [int(round(first + seam * rate)) for seam in seams]
+    first = bake.compute_frame(scene, take.start_time)
+    edges = [int(round(first + seam * rate)) for seam in transitions]
     edges[0], edges[-1] = int(np.ceil(first - 1e-4)), int(np.floor(first + (len(take.motion) - 1) * rate + 1e-4))
     found = []
-    for seam, start, end in zip(seams, edges, edges[1:]):
+    for seam, start, end in zip(transitions, edges, edges[1:]):
         if end > start:
-            found.append(Block(found[-1].end if found else start, end, name_of(take, seam)))
+            found.append(Block(found[-1].end if found else start, end, build_strip_name(take, seam)))
     return tuple(found)
 
 
-def name_of(take: Take, frame: int) -> str:
+def build_strip_name(take: Take, frame: int) -> str:
     """Build the name of a strip that starts at a frame of the take: clip and labels."""
     clip = take.clips[take.clip[frame]].rpartition("/")[2].removesuffix(".bvh")
     mirrored = " (mirrored)" if take.mirrored[frame] else ""
     return f"{clip}{mirrored} {' '.join(take.words[frame])}".strip()[:60]
 
 
-def as_strips(body: bpy.types.Object, scene: bpy.types.Scene) -> bpy.types.NlaTrack:
+def convert_to_strips(body: bpy.types.Object, scene: bpy.types.Scene) -> bpy.types.NlaTrack:
     """Cut the action of `body` into strips on a track of the extension; the action is removed. Returns the track."""
-    whole, slot = channels.playing(body)
-    track = track_of(body)
+    whole, slot = channels.find_playing_action(body)
+    track = find_track(body)
     if whole is None:
         return track
-    _clear(track)
+    _clear_track(track)
     data = body.animation_data
-    pieces = noted(whole) or (Block(*channels.keyed_range(channels.curves(whole, slot)), whole.name),)
+    pieces = read_blocks(whole) or (Block(*channels.find_key_range(channels.collect_curves(whole, slot)), whole.name),)
     if track is None:
         track = data.nla_tracks.new()
         track.name = TRACK
-    data.action, made = None, hand_keys.read(whole)
+    data.action, generated = None, hand_keys.read_generated(whole)
     for number, block in enumerate(pieces):
-        action, part = channels.cut(whole, slot, block.start, block.end, block.name)
-        if made is not None:
-            hand_keys.write(action, made.part(block.start, block.end))
+        action, part = channels.cut_action(whole, slot, block.start, block.end, block.name)
+        if generated is not None:
+            hand_keys.write_generated(action, generated.select_frames(block.start, block.end))
         action[MARK], action[BLOCKS] = True, json.dumps([[block.start, block.end, block.name]])
-        _keep_place(whole, action)
+        _copy_place(whole, action)
         strip = track.strips.new(block.name, block.start, action)
         strip.action_slot = part
         strip.use_sync_length = False
@@ -96,50 +96,50 @@ def as_strips(body: bpy.types.Object, scene: bpy.types.Scene) -> bpy.types.NlaTr
         strip.name = block.name
     data.use_nla = True
     if not whole.users - whole.use_fake_user:
-        purge_action(whole, MARK)
+        remove_unused_action(whole, MARK)
     return track
 
 
-def as_action(body: bpy.types.Object, scene: bpy.types.Scene) -> bpy.types.Action | None:
+def convert_to_action(body: bpy.types.Object, scene: bpy.types.Scene) -> bpy.types.Action | None:
     """Join the strips of `body` to one action, if it does not play one already; the strips are removed."""
-    whole, _ = channels.playing(body)
-    track = track_of(body)
+    whole, _ = channels.find_playing_action(body)
+    track = find_track(body)
     if track is None:
         return whole
     if whole is None:
-        alone = {strip.action: strip.action_slot for strip in track.strips}  # split strips share one action
-        parts = [(action, slot, *noted(action)[0:1]) for action, slot in alone.items()]
+        slots_by_action = {strip.action: strip.action_slot for strip in track.strips}  # split strips share one action
+        parts = [(action, slot, *read_blocks(action)[0:1]) for action, slot in slots_by_action.items()]
         pieces = [(action, slot, block.start, block.end) for action, slot, block in parts]
-        whole, slot = channels.joined(pieces, f"{body.name} take", body.name)
-        channels.assign(body, whole, slot)
-        made = hand_keys.joined([hand_keys.read(action) for action, _, _ in parts])
-        if made is not None:
-            hand_keys.write(whole, made)
+        whole, slot = channels.join_actions(pieces, f"{body.name} take", body.name)
+        channels.assign_action(body, whole, slot)
+        generated = hand_keys.join_generated([hand_keys.read_generated(action) for action, _, _ in parts])
+        if generated is not None:
+            hand_keys.write_generated(whole, generated)
         whole[MARK] = True
-        _keep_place(parts[0][0], whole)
+        _copy_place(parts[0][0], whole)
         whole[BLOCKS] = json.dumps([[block.start, block.end, block.name] for _, _, block in parts])
-    _clear(track)
+    _clear_track(track)
     body.animation_data.nla_tracks.remove(track)
     return whole
 
 
-def _keep_place(source: bpy.types.Action, made: bpy.types.Action) -> None:
+def _copy_place(source: bpy.types.Action, target: bpy.types.Action) -> None:
     """Copy the stored place of the body to another action."""
-    if PLACED in source:
-        made[PLACED] = list(source[PLACED])
+    if PLACEMENT in source:
+        target[PLACEMENT] = list(source[PLACEMENT])
 
 
-def track_of(body: bpy.types.Object) -> bpy.types.NlaTrack | None:
+def find_track(body: bpy.types.Object) -> bpy.types.NlaTrack | None:
     """Find the NLA track of `body` with strips of the extension; None without one."""
     tracks = body.animation_data.nla_tracks if body.animation_data is not None else ()
     return next((track for track in tracks if track.strips and all(
         strip.action is not None and strip.action.get(MARK) for strip in track.strips)), None)
 
 
-def _clear(track: bpy.types.NlaTrack | None) -> None:
+def _clear_track(track: bpy.types.NlaTrack | None) -> None:
     """Remove the strips of a track, and their actions."""
     for strip in list(track.strips) if track is not None else ():
         action = strip.action
         track.strips.remove(strip)
         if action is not None:
-            purge_action(action, MARK)
+            remove_unused_action(action, MARK)

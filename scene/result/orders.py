@@ -11,22 +11,22 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...beyond_mocap.annotation import validate
-from ...beyond_mocap.base.errors import InputError, NotInLibrary
+from ...beyond_mocap.annotation import check_timeline
+from ...beyond_mocap.base.errors import InputError, NotInLibraryError
 from ...beyond_mocap.synthesis.plan import Plan
 from ...beyond_mocap.synthesis.take import Take
 from ..core import preferences, session
-from ..core.settings import BeyondMocapPlayer, BeyondMocapSettings, absolute
+from ..core.settings import BeyondMocapPlayer, BeyondMocapSettings, to_absolute_path
 from . import freshness, plans, preview
 
 if TYPE_CHECKING:  # imported by the work itself: scipy and scikit-learn take a second, and enabling must be quick
     from ...beyond_mocap.library.library import Library
 
-LIKE = 0.05  # seconds: ranges whose ends differ by less are the same
+SAME_RANGE = 0.05  # seconds: ranges whose ends differ by less are the same
 
 
 @dataclass(frozen=True)
-class How:
+class SynthesisMode:
     """What to synthesize.
 
     Attributes:
@@ -45,7 +45,7 @@ class How:
 
 
 @dataclass(frozen=True)
-class Order:
+class Request:
     """Everything that the work for one player needs.
 
     Attributes:
@@ -63,7 +63,7 @@ class Order:
     """
 
     player: str
-    how: How
+    mode: SynthesisMode
     plan: Plan
     where: str
     warnings: tuple[str, ...]
@@ -77,12 +77,12 @@ class Order:
     @property
     def fingerprint(self) -> str:
         """Fingerprint of the inputs, without the player's name."""
-        start = self.begin if self.how.kind != "whole" else ""
-        return freshness.fingerprint((self.plan, self.how, start, self.folder, self.unit))
+        start = self.begin if self.mode.kind != "whole" else ""
+        return freshness.compute_fingerprint((self.plan, self.mode, start, self.folder, self.unit))
 
 
 @dataclass(frozen=True)
-class One:
+class TakeResult:
     """A take with its plan, its report, and the steps to reproduce it."""
 
     plan: Plan
@@ -92,15 +92,15 @@ class One:
 
 
 @dataclass(frozen=True)
-class Result:
+class RequestResult:
     """The result of a request: the library, the fingerprints of the inputs, and the takes (several for variants)."""
 
     library: "Library"
     made_of: dict
-    takes: tuple[One, ...]
+    takes: tuple[TakeResult, ...]
 
 
-def order_of(settings: BeyondMocapSettings, player: BeyondMocapPlayer, how: How, still: bool = False) -> Order:
+def build_request(settings: BeyondMocapSettings, player: BeyondMocapPlayer, mode: SynthesisMode, still: bool = False) -> Request:
     """Build the request of one player.
 
     Args:
@@ -115,19 +115,19 @@ def order_of(settings: BeyondMocapSettings, player: BeyondMocapPlayer, how: How,
     """
     if not settings.library_folder:
         raise InputError("library", "no folder is chosen", "a folder of clips", "choose one in step 1")
-    preview.check(player)
-    plan, warnings = plans.plan_of(settings, player, still)
-    made = session.made(player.take)
-    if how.kind == "stretch" and made is None:
+    preview.check_body(player)
+    plan, warnings = plans.build_plan(settings, player, still)
+    session_take = session.find_take(player.take)
+    if mode.kind == "stretch" and session_take is None:
         found = f"no take of {player.name} in this session"
         raise InputError("resynthesize", found, "a take", "press Update first to compute it again")
-    folder, unit = absolute(settings.library_folder), settings.library_unit or None
-    return Order(player.name, how, plan, where=plans.words_from(player), warnings=warnings, begin=player.take,
-                 before=made.take if made else None, recipe=json.loads(player.result.recipe or "{}"), folder=folder,
-                 unit=unit, build=preferences.for_build(folder))
+    folder, unit = to_absolute_path(settings.library_folder), settings.library_unit or None
+    return Request(player.name, mode, plan, where=plans.describe_label_source(player), warnings=warnings, begin=player.take,
+                 before=session_take.take if session_take else None, recipe=json.loads(player.result.recipe or "{}"), folder=folder,
+                 unit=unit, build=preferences.build_library_options(folder))
 
 
-def work(order: Order, library: "Library | None", progress, cancelled, hurry) -> Result:
+def process_request(request: Request, library: "Library | None", progress, cancelled, hurry) -> RequestResult:
     """Process a request. Never accesses bpy.
 
     Args:
@@ -139,113 +139,113 @@ def work(order: Order, library: "Library | None", progress, cancelled, hurry) ->
     Returns:
         The library and the takes.
     """
-    from ...beyond_mocap.library.build import build
+    from ...beyond_mocap.library.build import build_library
 
-    clips = library or build(order.folder, unit=order.unit, **order.build, progress=progress,
+    clips = library or build_library(request.folder, unit=request.unit, **request.build, progress=progress,
                              cancelled=lambda: cancelled() or hurry())
-    plan = order.plan
-    validate(plan.timeline, clips.words, float(plan.track.times[0]), float(plan.track.times[-1]), order.where)
-    asked = progress, cancelled, hurry
+    plan = request.plan
+    check_timeline(plan.timeline, clips.labels, float(plan.track.times[0]), float(plan.track.times[-1]), request.where)
+    callbacks = progress, cancelled, hurry
     try:
-        takes = _variants(order, clips, *asked) if order.how.kind == "variants" else (_single(order, clips, *asked),)
-    except NotInLibrary as error:
-        raise NotInLibrary(f"{order.where}: {error}", error.nearest) from None
-    return Result(clips, freshness.parts(plan, order.folder), takes)
+        takes = _synthesize_variants(request, clips, *callbacks) if request.mode.kind == "variants" else (_synthesize_single(request, clips, *callbacks),)
+    except NotInLibraryError as error:
+        raise NotInLibraryError(f"{request.where}: {error}", error.nearest) from None
+    return RequestResult(clips, freshness.compute_parts(plan, request.folder), takes)
 
 
-def _single(order: Order, clips, progress, cancelled, hurry) -> One:
+def _synthesize_single(request: Request, clips, progress, cancelled, hurry) -> TakeResult:
     """Synthesize one take by the request's mode."""
-    from ...beyond_mocap.synthesis.resynthesize import Anew, resynthesize, shown_footage
+    from ...beyond_mocap.synthesis.resynthesize import VariantStretch, resynthesize, list_shown_stretches
     from ...beyond_mocap.synthesis.synthesize import synthesize
 
-    begun, plan, how = perf_counter(), order.plan, order.how
-    stamp = freshness.fingerprint(plan)
-    same, steps = order.recipe.get("plan") == stamp, order.recipe.get("steps")
-    asked = progress, cancelled, hurry
-    if how.kind == "stretch":
-        used = (*_used_before(steps, how), *shown_footage(clips, order.before, how.start, how.end))
-        take = resynthesize(clips, plan, order.before, *asked, anew=Anew(how.start, how.end, used))
-        step = {"start": how.start, "end": how.end, "used": [asdict(piece) for piece in used]}
-        steps = [*steps, step] if same and steps else None
-    elif how.kind == "quick" and plan.method == "path" and not _same_span(plan, order.before):
+    start, plan, mode = perf_counter(), request.plan, request.mode
+    stamp = freshness.compute_fingerprint(plan)
+    is_same_plan, steps = request.recipe.get("plan") == stamp, request.recipe.get("steps")
+    callbacks = progress, cancelled, hurry
+    if mode.kind == "stretch":
+        used = (*_list_used_pieces(steps, mode), *list_shown_stretches(clips, request.before, mode.start, mode.end))
+        take = resynthesize(clips, plan, request.before, *callbacks, variant=VariantStretch(mode.start, mode.end, used))
+        step = {"start": mode.start, "end": mode.end, "used": [asdict(piece) for piece in used]}
+        steps = [*steps, step] if is_same_plan and steps else None
+    elif mode.kind == "quick" and plan.method == "path" and not _has_same_duration(plan, request.before):
         take, steps = synthesize(clips, plan, progress, cancelled, hurry, narrow=True), None
-    elif how.kind in ("update", "quick") and order.before is not None:
-        take = resynthesize(clips, plan, order.before, *asked)
-        steps = steps if same else None
-    elif how.kind == "update" and same and steps:
-        take = _again(clips, plan, steps, asked)
+    elif mode.kind in ("update", "quick") and request.before is not None:
+        take = resynthesize(clips, plan, request.before, *callbacks)
+        steps = steps if is_same_plan else None
+    elif mode.kind == "update" and is_same_plan and steps:
+        take = _reproduce_take(clips, plan, steps, callbacks)
     else:
-        take, steps = synthesize(clips, plan, *asked), [{}]
+        take, steps = synthesize(clips, plan, *callbacks), [{}]
     recipe = {"plan": stamp, "steps": steps}
-    if how.kind == "quick":  # its figures come with the full take that follows
-        seconds = {**take.seconds, "total": perf_counter() - begun}
-        return One(plan, take, {"fps": plan.fps, "seconds": seconds, "warnings": list(take.warnings)}, recipe)
-    return _judged(clips, plan, take, recipe, perf_counter() - begun)
+    if mode.kind == "quick":  # its figures come with the full take that follows
+        seconds = {**take.seconds, "total": perf_counter() - start}
+        return TakeResult(plan, take, {"fps": plan.fps, "seconds": seconds, "warnings": list(take.warnings)}, recipe)
+    return _evaluate_take(clips, plan, take, recipe, perf_counter() - start)
 
 
-def _same_span(plan: Plan, before: Take | None) -> bool:
+def _has_same_duration(plan: Plan, before: Take | None) -> bool:
     """Return whether a take can be updated in part: a drawn track with another duration needs a whole take."""
     old = before.plan.track if before is not None and before.plan is not None else None
     return old is not None and np.array_equal(plan.track.times[[0, -1]], old.times[[0, -1]])
 
 
-def _variants(order: Order, clips, progress, cancelled, hurry) -> tuple[One, ...]:
+def _synthesize_variants(request: Request, clips, progress, cancelled, hurry) -> tuple[TakeResult, ...]:
     """Synthesize the best take and others: each without the source frames of those before, or with another seed."""
-    from ...beyond_mocap.base.errors import Cancelled
-    from ...beyond_mocap.synthesis.resynthesize import shown_footage
+    from ...beyond_mocap.base.errors import UserCancelledError
+    from ...beyond_mocap.synthesis.resynthesize import list_shown_stretches
     from ...beyond_mocap.synthesis.synthesize import synthesize
 
-    found, used, count = [], (), order.how.count
+    found, used, count = [], (), request.mode.count
     for number in range(count):
-        def tell(fraction, text, number=number):
+        def report_progress(fraction, text, number=number):
             progress((number + fraction) / count, f"variant {number + 1} of {count}: {text}")
 
-        begun = perf_counter()
-        plan = replace(order.plan, seed=order.plan.seed + (0 if order.plan.method == "path" else number))
+        start = perf_counter()
+        plan = replace(request.plan, seed=request.plan.seed + (0 if request.plan.method == "path" else number))
         if number and hurry():
             break
         try:
-            take = synthesize(clips, plan, tell, cancelled=cancelled, hurry=hurry, used=used)
-        except Cancelled:
+            take = synthesize(clips, plan, report_progress, cancelled=cancelled, hurry=hurry, used=used)
+        except UserCancelledError:
             if cancelled() or not found:
                 raise
             break
-        recipe = {"plan": freshness.fingerprint(plan), "steps": [{"used": [asdict(piece) for piece in used]}]}
-        found.append(_judged(clips, plan, take, recipe, perf_counter() - begun))
-        used = (*used, *shown_footage(clips, take, take.start_time, take.start_time + take.motion.duration))
+        recipe = {"plan": freshness.compute_fingerprint(plan), "steps": [{"used": [asdict(piece) for piece in used]}]}
+        found.append(_evaluate_take(clips, plan, take, recipe, perf_counter() - start))
+        used = (*used, *list_shown_stretches(clips, take, take.start_time, take.start_time + take.motion.duration))
     return tuple(found)
 
 
-def _again(clips, plan: Plan, steps: list[dict], asked) -> Take:
+def _reproduce_take(clips, plan: Plan, steps: list[dict], callbacks) -> Take:
     """Reproduce a take from its steps: the same bits."""
-    from ...beyond_mocap.synthesis.resynthesize import Anew, resynthesize
+    from ...beyond_mocap.synthesis.resynthesize import VariantStretch, resynthesize
     from ...beyond_mocap.synthesis.synthesize import synthesize
 
     first, *edits = steps
-    take = synthesize(clips, plan, *asked, _pieces(first))
+    take = synthesize(clips, plan, *callbacks, _parse_pieces(first))
     for edit in edits:
-        take = resynthesize(clips, plan, take, *asked, anew=Anew(edit["start"], edit["end"], _pieces(edit)))
+        take = resynthesize(clips, plan, take, *callbacks, variant=VariantStretch(edit["start"], edit["end"], _parse_pieces(edit)))
     return take
 
 
-def _pieces(step: dict) -> tuple:
-    from ...beyond_mocap.synthesis.search.preferences import Used
+def _parse_pieces(step: dict) -> tuple:
+    from ...beyond_mocap.synthesis.search.preferences import UsedStretch
 
-    return tuple(Used(**piece) for piece in step.get("used", ()))
+    return tuple(UsedStretch(**piece) for piece in step.get("used", ()))
 
 
-def _used_before(steps: list[dict] | None, how: How) -> tuple:
+def _list_used_pieces(steps: list[dict] | None, mode: SynthesisMode) -> tuple:
     """List the source frames that earlier solutions of the same range excluded, so that each press leads to a new
     one.
     """
     same = [step for step in steps or () if "start" in step
-            and abs(step["start"] - how.start) < LIKE and abs(step["end"] - how.end) < LIKE]
-    return tuple(dict.fromkeys(piece for step in same for piece in _pieces(step)))
+            and abs(step["start"] - mode.start) < SAME_RANGE and abs(step["end"] - mode.end) < SAME_RANGE]
+    return tuple(dict.fromkeys(piece for step in same for piece in _parse_pieces(step)))
 
 
-def _judged(clips, plan: Plan, take: Take, recipe: dict, seconds: float) -> One:
+def _evaluate_take(clips, plan: Plan, take: Take, recipe: dict, seconds: float) -> TakeResult:
     from ...beyond_mocap.evaluation.report import evaluate
 
     report: dict[str, Any] = evaluate(take, plan.track, clips)
     report["seconds"]["total"] = seconds
-    return One(plan, take, report, recipe)
+    return TakeResult(plan, take, report, recipe)

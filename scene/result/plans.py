@@ -6,18 +6,18 @@ import bpy
 
 from ...beyond_mocap.annotation import Timeline
 from ...beyond_mocap.base.errors import InputError
-from ...beyond_mocap.motion.track import Track, clean
+from ...beyond_mocap.motion.track import Track, clean_track
 from ...beyond_mocap.synthesis.plan import Plan
-from ..core.measure import scene_clock
-from ..core.properties import property_values
-from ..core.settings import BeyondMocapPlayer, BeyondMocapSettings, absolute, active_player
+from ..core.measure import build_scene_clock
+from ..core.properties import read_property_values
+from ..core.settings import BeyondMocapPlayer, BeyondMocapSettings, to_absolute_path, find_active_player
 from ..player import pins
 from ..player.tracks import read_track
 from ..timeline import lanes, strips
 from . import blocks
 
 
-def chosen(settings: BeyondMocapSettings) -> list[BeyondMocapPlayer]:
+def list_selected_players(settings: BeyondMocapSettings) -> list[BeyondMocapPlayer]:
     """List the players that are switched on. Raises InputError if there is none."""
     players = [player for player in settings.players if player.use]
     if not players:
@@ -25,7 +25,7 @@ def chosen(settings: BeyondMocapSettings) -> list[BeyondMocapPlayer]:
     return players
 
 
-def plan_of(settings: BeyondMocapSettings, player: BeyondMocapPlayer,
+def build_plan(settings: BeyondMocapSettings, player: BeyondMocapPlayer,
             still: bool = False) -> tuple[Plan, tuple[str, ...]]:
     """Build the plan of one player.
 
@@ -36,61 +36,61 @@ def plan_of(settings: BeyondMocapSettings, player: BeyondMocapPlayer,
     Returns:
         The plan, and warnings about the track.
     """
-    track, found = clean(read_track(settings, player, still))
-    plan = Plan(track=track, timeline=timeline_of(player, settings.rate, track),
-                library=absolute(settings.library_folder), pins=pins.read(player.id_data, player),
-                **property_values(Plan, settings, "synthesis"), **property_values(Plan, player, "player"))
+    track, found = clean_track(read_track(settings, player, still))
+    plan = Plan(track=track, timeline=read_timeline(player, settings.rate, track),
+                library=to_absolute_path(settings.library_folder), pins=pins.read_pins(player.id_data, player),
+                **read_property_values(Plan, settings, "synthesis"), **read_property_values(Plan, player, "player"))
     return plan, found.warnings
 
 
-def timeline_of(player: BeyondMocapPlayer, fps: float, track: Track) -> Timeline:
+def read_timeline(player: BeyondMocapPlayer, fps: float, track: Track) -> Timeline:
     """Read the player's labels: from their strips, else from the text, else from the file, else none (all
     automatic).
     """
-    asked = strips.read(player, player.id_data)
-    return strips.written_words(player, fps, track) if asked is None else asked
+    timeline = strips.read_player_timeline(player, player.id_data)
+    return strips.read_written_labels(player, fps, track) if timeline is None else timeline
 
 
-def words_from(player: BeyondMocapPlayer) -> str:
+def describe_label_source(player: BeyondMocapPlayer) -> str:
     """Describe where the player's labels are written, for messages."""
-    return strips.written_in(player) if strips.dot_of(player, player.id_data) is None else strips.where(player)
+    return strips.describe_label_source(player) if strips.find_dot(player, player.id_data) is None else strips.describe_strips(player)
 
 
-def selected_stretch(scene: bpy.types.Scene) -> tuple[BeyondMocapPlayer, float, float]:
+def find_selected_range(scene: bpy.types.Scene) -> tuple[BeyondMocapPlayer, float, float]:
     """Find the selected player and seconds on the track's clock. Raises InputError without a selection."""
-    clock = scene_clock(scene)
+    clock = build_scene_clock(scene)
     for player in scene.beyond_mocap.players:
-        frames = _of_result(player) or _of_words(player, scene)
+        frames = _find_result_range(player) or _find_label_range(player, scene)
         if frames is not None:
-            return player, clock.seconds(frames[0]), clock.seconds(frames[1])
-    player = player_shown(scene)
+            return player, clock.to_seconds(frames[0]), clock.to_seconds(frames[1])
+    player = find_shown_player(scene)
     if player is not None and scene.use_preview_range:
-        return player, clock.seconds(scene.frame_preview_start), clock.seconds(scene.frame_preview_end)
+        return player, clock.to_seconds(scene.frame_preview_start), clock.to_seconds(scene.frame_preview_end)
     raise InputError("resynthesize", "no range of time is selected", "a selected strip or a preview range",
                      "select a strip in the NLA editor, or press P in the timeline and draw a range")
 
 
-def player_shown(scene: bpy.types.Scene) -> BeyondMocapPlayer | None:
+def find_shown_player(scene: bpy.types.Scene) -> BeyondMocapPlayer | None:
     """Find the active player if they have a take; else None."""
-    player = active_player(scene.beyond_mocap)
+    player = find_active_player(scene.beyond_mocap)
     return player if player is not None and player.take else None
 
 
-def _of_result(player: BeyondMocapPlayer) -> tuple[float, float] | None:
+def _find_result_range(player: BeyondMocapPlayer) -> tuple[float, float] | None:
     """Find the frames of the selected strips of an applied result."""
-    track = blocks.track_of(player.body) if player.body is not None else None
+    track = blocks.find_track(player.body) if player.body is not None else None
     chosen = [strip for strip in track.strips if strip.select] if track is not None and player.body.select_get() else []
     if not chosen or len(chosen) == len(track.strips) > 1:
         return None
     return min(strip.frame_start for strip in chosen), max(strip.frame_end for strip in chosen)
 
 
-def _of_words(player: BeyondMocapPlayer, scene: bpy.types.Scene) -> tuple[float, float] | None:
+def _find_label_range(player: BeyondMocapPlayer, scene: bpy.types.Scene) -> tuple[float, float] | None:
     """Find the frames of the selected label strips of a player's selected dot."""
-    dot = strips.dot_of(player, scene)
+    dot = strips.find_dot(player, scene)
     if dot is None or not player.take or not dot.select_get():
         return None
-    chosen = [strip for _, strip in lanes.strips(dot) if strip.select and strip.action.beyond_mocap.kind != "moments"]
+    chosen = [strip for _, strip in lanes.iter_strips(dot) if strip.select and strip.action.beyond_mocap.kind != "moments"]
     if not chosen:
         return None
     return min(strip.frame_start for strip in chosen), max(strip.frame_end for strip in chosen)

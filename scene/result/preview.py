@@ -11,8 +11,8 @@ import numpy as np
 
 from ...beyond_mocap.base.errors import InputError
 from ..core import channels, session
-from ..core.measure import scene_clock
-from ..core.set_aside import bring_back, drop, play_as_before, put_aside
+from ..core.measure import build_scene_clock
+from ..core.set_aside import restore_playback, discard_saved_state, restore_nla, save_playback
 from ..core.settings import BeyondMocapPlayer
 from ..passes import possession
 from ..path_editing import riders
@@ -26,7 +26,7 @@ LINES = ("take", "quality", "moments", "warnings")
 VARIANT_LINES = ("quality", "moments", "warnings", "recipe")
 
 
-def check(player: BeyondMocapPlayer) -> None:
+def check_body(player: BeyondMocapPlayer) -> None:
     """Raise InputError if the player's body cannot be animated here."""
     body = player.body
     if body is None:
@@ -38,12 +38,12 @@ def check(player: BeyondMocapPlayer) -> None:
                          "make it editable: Outliner, Library Override, Make")
 
 
-def off_path(player: BeyondMocapPlayer) -> list[str]:
+def revert_path_edit(player: BeyondMocapPlayer) -> list[str]:
     """Revert the path edit of a player's body before its result changes; returns messages."""
-    return riders.leave(player.body)
+    return riders.revert_path_edits(player.body)
 
 
-def show(context: bpy.types.Context, player: BeyondMocapPlayer, take: str, lines: dict[str, str]) -> bpy.types.Object:
+def show_preview(context: bpy.types.Context, player: BeyondMocapPlayer, take: str, lines: dict[str, str]) -> bpy.types.Object:
     """Preview a take of the session on the player's armature, created if missing; the previous state is stored.
 
     Args:
@@ -54,64 +54,64 @@ def show(context: bpy.types.Context, player: BeyondMocapPlayer, take: str, lines
     Returns:
         The armature.
     """
-    made, result = session.made(take), player.result
-    check(player)
-    left = off_path(player)
-    if result.state != "NONE" and not shown(context.scene, player):
-        forget(player)
-    hand, clock = hand_keys.Hand(), ""
+    result_take, result = session.find_take(take), player.result
+    check_body(player)
+    reverted = revert_path_edit(player)
+    if result.state != "NONE" and not is_shown(context.scene, player):
+        drop_preview(player)
+    recorded_keys, clock = hand_keys.ManualKeys(), ""
     if context.scene.beyond_mocap.keep_hand_keys and player.body is not None and result.state != "NONE":
-        hand, clock = hand_keys.of_body(player.body)
+        recorded_keys, clock = hand_keys.find_in_body(player.body)
     if result.state != "PREVIEW":
-        _remember(context, player, made)
+        _store_state(context, player, result_take)
     player.take = take
     for name, text in lines.items():
         setattr(result if name in STEPS else player, name, text)
-    if left:
-        player.warnings = "\n".join(filter(None, [player.warnings, *left]))
-    with _shared_length(context.scene):
-        body = bake.player(context, player, made)
-    action, slot = channels.playing(body)
-    blocks.note(action, made.take, context.scene)
-    hand_keys.note(action, slot, scene_clock(context.scene))
-    moved = hand_keys.shift_between(clock, scene_clock(context.scene))
-    result.hand_keys = hand_keys.put(action, slot, hand, moved) if moved is not None else 0
+    if reverted:
+        player.warnings = "\n".join(filter(None, [player.warnings, *reverted]))
+    with _SharedLength(context.scene):
+        body = bake.write_take(context, player, result_take)
+    action, slot = channels.find_playing_action(body)
+    blocks.store_blocks(action, result_take.take, context.scene)
+    hand_keys.store_generated(action, slot, build_scene_clock(context.scene))
+    shift = hand_keys.compute_shift(clock, build_scene_clock(context.scene))
+    result.hand_keys = hand_keys.write_manual_keys(action, slot, recorded_keys, shift) if shift is not None else 0
     result.state = "PREVIEW"
-    quality.renew_error_curves(context.scene, player)
-    share(context)
+    quality.update_error_curves(context.scene, player)
+    update_shared(context)
     return body
 
 
-def keep(context: bpy.types.Context, player: BeyondMocapPlayer, form: str) -> bpy.types.Object:
+def apply_preview(context: bpy.types.Context, player: BeyondMocapPlayer, form: str) -> bpy.types.Object:
     """Apply the preview of a player as one action ("ACTION") or as NLA strips ("STRIPS").
 
     What had been stored for it and belongs to the extension is removed. Returns the armature.
     """
     result, body = player.result, player.body
-    off_path(player)
+    revert_path_edit(player)
     if result.motion.kept and body.animation_data is not None:
-        play_as_before(result.motion, body.animation_data)
+        restore_nla(result.motion, body.animation_data)
     if form == "STRIPS":
-        blocks.as_strips(body, context.scene)
+        blocks.convert_to_strips(body, context.scene)
     else:
-        blocks.as_action(body, context.scene)
-    _settle(player)
+        blocks.convert_to_action(body, context.scene)
+    _clear_state(player)
     result.state = "ACCEPTED"
-    _keep_shared(context)
-    _name(context, player)
+    _apply_shared(context)
+    _rename_datablocks(context, player)
     return body
 
 
-def discard(context: bpy.types.Context, player: BeyondMocapPlayer) -> None:
+def revert_preview(context: bpy.types.Context, player: BeyondMocapPlayer) -> None:
     """Revert the preview of a player: the previous state is restored, bit for bit."""
     result, body = player.result, player.body
-    off_path(player)
+    revert_path_edit(player)
     accepted = result.was_accepted
     if body is not None and body == result.body and result.motion.kept:
-        _undress(context, player)
-        bring_back(result.motion, body, MARK)
+        _remove_preview_objects(context, player)
+        restore_playback(result.motion, body, MARK)
     else:
-        _undress(context, player)
+        _remove_preview_objects(context, player)
         if body is not None:
             quality.remove_error_curves(body)
             _remove_armature(body)
@@ -120,32 +120,32 @@ def discard(context: bpy.types.Context, player: BeyondMocapPlayer) -> None:
         setattr(player, name, getattr(result, name))
     for name in STEPS:
         setattr(result, name, getattr(result, f"{name}_before"))
-    _settle(player)
+    _clear_state(player)
     result.state = "ACCEPTED" if accepted else "NONE"
-    quality.renew_error_curves(context.scene, player)
-    share(context)
+    quality.update_error_curves(context.scene, player)
+    update_shared(context)
 
 
-def shown(scene: bpy.types.Scene, player: BeyondMocapPlayer) -> bool:
+def is_shown(scene: bpy.types.Scene, player: BeyondMocapPlayer) -> bool:
     """Return whether the player's result is on a body in the scene."""
     there = player.body is not None and player.body.name in scene.objects
     return there and player.result.state != "NONE"
 
 
-def forget(player: BeyondMocapPlayer) -> None:
+def drop_preview(player: BeyondMocapPlayer) -> None:
     """Drop a preview whose body was deleted."""
-    _settle(player)
+    _clear_state(player)
     player.result.state = "NONE"
 
 
-def share(context: bpy.types.Context) -> None:
+def update_shared(context: bpy.types.Context) -> None:
     """Let ball and camera follow the takes that are shown; after the last preview they return to their previous
     state.
     """
-    _with_free_ball(context, _share_free)
+    _with_free_ball(context, _update_shared_objects)
 
 
-class _shared_length:
+class _SharedLength:
     """Records, for the length of a `with`, by how much a preview extends the scene."""
 
     def __init__(self, scene: bpy.types.Scene):
@@ -162,7 +162,7 @@ class _shared_length:
         self.shared.end_set = self.scene.frame_end
 
 
-def keep_variants(player: BeyondMocapPlayer, found: list[tuple[str, dict[str, str], dict]]) -> None:
+def store_variants(player: BeyondMocapPlayer, found: list[tuple[str, dict[str, str], dict]]) -> None:
     """Store the takes of (name, lines, report) as variants of the player, if there are several, in place of previous
     ones.
     """
@@ -170,13 +170,13 @@ def keep_variants(player: BeyondMocapPlayer, found: list[tuple[str, dict[str, st
     variants.clear()
     if len(found) < 2:
         return
-    first = session.made(found[0][0]).take
+    first = session.find_take(found[0][0]).take
     for name, lines, report in found:
         variant = variants.add()
         variant.name = name
         for line in VARIANT_LINES:
             setattr(variant, line, lines[line])
-        variant.summary = _summary(report, _apart(first, session.made(name).take))
+        variant.summary = _describe_take(report, _compute_difference(first, session.find_take(name).take))
 
 
 def show_variant(context: bpy.types.Context, player: BeyondMocapPlayer, number: int) -> None:
@@ -185,14 +185,14 @@ def show_variant(context: bpy.types.Context, player: BeyondMocapPlayer, number: 
     if not 0 <= number < len(variants):
         raise InputError("variant", f"number {number + 1}", f"1 to {len(variants)}", "press Variants first")
     variant = variants[number]
-    if session.made(variant.name) is None:
+    if session.find_take(variant.name) is None:
         found = "is not in this session: it is from before the file was opened"
         raise InputError("variant", found, "variants of this session", "press Variants again")
-    show(context, player, variant.name, {line: getattr(variant, line) for line in VARIANT_LINES})
+    show_preview(context, player, variant.name, {line: getattr(variant, line) for line in VARIANT_LINES})
 
 
-def _keep_shared(context: bpy.types.Context) -> None:
-    _with_free_ball(context, _keep_free)
+def _apply_shared(context: bpy.types.Context) -> None:
+    _with_free_ball(context, _apply_shared_objects)
 
 
 def _with_free_ball(context: bpy.types.Context, change) -> None:
@@ -201,111 +201,111 @@ def _with_free_ball(context: bpy.types.Context, change) -> None:
     ball = room.objects.get(bake.BALL) if room is not None else None
     if ball is None or not len(ball.beyond_mocap_ball.holds):
         return change(context)
-    possession.anew(context.scene, ball, lambda: change(context))
+    possession.replace_own_action(context.scene, ball, lambda: change(context))
 
 
-def _keep_free(context: bpy.types.Context) -> None:
+def _apply_shared_objects(context: bpy.types.Context) -> None:
     """Let ball and camera stay with applied results: that is the state to which other previews revert."""
     shared, players = context.scene.beyond_mocap.shared, context.scene.beyond_mocap.players
-    others, takes = any(player.result.state == "PREVIEW" for player in players), _takes(players, "ACCEPTED")
-    if not others or bake.ball_of(takes, context.scene.beyond_mocap) is not None:
-        drop(shared.ball, MARK)
-    drop(shared.camera, stage.MARK)
+    has_other_previews, takes = any(player.result.state == "PREVIEW" for player in players), _list_takes(players, "ACCEPTED")
+    if not has_other_previews or bake.find_ball(takes, context.scene.beyond_mocap) is not None:
+        discard_saved_state(shared.ball, MARK)
+    discard_saved_state(shared.camera, stage.MARK)
     shared.end_set = 0
-    if others:
-        _follow(context, takes)
-        share(context)
+    if has_other_previews:
+        _update_followers(context, takes)
+        update_shared(context)
 
 
-def _name(context: bpy.types.Context, player: BeyondMocapPlayer) -> None:
+def _rename_datablocks(context: bpy.types.Context, player: BeyondMocapPlayer) -> None:
     """Give applied datablocks their plain names, now that their previous owners are gone."""
-    playing = channels.playing(player.body)[0]
+    playing = channels.find_playing_action(player.body)[0]
     if playing is not None and playing.get(MARK) and playing.library is None:
         playing.name = f"{player.name} take"
-    room = bake.collection(context.scene)
-    ribbon, ball = room.objects.get(bake.track_name(player)), room.objects.get(bake.BALL)
+    room = bake.find_or_create_collection(context.scene)
+    ribbon, ball = room.objects.get(bake.build_track_name(player)), room.objects.get(bake.BALL)
     if ribbon is not None:
-        ribbon.data.name = bake.track_name(player)
-    path = channels.playing(ball)[0] if ball is not None else None
+        ribbon.data.name = bake.build_track_name(player)
+    path = channels.find_playing_action(ball)[0] if ball is not None else None
     if path is not None and path.get(MARK):
         path.name = f"{bake.BALL} path"
 
 
-def _share_free(context: bpy.types.Context) -> None:
+def _update_shared_objects(context: bpy.types.Context) -> None:
     """Let ball and camera follow the previews, and store their previous state; without previews restore it."""
     scene, settings = context.scene, context.scene.beyond_mocap
     shared = settings.shared
-    takes = _takes(settings.players, "ACCEPTED", "PREVIEW")
+    takes = _list_takes(settings.players, "ACCEPTED", "PREVIEW")
     previews = any(player.result.state == "PREVIEW" for player in settings.players)
     room = scene.collection.children.get(bake.COLLECTION)
     ball = room.objects.get(bake.BALL) if room is not None else None
-    focus = stage.focus(scene)
+    focus = stage.find_focus(scene)
     if not previews:
-        _as_before(scene, shared, ball, focus)
+        _restore_shared(scene, shared, ball, focus)
         return
-    made_now, wanted = ball is None, bake.ball_of(takes, settings) is not None
-    if wanted and not made_now and not shared.ball.kept:
-        put_aside(shared.ball, ball)
+    is_new, wanted = ball is None, bake.find_ball(takes, settings) is not None
+    if wanted and not is_new and not shared.ball.kept:
+        save_playback(shared.ball, ball)
     if takes and focus is not None and not shared.camera.kept:
-        put_aside(shared.camera, focus)
-    _follow(context, takes)
-    if wanted and made_now:
+        save_playback(shared.camera, focus)
+    _update_followers(context, takes)
+    if wanted and is_new:
         shared.ball.kept = shared.ball.made = True
 
 
-def _takes(players, *states: str) -> list:
+def _list_takes(players, *states: str) -> list:
     """List the takes of players whose result is in one of these states, as far as the session has them."""
-    found = [session.made(player.take) for player in players if player.result.state in states]
-    return [made.take for made in found if made is not None]
+    found = [session.find_take(player.take) for player in players if player.result.state in states]
+    return [session_take.take for session_take in found if session_take is not None]
 
 
-def _follow(context: bpy.types.Context, takes: list) -> None:
+def _update_followers(context: bpy.types.Context, takes: list) -> None:
     """Let ball and camera follow these takes."""
-    path = bake.ball_of(takes, context.scene.beyond_mocap)
+    path = bake.find_ball(takes, context.scene.beyond_mocap)
     if path is not None:
-        bake.the_ball(context, path)
-    if takes and stage.focus(context.scene) is not None:
-        bake.camera(context.scene, takes)
+        bake.write_ball(context, path)
+    if takes and stage.find_focus(context.scene) is not None:
+        bake.write_camera(context.scene, takes)
 
 
-def _as_before(scene: bpy.types.Scene, shared, ball, focus) -> None:
+def _restore_shared(scene: bpy.types.Scene, shared, ball, focus) -> None:
     """Restore ball, camera and scene length to their state before any preview."""
     if shared.ball.kept and ball is not None:
         if shared.ball.made:
-            _remove(ball)
+            _remove_object(ball)
         else:
-            bring_back(shared.ball, ball, MARK)
+            restore_playback(shared.ball, ball, MARK)
     if shared.camera.kept and focus is not None:
-        bring_back(shared.camera, focus, stage.MARK)
-    drop(shared.ball, MARK)
-    drop(shared.camera, stage.MARK)
+        restore_playback(shared.camera, focus, stage.MARK)
+    discard_saved_state(shared.ball, MARK)
+    discard_saved_state(shared.camera, stage.MARK)
     if shared.end_set and scene.frame_end == shared.end_set:
         scene.frame_end = shared.end_before
     shared.end_set = 0
 
 
-def _remember(context: bpy.types.Context, player: BeyondMocapPlayer, made: session.Made) -> None:
+def _store_state(context: bpy.types.Context, player: BeyondMocapPlayer, new_take: session.StoredTake) -> None:
     """Store what a preview replaces, and the body's motion."""
-    result, body, room = player.result, player.body, bake.collection(context.scene)
+    result, body, room = player.result, player.body, bake.find_or_create_collection(context.scene)
     result.was_accepted = result.state == "ACCEPTED"
     result.body = body
     for name in LINES:
         setattr(result, name, getattr(player, name))
     for name in STEPS:
         setattr(result, f"{name}_before", getattr(result, name))
-    fits = body is not None and bake.fits(body, made.take, context.scene)
+    fits = body is not None and bake.is_matching(body, new_take.take, context.scene)
     result.mesh_made = not fits or not any(child.type == "MESH" for child in body.children)
-    ribbon = room.objects.get(bake.track_name(player))
+    ribbon = room.objects.get(bake.build_track_name(player))
     result.track_made = ribbon is None
     result.track = ribbon.data if ribbon is not None and ribbon.type == "CURVE" else None
     if fits:
-        put_aside(result.motion, body)
+        save_playback(result.motion, body)
 
 
-def _settle(player: BeyondMocapPlayer) -> None:
+def _clear_state(player: BeyondMocapPlayer) -> None:
     """Clear the stored previous state; datablocks of the extension that nothing else uses are removed."""
     result = player.result
-    drop(result.motion, MARK)
+    discard_saved_state(result.motion, MARK)
     track, result.track = result.track, None
     if track is not None and not track.users:
         bpy.data.curves.remove(track)
@@ -314,18 +314,18 @@ def _settle(player: BeyondMocapPlayer) -> None:
         result.property_unset(name)
 
 
-def _undress(context: bpy.types.Context, player: BeyondMocapPlayer) -> None:
+def _remove_preview_objects(context: bpy.types.Context, player: BeyondMocapPlayer) -> None:
     """Remove the mesh and the track that a preview created, or restore the previous track."""
     result, body = player.result, player.body
-    room = bake.collection(context.scene)
+    room = bake.find_or_create_collection(context.scene)
     if result.mesh_made and body is not None:
         for child in [child for child in body.children if child.get(MARK)]:
-            _remove(child)
-    ribbon = room.objects.get(bake.track_name(player))
+            _remove_object(child)
+    ribbon = room.objects.get(bake.build_track_name(player))
     if ribbon is None:
         return
     if result.track_made:
-        _remove(ribbon)
+        _remove_object(ribbon)
     elif result.track is not None and ribbon.data != result.track:
         made, ribbon.data = ribbon.data, result.track
         _remove_data(made)
@@ -335,15 +335,15 @@ def _remove_armature(body: bpy.types.Object) -> None:
     """Remove an armature that a preview created, with its action, unless it has children or belongs to another file."""
     if body.library is not None:
         return
-    channels.discard(body, MARK)
+    channels.remove_marked_action(body, MARK)
     if not body.children and body.get(MARK):
-        _remove(body)
+        _remove_object(body)
 
 
-def _remove(thing: bpy.types.Object) -> None:
+def _remove_object(thing: bpy.types.Object) -> None:
     """Remove an object of the extension, with its data and materials if nothing else uses them."""
     data = thing.data
-    channels.discard(thing, MARK)
+    channels.remove_marked_action(thing, MARK)
     bpy.data.objects.remove(thing)
     _remove_data(data)
 
@@ -358,16 +358,16 @@ def _remove_data(data) -> None:
         bpy.data.batch_remove(unworn)
 
 
-def _summary(report: dict, apart: float) -> str:
+def _describe_take(report: dict, difference: float) -> str:
     """Describe a take's main figures."""
     root, slide = report["root_error_m"]["mean"], report["skate"]["contact_cm_s"]
-    words = f"slide {slide:.1f} cm/s" if slide is not None else f"track {100 * root:.1f} cm"
+    text = f"slide {slide:.1f} cm/s" if slide is not None else f"track {100 * root:.1f} cm"
     jerk = report.get("seam_jerk_ratio", {}).get("median")
-    words += f", cuts {jerk:.2f}" if jerk is not None else ""
-    return f"{words}, {apart:.0%} different" if apart else words
+    text += f", cuts {jerk:.2f}" if jerk is not None else ""
+    return f"{text}, {difference:.0%} different" if difference else text
 
 
-def _apart(first, other) -> float:
+def _compute_difference(first, other) -> float:
     """Compute the share of frames in which two takes of one plan show different source frames."""
     same_clip = np.array(first.clips)[first.clip] == np.array(other.clips)[other.clip]
     same = same_clip & (first.mirrored == other.mirrored) & (np.abs(first.clip_frame - other.clip_frame) < 3.0)

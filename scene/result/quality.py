@@ -53,32 +53,32 @@ CURVES = (  # name, tooltip
 )
 
 
-def quality_lines(report: Mapping) -> str:
+def describe_quality(report: Mapping) -> str:
     """Describe each of FIGURES that the report has, with its target and whether that is met."""
-    from ...beyond_mocap.evaluation.report import flat
-    from ...beyond_mocap.synthesis.quality.targets import target_of
+    from ...beyond_mocap.evaluation.report import flatten_report
+    from ...beyond_mocap.synthesis.quality.targets import find_target
 
-    table, fps = flat(report), float(report.get("fps") or 30.0)
+    table, fps = flatten_report(report), float(report.get("fps") or 30.0)
     lines = []
     for name, path, factor, form, unit in FIGURES:
         value = table.get(path)
         if value is None:
             continue
-        target = target_of(path, fps)
-        met = target.met(value, table) if target else None
+        target = find_target(path, fps)
+        is_met = target.is_met(value, table) if target else None
         least, most = target.bounds(table) if target else (None, None)
-        shown = [form.format(_shown(limit, factor)) for limit in (least, most) if limit is not None]
-        aim = (("≥ " if (least is not None) == (factor > 0) else "≤ ") + shown[0]
-               if len(shown) == 1
-               else " .. ".join(shown))
-        status = "" if met is None else ("met" if met else "missed")
-        lines.append("\t".join((f"{name}: {form.format(_shown(value, factor))}{unit}", aim, status)))
+        limits_text = [form.format(_scale_value(limit, factor)) for limit in (least, most) if limit is not None]
+        target_text = (("≥ " if (least is not None) == (factor > 0) else "≤ ") + limits_text[0]
+               if len(limits_text) == 1
+               else " .. ".join(limits_text))
+        status = "" if is_met is None else ("met" if is_met else "missed")
+        lines.append("\t".join((f"{name}: {form.format(_scale_value(value, factor))}{unit}", target_text, status)))
     return "\n".join(lines)
 
 
-def moment_lines(report: Mapping) -> str:
+def describe_moments(report: Mapping) -> str:
     """Describe each key moment: time, labels, what is shown instead, clip, and gap to the ball."""
-    from ...beyond_mocap.synthesis.quality.targets import KEY_TARGETS, target_of
+    from ...beyond_mocap.synthesis.quality.targets import KEY_TARGETS, find_target
 
     lines = []
     for number, key in enumerate(report.get("keys", ()), 1):
@@ -89,26 +89,26 @@ def moment_lines(report: Mapping) -> str:
             text += f", replaced by {' '.join(key['used_instead'])}"
         if key.get("clip"):
             text += f"; {key['clip'].rpartition('/')[2].removesuffix('.bvh')}"
-        late, gap = key.get("time_error_s"), key.get("met_gap_m")
-        half = target_of(f"keys {number}.time_error_s", float(report.get("fps") or 30.0))
-        missed = late is not None and not half.met(late, {})
-        if missed:
-            text += f", {late:+.2f} s"
+        time_error, gap = key.get("time_error_s"), key.get("met_gap_m")
+        half = find_target(f"keys {number}.time_error_s", float(report.get("fps") or 30.0))
+        is_missed = time_error is not None and not half.is_met(time_error, {})
+        if is_missed:
+            text += f", {time_error:+.2f} s"
         if gap is not None:
             text += f", gap {1000 * gap:.0f} mm"
-            missed |= gap > KEY_TARGETS["contact_gap_m"].most
-        lines.append("\t".join((text, f"{key['time_s']:.3f}", "missed" if missed else "met")))
+            is_missed |= gap > KEY_TARGETS["contact_gap_m"].most
+        lines.append("\t".join((text, f"{key['time_s']:.3f}", "missed" if is_missed else "met")))
     return "\n".join(lines)
 
 
-def warning_lines(report: Mapping, more: Iterable[str] = (), known: Iterable[str] = ()) -> str:
+def list_warnings(report: Mapping, more: Iterable[str] = (), known: Iterable[str] = ()) -> str:
     """List the warnings of a report, after `more` (of the track), without those that are `known`."""
-    from ...beyond_mocap.base.errors import spans_of
+    from ...beyond_mocap.base.errors import line_spans
 
     seconds = dict(zip(report.get("warnings", ()), report.get("warning_seconds", ())))
     lines = []
     for text in dict.fromkeys((*more, *seconds)):
-        spans = seconds.get(text) or spans_of(text)
+        spans = seconds.get(text) or line_spans(text)
         if text not in known:
             lines.append(f"{text}\t{' '.join(f'{first:.3f}' for first, _ in spans)}")
     return "\n".join(lines)
@@ -121,53 +121,53 @@ def has_error_curves(body: bpy.types.Object | None) -> bool:
 
 def write_error_curves(scene: bpy.types.Scene, player: BeyondMocapPlayer) -> bpy.types.Action | None:
     """Write the figures of the player's take to its armature; returns None without body or take."""
-    made, body = session.made(player.take), player.body
-    if made is None or body is None:
+    result, body = session.find_take(player.take), player.body
+    if result is None or body is None:
         return None
-    values = _error_values(scene, made)
+    values = _compute_errors(scene, result)
     remove_error_curves(body)
-    take, fps = made.take, frames_per_second(scene)
-    start = bake.frame_at(scene, take.start_time)
+    take, fps = result.take, frames_per_second(scene)
+    start = bake.compute_frame(scene, take.start_time)
     frames = whole_frames(start, (len(take.motion) - 1) / take.motion.fps, fps)
     at = np.clip(np.rint((frames - start) * (take.motion.fps / fps)), 0, len(take.motion) - 1).astype(int)
-    for (name, told), row in zip(CURVES, values):
+    for (name, tooltip), row in zip(CURVES, values):
         body.data[name] = float(row[at[0]])
-        body.data.id_properties_ui(name).update(description=told)
-    curves = {_path(name): (ERROR_GROUP, row[at][:, None]) for (name, _), row in zip(CURVES, values)}
-    action = channels.animate(body.data, f"{player.name} errors", frames, curves)
+        body.data.id_properties_ui(name).update(description=tooltip)
+    curves = {_build_data_path(name): (ERROR_GROUP, row[at][:, None]) for (name, _), row in zip(CURVES, values)}
+    action = channels.create_action(body.data, f"{player.name} errors", frames, curves)
     action[ERROR_MARK] = True
-    for curve in channels.curves(action, body.data.animation_data.action_slot).values():
+    for curve in channels.collect_curves(action, body.data.animation_data.action_slot).values():
         curve.keyframe_points.foreach_set("select_control_point", np.zeros(len(frames), bool))
     return action
 
 
 def remove_error_curves(body: bpy.types.Object) -> None:
     """Remove the error curves from an armature, with their action."""
-    channels.discard(body.data, ERROR_MARK)
+    channels.remove_marked_action(body.data, ERROR_MARK)
     for name, _ in CURVES:
         if name in body.data:
             del body.data[name]
 
 
-def renew_error_curves(scene: bpy.types.Scene, player: BeyondMocapPlayer) -> None:
+def update_error_curves(scene: bpy.types.Scene, player: BeyondMocapPlayer) -> None:
     """Update an armature's error curves to the displayed take; without a take they are removed."""
     if has_error_curves(player.body) and (not player.take or write_error_curves(scene, player) is None):
         remove_error_curves(player.body)
 
 
-def _shown(value: float, factor: float) -> float:
+def _scale_value(value: float, factor: float) -> float:
     return factor * value if factor > 0 else factor * (value - 1.0)
 
 
-def _error_values(scene: bpy.types.Scene, made: session.Made) -> np.ndarray:
+def _compute_errors(scene: bpy.types.Scene, result: session.StoredTake) -> np.ndarray:
     """Compute (C, T) values in the order of CURVES; 0 where unknown, since a key needs a number."""
-    from ...beyond_mocap.evaluation.per_frame import per_frame
+    from ...beyond_mocap.evaluation.per_frame import measure_per_frame
     from ...beyond_mocap.evaluation.reference import View
-    from ...beyond_mocap.synthesis.quality.played import played_from_take
+    from ...beyond_mocap.synthesis.quality.played import playback_from_take
 
-    take, unit = made.take, scene.beyond_mocap.library_unit or None
-    library = session.library(made.plan.library, unit) if made.plan.library else None
-    figures = per_frame(View(played_from_take(take), made.plan.track, take.timeline, library))
+    take, unit = result.take, scene.beyond_mocap.library_unit or None
+    library = session.find_library(result.plan.find_library, unit) if result.plan.find_library else None
+    figures = measure_per_frame(View(playback_from_take(take), result.plan.track, take.timeline, library))
     piece = np.zeros(len(take.motion))
     piece[np.asarray(take.seams, int)] = 1.0
     rows = (100.0 * figures.root_error, *(100.0 * figures.slide.T), *(100.0 * figures.correction.T), figures.jerk,
@@ -175,5 +175,5 @@ def _error_values(scene: bpy.types.Scene, made: session.Made) -> np.ndarray:
     return np.nan_to_num(np.array(rows))
 
 
-def _path(name: str) -> str:
+def _build_data_path(name: str) -> str:
     return f'["{bpy.utils.escape_identifier(name)}"]'

@@ -7,12 +7,12 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-_waiting: list["Entry"] = []
+_waiting: list["QueueEntry"] = []
 _busy = [False]  # whether an operator is processing the queue
 
 
 @dataclass(eq=False)
-class Entry:
+class QueueEntry:
     """A player's place in the queue.
 
     Attributes:
@@ -26,13 +26,13 @@ class Entry:
 
     scene: int
     player: str
-    how: Any
-    order: Any
+    mode: Any
+    request: Any
     fingerprint: str
     tries: int = field(default=1)
 
 
-def add(entry: Entry) -> None:
+def add_entry(entry: QueueEntry) -> None:
     """Add an entry at the end; it replaces a waiting one of the same player."""
     for number, other in enumerate(_waiting):
         if (other.scene, other.player) == (entry.scene, entry.player):
@@ -41,33 +41,33 @@ def add(entry: Entry) -> None:
     _waiting.append(entry)
 
 
-def take() -> Entry | None:
+def pop_entry() -> QueueEntry | None:
     """Remove and return the next entry; None if the queue is empty."""
     return _waiting.pop(0) if _waiting else None
 
 
-def remove(player: str) -> bool:
+def remove_player(player: str) -> bool:
     """Remove the entry of this player; returns whether there was one."""
     before = len(_waiting)
     _waiting[:] = [entry for entry in _waiting if entry.player != player]
     return len(_waiting) < before
 
 
-def names() -> list[str]:
+def list_players() -> list[str]:
     """List the waiting players in their order."""
     return [entry.player for entry in _waiting]
 
 
-def work(busy: bool) -> None:
+def set_busy(busy: bool) -> None:
     """Mark the queue as being processed, or not."""
     _busy[0] = busy
 
 
-def worked() -> bool:
+def is_busy() -> bool:
     """Return whether the queue is being processed."""
     return _busy[0]
 
 
-def clear() -> None:
+def clear_queue() -> None:
     """Remove all entries."""
     _waiting.clear()

@@ -16,12 +16,12 @@ from mathutils import Vector
 
 from ...beyond_mocap.base.errors import InputError
 from ...beyond_mocap.motion import quaternion
-from ...beyond_mocap.motion.humanoid import side_and_part
+from ...beyond_mocap.motion.humanoid import split_joint_name
 from ...beyond_mocap.motion.skeleton import Skeleton
 from ..core.measure import units_per_metre
 
-PROPERTY = "beyond_mocap_skeleton"
-STUB = 0.04  # metres: length of a bone without children
+SKELETON_PROPERTY = "beyond_mocap_skeleton"
+STUB_LENGTH = 0.04  # metres: length of a bone without children
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +47,7 @@ class Placement:
         return quaternion.rotate(quaternion.inverse(self.rotation), np.asarray(points) - self.origin) / self.scale
 
 
-def create(context: bpy.types.Context, skeleton: Skeleton, name: str, collection=None) -> bpy.types.Object:
+def create_armature(context: bpy.types.Context, skeleton: Skeleton, name: str, collection=None) -> bpy.types.Object:
     """Create an armature object with one bone per joint, its lowest joint on the floor.
 
     The exact offsets in metres, the order of the joints and the tips are stored as a custom property of the armature.
@@ -66,19 +66,19 @@ def create(context: bpy.types.Context, skeleton: Skeleton, name: str, collection
     data.display_type = "WIRE"
     body = bpy.data.objects.new(name, data)
     scene.collection.objects.link(body)
-    places, tails = skeleton.rest_positions, _tails(skeleton)
+    places, tails = skeleton.rest_positions, _compute_tails(skeleton)
     places = places - [0.0, 0.0, min(places[:, 2].min(), (places + tails)[:, 2].min())]
-    with _editing(context, body):
+    with _edit_mode(context, body):
         for joint, joint_name in enumerate(skeleton.names):
             bone = data.edit_bones.new(joint_name)
             bone.head = places[joint] * units
             bone.tail = (places[joint] + tails[joint]) * units
-            bone.align_roll(_roll_target(tails[joint]))
+            bone.align_roll(_choose_roll_target(tails[joint]))
             if joint:
                 bone.parent = data.edit_bones[skeleton.names[skeleton.parents[joint]]]
     for bone in body.pose.bones:
         bone.rotation_mode = "QUATERNION"
-    data[PROPERTY] = json.dumps({
+    data[SKELETON_PROPERTY] = json.dumps({
         "names": skeleton.names, "parents": skeleton.parents, "offsets": skeleton.offsets.tolist(),
         "end_parents": skeleton.end_parents, "end_offsets": skeleton.end_offsets.tolist(), "units_per_metre": units,
     })
@@ -89,7 +89,7 @@ def create(context: bpy.types.Context, skeleton: Skeleton, name: str, collection
     return body
 
 
-def skeleton_of(body: bpy.types.Object, scene: bpy.types.Scene) -> Skeleton:
+def build_skeleton(body: bpy.types.Object, scene: bpy.types.Scene) -> Skeleton:
     """Build the skeleton of an armature object, in metres, at rest in the armature's own space.
 
     An armature from `create_armature` returns exactly its original skeleton while its bones are unedited. Any other is
@@ -101,27 +101,27 @@ def skeleton_of(body: bpy.types.Object, scene: bpy.types.Scene) -> Skeleton:
     """
     if body is None or body.type != "ARMATURE" or not len(body.data.bones):
         raise InputError("armature", "no bones", "an armature object", "select one in the 3D view")
-    derived = _from_bones(body, scene)
-    kept = _kept(body, scene)
-    if kept is None or set(kept.names) != set(derived.names):
+    derived = _build_from_bones(body, scene)
+    stored = _read_stored_skeleton(body, scene)
+    if stored is None or set(stored.names) != set(derived.names):
         return derived
-    order = [derived.names.index(name) for name in kept.names]
+    order = [derived.names.index(name) for name in stored.names]
     same_parents = all(
-        parent < 0 or derived.names[derived.parents[at]] == kept.names[parent]
-        for at, parent in zip(order, kept.parents, strict=True)
+        parent < 0 or derived.names[derived.parents[at]] == stored.names[parent]
+        for at, parent in zip(order, stored.parents, strict=True)
     )
-    size = max(1.0, float(np.abs(kept.offsets).max()))
-    same = same_parents and np.allclose(derived.offsets[order], kept.offsets, atol=1e-5 * size)
-    return kept if same else derived
+    size = max(1.0, float(np.abs(stored.offsets).max()))
+    same = same_parents and np.allclose(derived.offsets[order], stored.offsets, atol=1e-5 * size)
+    return stored if same else derived
 
 
-def placement(body: bpy.types.Object, scene: bpy.types.Scene) -> Placement:
+def find_placement(body: bpy.types.Object, scene: bpy.types.Scene) -> Placement:
     """Find the placement of the armature's space in the scene; InputError for an uneven scale, which skews bones."""
     bpy.context.view_layer.update()  # a script may have moved it just before
-    return placement_now(body, scene)
+    return find_current_placement(body, scene)
 
 
-def placement_now(body: bpy.types.Object, scene: bpy.types.Scene) -> Placement:
+def find_current_placement(body: bpy.types.Object, scene: bpy.types.Scene) -> Placement:
     """Find the placement as Blender computed it last, which is quick."""
     origin, rotation, scale = body.matrix_world.decompose()
     if min(scale) <= 0.0 or max(scale) > 1.001 * min(scale):
@@ -131,13 +131,13 @@ def placement_now(body: bpy.types.Object, scene: bpy.types.Scene) -> Placement:
     return Placement(np.array(rotation), np.array(origin) * metres, float(np.mean(scale)) * metres)
 
 
-def rest_rotations(body: bpy.types.Object, names: tuple[str, ...]) -> np.ndarray:
+def compute_rest_rotations(body: bpy.types.Object, names: tuple[str, ...]) -> np.ndarray:
     """Compute the rotations (J, 4) of the named bones at rest, in the armature's space."""
     return quaternion.from_matrix(np.array([body.data.bones[name].matrix_local.to_3x3() for name in names]))
 
 
 @contextmanager
-def _editing(context: bpy.types.Context, body: bpy.types.Object):
+def _edit_mode(context: bpy.types.Context, body: bpy.types.Object):
     """Edit one armature in a `with`; the active object and its mode are restored afterwards."""
     before = context.view_layer.objects.active
     mode = before.mode if before is not None else "OBJECT"
@@ -154,33 +154,33 @@ def _editing(context: bpy.types.Context, body: bpy.types.Object):
             bpy.ops.object.mode_set(mode=mode)
 
 
-def _tails(skeleton: Skeleton) -> np.ndarray:
+def _compute_tails(skeleton: Skeleton) -> np.ndarray:
     """Compute the vectors (J, 3) m from each joint to its bone's tail: toward the joints or tips that continue the
     limb.
     """
     tails = np.zeros((len(skeleton), 3))
     for joint in range(len(skeleton)):
-        onward = _onward(skeleton, joint)
+        onward = _collect_child_offsets(skeleton, joint)
         mean = onward.mean(axis=0) if len(onward) else np.zeros(3)
-        if np.linalg.norm(mean) < 0.25 * STUB and len(onward):
+        if np.linalg.norm(mean) < 0.25 * STUB_LENGTH and len(onward):
             mean = max(onward, key=np.linalg.norm)
-        tails[joint] = mean if np.linalg.norm(mean) >= 1e-4 else STUB * _incoming(skeleton, joint)
+        tails[joint] = mean if np.linalg.norm(mean) >= 1e-4 else STUB_LENGTH * _find_incoming_direction(skeleton, joint)
     return tails
 
 
-def _onward(skeleton: Skeleton, joint: int) -> np.ndarray:
+def _collect_child_offsets(skeleton: Skeleton, joint: int) -> np.ndarray:
     """Collect the offsets (n, 3) of the children on the joint's side (the neck, not the shoulders), else of all, else
     tips.
     """
     children = skeleton.children(joint)
-    side = side_and_part(skeleton.names[joint])[0]
-    along = [c for c in children if side_and_part(skeleton.names[c])[0] == side] or children
+    side = split_joint_name(skeleton.names[joint])[0]
+    along = [c for c in children if split_joint_name(skeleton.names[c])[0] == side] or children
     if along:
         return skeleton.offsets[list(along)]
     return skeleton.end_offsets[[i for i, parent in enumerate(skeleton.end_parents) if parent == joint]]
 
 
-def _incoming(skeleton: Skeleton, joint: int) -> np.ndarray:
+def _find_incoming_direction(skeleton: Skeleton, joint: int) -> np.ndarray:
     """Find the unit direction (3,) of the limb at this joint; up where there is none."""
     while joint > 0:
         length = np.linalg.norm(skeleton.offsets[joint])
@@ -190,27 +190,27 @@ def _incoming(skeleton: Skeleton, joint: int) -> np.ndarray:
     return np.array([0.0, 0.0, 1.0])
 
 
-def _roll_target(tail: np.ndarray) -> Vector:
+def _choose_roll_target(tail: np.ndarray) -> Vector:
     """Choose the direction of a bone's Z axis: forward along X, or up for bones that point forward, as feet do."""
     forward = abs(tail[0]) > 0.7 * np.linalg.norm(tail)
     return Vector((0.0, 0.0, 1.0)) if forward else Vector((1.0, 0.0, 0.0))
 
 
-def _kept(body: bpy.types.Object, scene: bpy.types.Scene) -> Skeleton | None:
+def _read_stored_skeleton(body: bpy.types.Object, scene: bpy.types.Scene) -> Skeleton | None:
     """Read the skeleton stored by `create_armature`, at the object's current size; None where it is missing or damaged.
     """
     try:
-        table = json.loads(body.data[PROPERTY])
-        grown = placement(body, scene).scale * table.pop("units_per_metre")
+        table = json.loads(body.data[SKELETON_PROPERTY])
+        factor = find_placement(body, scene).scale * table.pop("units_per_metre")
         skeleton = Skeleton(**table)
     except (KeyError, TypeError, ValueError, InputError):
         return None
-    if abs(grown - 1.0) < 1e-6:
+    if abs(factor - 1.0) < 1e-6:
         return skeleton
-    return replace(skeleton, offsets=skeleton.offsets * grown, end_offsets=skeleton.end_offsets * grown)
+    return replace(skeleton, offsets=skeleton.offsets * factor, end_offsets=skeleton.end_offsets * factor)
 
 
-def _from_bones(body: bpy.types.Object, scene: bpy.types.Scene) -> Skeleton:
+def _build_from_bones(body: bpy.types.Object, scene: bpy.types.Scene) -> Skeleton:
     """Build the skeleton from the bones' rest pose."""
     roots = [bone for bone in body.data.bones if bone.parent is None]
     root = max(roots, key=lambda bone: len(bone.children_recursive))
@@ -219,7 +219,7 @@ def _from_bones(body: bpy.types.Object, scene: bpy.types.Scene) -> Skeleton:
         bones.extend(bone.children)
     names = [bone.name for bone in bones]
     parents = [-1] + [names.index(bone.parent.name) for bone in bones[1:]]
-    scale = placement(body, scene).scale
+    scale = find_placement(body, scene).scale
     heads = np.array([bone.head_local for bone in bones]) * scale
     tails = np.array([bone.tail_local for bone in bones]) * scale
     tips = [i for i, bone in enumerate(bones) if not bone.children]
@@ -234,30 +234,30 @@ def copy_rig(rig: bpy.types.Object, name: str) -> bpy.types.Object:
     point to the copies; the copy plays nothing.
     """
     family = [rig, *rig.children_recursive]
-    twins = {one: one.copy() for one in family}
-    for one, twin in twins.items():
-        twin.name = name if one == rig else f"{name} {one.name}"
-        for collection in _open_to(one):
-            collection.objects.link(twin)
-        if one.parent in twins:
-            inverse = one.matrix_parent_inverse.copy()
-            twin.parent, twin.matrix_parent_inverse = twins[one.parent], inverse
-        _repoint(twin, twins)
-    data = twins[rig].animation_data
+    copies = {original: original.copy() for original in family}
+    for original, copied in copies.items():
+        copied.name = name if original == rig else f"{name} {original.name}"
+        for collection in _list_editable_collections(original):
+            collection.objects.link(copied)
+        if original.parent in copies:
+            inverse = original.matrix_parent_inverse.copy()
+            copied.parent, copied.matrix_parent_inverse = copies[original.parent], inverse
+        _update_pointers(copied, copies)
+    data = copies[rig].animation_data
     if data is not None:
         data.action = None
         for track in list(data.nla_tracks):
             data.nla_tracks.remove(track)
-    return twins[rig]
+    return copies[rig]
 
 
-def _open_to(thing: bpy.types.Object) -> list[bpy.types.Collection]:
+def _list_editable_collections(thing: bpy.types.Object) -> list[bpy.types.Collection]:
     """List the editable collections of an object: not linked ones, nor those of a library override."""
     found = [one for one in thing.users_collection if one.library is None and one.override_library is None]
     return found or [bpy.context.scene.collection]
 
 
-def _repoint(thing: bpy.types.Object, twins: dict) -> None:
+def _update_pointers(thing: bpy.types.Object, copies: dict) -> None:
     """Update the pointers of constraints, modifiers and drivers to the copies."""
     holders = [*thing.constraints, *thing.modifiers]
     if thing.pose is not None:
@@ -266,10 +266,10 @@ def _repoint(thing: bpy.types.Object, twins: dict) -> None:
         targets = list(getattr(holder, "targets", ())) or []
         for one in (holder, *targets):
             for pointer in ("target", "pole_target", "object", "space_object"):
-                if getattr(one, pointer, None) in twins:
-                    setattr(one, pointer, twins[getattr(one, pointer)])
+                if getattr(one, pointer, None) in copies:
+                    setattr(one, pointer, copies[getattr(one, pointer)])
     for driver in thing.animation_data.drivers if thing.animation_data else ():
         for variable in driver.driver.variables:
             for target in variable.targets:
-                if target.id in twins:
-                    target.id = twins[target.id]
+                if target.id in copies:
+                    target.id = copies[target.id]

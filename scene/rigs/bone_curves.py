@@ -13,14 +13,14 @@ from ...beyond_mocap.motion import quaternion
 from ...beyond_mocap.motion.motion import Motion, forward_kinematics
 from ..core.measure import frames_per_second, units_per_metre
 from ..path_editing import keys
-from ..path_editing.rig_look import channel_of
+from ..path_editing.rig_look import find_rotation_channel
 from . import armature, bone_maps
-from .driven import Driven, upright_axes
+from .driven import DrivenRig, compute_upright_axes
 
 ROOT_BONE = "root"  # name in a copy whose rig has none
 
 
-def wanted(driven: Driven, motion: Motion, frames: np.ndarray, root: str):
+def compute_bone_poses(driven: DrivenRig, motion: Motion, frames: np.ndarray, root: str):
     """Compute the poses of the driven bones.
 
     Args:
@@ -33,69 +33,69 @@ def wanted(driven: Driven, motion: Motion, frames: np.ndarray, root: str):
     """
     heads, world = forward_kinematics(motion)
     hips = heads[:, driven.parts.index("hips")]
-    told = []
+    messages = []
     if root != "KEEP":
-        root_turn, root_place = _root_line(driven, motion, heads, "straight" if root == "STRAIGHT" else "smooth")
+        root_rotation, root_place = _compute_root_path(driven, motion, heads, "straight" if root == "STRAIGHT" else "smooth")
     if root == "IN_PLACE":  # the root's path is removed from everything: the body stays where it started
-        back = quaternion.multiply(root_turn[:1], quaternion.inverse(root_turn))
+        back = quaternion.multiply(root_rotation[:1], quaternion.inverse(root_rotation))
         world = quaternion.multiply(back[:, None], world)
         hips = quaternion.rotate(back, hips - root_place) + root_place[:1]
-        root_turn, root_place = (np.repeat(values[:1], len(hips), axis=0) for values in (root_turn, root_place))
+        root_rotation, root_place = (np.repeat(values[:1], len(hips), axis=0) for values in (root_rotation, root_place))
     if root in ("SMOOTH", "STRAIGHT") and "root" not in driven.table:
-        told.append("no root bone: the hips carry the whole motion; Export Motion can add one to a copy")
-    lie_turn, lie_origin = placements(driven.rig, driven.scene, frames)
+        messages.append("no root bone: the hips carry the whole motion; Export Motion can add one to a copy")
+    object_rotation, object_origin = sample_placements(driven.rig, driven.scene, frames)
     scale = driven.placement.scale
 
-    def turned(turn: np.ndarray, bone: str) -> np.ndarray:
+    def to_bone_rotations(turn: np.ndarray, bone: str) -> np.ndarray:
         to_rest = quaternion.multiply(turn, driven.upright)
-        return quaternion.to_matrix(quaternion.multiply(quaternion.inverse(lie_turn), to_rest)) @ driven.rest_turn[bone]
+        return quaternion.to_matrix(quaternion.multiply(quaternion.inverse(object_rotation), to_rest)) @ driven.rest_rotations[bone]
 
-    def placed(points: np.ndarray) -> np.ndarray:
-        return quaternion.rotate(quaternion.inverse(lie_turn), points - lie_origin) / scale
+    def to_armature_space(points: np.ndarray) -> np.ndarray:
+        return quaternion.rotate(quaternion.inverse(object_rotation), points - object_origin) / scale
 
-    turns = {driven.bone(part): turned(world[:, i], driven.bone(part)) for i, part in enumerate(driven.parts)}
-    places = {driven.bone("hips"): placed(hips)}
+    rotations = {driven.bone_of(part): to_bone_rotations(world[:, i], driven.bone_of(part)) for i, part in enumerate(driven.parts)}
+    places = {driven.bone_of("hips"): to_armature_space(hips)}
     if "root" in driven.table:
-        bone = driven.bone("root")
+        bone = driven.bone_of("root")
         if root == "KEEP":  # it stays at rest
-            turns[bone] = np.repeat(driven.rest_turn[bone][None], len(frames), axis=0)
-            places[bone] = np.repeat(driven.rest_place[bone][None], len(frames), axis=0)
+            rotations[bone] = np.repeat(driven.rest_rotations[bone][None], len(frames), axis=0)
+            places[bone] = np.repeat(driven.rest_positions[bone][None], len(frames), axis=0)
         else:
-            turns[bone] = turned(root_turn, bone)
-            places[bone] = placed(root_place)
-    _follow(driven, turns, places, hips=hips, world=world, motion=motion, placed=placed)
-    return turns, places, told
+            rotations[bone] = to_bone_rotations(root_rotation, bone)
+            places[bone] = to_armature_space(root_place)
+    _compute_followers(driven, rotations, places, hips=hips, world=world, motion=motion, placed=to_armature_space)
+    return rotations, places, messages
 
 
-def _root_line(driven: Driven, motion: Motion, heads: np.ndarray, way: str):
+def _compute_root_path(driven: DrivenRig, motion: Motion, heads: np.ndarray, kind: str):
     """Compute the root's rotation (F, 4) and position (F, 3), world: on the ground under the pelvis, as at rest."""
-    from ...beyond_mocap.motion.humanoid import heading_from_positions
-    from ...beyond_mocap.motion.path.smooth_spline import ground_path
+    from ...beyond_mocap.motion.humanoid import compute_heading_from_positions
+    from ...beyond_mocap.motion.path.smooth_spline import compute_root_path
 
     middle = heads[:, [driven.parts.index(f"{side} upper_leg") for side in ("left", "right")]].mean(axis=1)
-    facing = np.unwrap(heading_from_positions(motion.skeleton, heads))
-    line, yaw = ground_path(middle[:, :2], facing, motion.fps, way)
-    turn = quaternion.about_up(yaw)
-    rest = driven.metres(driven.heads("left upper_leg", "right upper_leg").mean(axis=0))
-    own = driven.metres(driven.heads("root")[0]) - rest if "root" in driven.table else np.zeros(3)
-    own = np.array([own[0], own[1], 0.0])
-    return turn, np.column_stack([line, np.zeros(len(line))]) + quaternion.rotate(turn, own)
+    facing = np.unwrap(compute_heading_from_positions(motion.skeleton, heads))
+    line, yaw = compute_root_path(middle[:, :2], facing, motion.fps, kind)
+    turn = quaternion.from_up_angle(yaw)
+    rest = driven.to_metres(driven.rest_heads("left upper_leg", "right upper_leg").mean(axis=0))
+    root_offset = driven.to_metres(driven.rest_heads("root")[0]) - rest if "root" in driven.table else np.zeros(3)
+    root_offset = np.array([root_offset[0], root_offset[1], 0.0])
+    return turn, np.column_stack([line, np.zeros(len(line))]) + quaternion.rotate(turn, root_offset)
 
 
-def _follow(driven: Driven, turns: dict, places: dict, hips, world, motion: Motion, placed) -> None:
+def _compute_followers(driven: DrivenRig, turns: dict, places: dict, hips, world, motion: Motion, placed) -> None:
     """Compute the poses of IK targets, which follow their bones rigidly."""
     if not driven.followers:
         return
-    heads = _shifted_heads(motion, world, hips)
+    heads = _compute_heads(motion, world, hips)
     for bone, part in driven.followers.items():
-        carrier = driven.bone(part)
-        own = driven.rest_turn[carrier].T @ driven.rest_turn[bone]
-        offset = driven.rest_turn[carrier].T @ (driven.rest_place[bone] - driven.rest_place[carrier])
+        carrier = driven.bone_of(part)
+        own = driven.rest_rotations[carrier].T @ driven.rest_rotations[bone]
+        offset = driven.rest_rotations[carrier].T @ (driven.rest_positions[bone] - driven.rest_positions[carrier])
         turns[bone] = turns[carrier] @ own
         places[bone] = placed(heads[:, driven.parts.index(part)]) + turns[carrier] @ offset
 
 
-def _shifted_heads(motion: Motion, world: np.ndarray, hips: np.ndarray) -> np.ndarray:
+def _compute_heads(motion: Motion, world: np.ndarray, hips: np.ndarray) -> np.ndarray:
     """Compute all joints' positions (F, J, 3) from world rotations and the hips' positions."""
     skeleton, heads = motion.skeleton, np.zeros((*world.shape[:2], 3))
     for joint, parent in enumerate(skeleton.parents):
@@ -104,9 +104,9 @@ def _shifted_heads(motion: Motion, world: np.ndarray, hips: np.ndarray) -> np.nd
     return heads
 
 
-def placements(rig: bpy.types.Object, scene: bpy.types.Scene, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def sample_placements(rig: bpy.types.Object, scene: bpy.types.Scene, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Sample the armature object's placement at each frame: rotations (F, 4) and origins (F, 3) metres."""
-    still = armature.placement(rig, scene)
+    still = armature.find_placement(rig, scene)
     if not is_carried(rig):
         return np.repeat(still.rotation[None], len(frames), axis=0), np.repeat(still.origin[None], len(frames), axis=0)
     now, subframe, rows = scene.frame_current, scene.frame_subframe, []
@@ -116,7 +116,7 @@ def placements(rig: bpy.types.Object, scene: bpy.types.Scene, frames: np.ndarray
         rows.append((*turn, *origin))
     scene.frame_set(now, subframe=subframe)
     table = np.array(rows)
-    return quaternion.continuous(table[:, :4]), table[:, 4:] / units_per_metre(scene)
+    return quaternion.unify_signs(table[:, :4]), table[:, 4:] / units_per_metre(scene)
 
 
 def is_carried(rig: bpy.types.Object) -> bool:
@@ -131,7 +131,7 @@ def is_carried(rig: bpy.types.Object) -> bool:
     return False
 
 
-def bone_curves(rig: bpy.types.Object, basis: dict) -> dict[str, tuple[str, np.ndarray]]:
+def build_bone_curves(rig: bpy.types.Object, basis: dict) -> dict[str, tuple[str, np.ndarray]]:
     """Build curves for the driven bones' channels, each bone in its own rotation mode."""
     found = {}
     for name, (rotation, location) in basis.items():
@@ -142,12 +142,12 @@ def bone_curves(rig: bpy.types.Object, basis: dict) -> dict[str, tuple[str, np.n
         if mode == "QUATERNION":
             values = -rotation if rotation[0, 0] < 0 else rotation
         else:
-            values = keys.rotation(mode, rotation) if mode == "AXIS_ANGLE" else _euler_curves(rotation, mode)
-        found[f"{path}.{channel_of(mode)}"] = (name, values)
+            values = keys.to_rotation_channel(mode, rotation) if mode == "AXIS_ANGLE" else _compute_euler_curves(rotation, mode)
+        found[f"{path}.{find_rotation_channel(mode)}"] = (name, values)
     return found
 
 
-def _euler_curves(rotation: np.ndarray, mode: str) -> np.ndarray:
+def _compute_euler_curves(rotation: np.ndarray, mode: str) -> np.ndarray:
     """Compute Blender's Euler angles (F, 3), X Y Z, of rotations (F, 4), without jumps.
 
     Of the two forms of a rotation the one nearer to the previous frame is used, full turns added.
@@ -164,7 +164,7 @@ def _euler_curves(rotation: np.ndarray, mode: str) -> np.ndarray:
     return out[:, [order.index(letter) for letter in "XYZ"]]
 
 
-def setting_curves(driven: Driven, bakes_ik: bool) -> dict[str, tuple[str, np.ndarray]]:
+def build_setting_curves(driven: DrivenRig, bakes_ik: bool) -> dict[str, tuple[str, np.ndarray]]:
     """Build curves of one key each: IK/FK switches, and constraints that are switched off."""
     found = {}
     for switch in driven.controls.switches:
@@ -178,7 +178,7 @@ def setting_curves(driven: Driven, bakes_ik: bool) -> dict[str, tuple[str, np.nd
     return found
 
 
-def root_motion(rig: bpy.types.Object, shown, wanted, told: list[str]):
+def compute_root_motion(rig: bpy.types.Object, sampled, options, messages: list[str]):
     """Compute the root motion for an export.
 
     Args:
@@ -190,37 +190,37 @@ def root_motion(rig: bpy.types.Object, shown, wanted, told: list[str]):
         Hips, root bone (None: it has none), the root's path (F, 4, 4) and the matrices (F, 4, 4) that keep the body in
         place; the last two are None where they are not requested.
     """
-    if wanted.root == "KEEP":
+    if options.root == "KEEP":
         return None, None, None, None
-    from ...beyond_mocap.motion.path.smooth_spline import ground_path
+    from ...beyond_mocap.motion.path.smooth_spline import compute_root_path
 
-    table = bone_maps.kept(rig) or bone_maps.suggest(rig)
-    at = {part: shown.bones.index(table[part]) for part in ("left upper_leg", "right upper_leg")}
-    world = shown.lies[:, None] @ shown.poses[:, list(at.values())]
+    table = bone_maps.load_stored_map(rig) or bone_maps.find_bone_map(rig)
+    at = {part: sampled.bones.index(table[part]) for part in ("left upper_leg", "right upper_leg")}
+    world = sampled.object_matrices[:, None] @ sampled.poses[:, list(at.values())]
     legs = world[:, :, :3, 3]
     across = legs[:, 0] - legs[:, 1]
     facing = np.unwrap(np.arctan2(-across[:, 0], across[:, 1]))
-    units, rate = units_per_metre(bpy.context.scene), wanted.rate or frames_per_second(bpy.context.scene)
-    place, yaw = ground_path(legs.mean(axis=1)[:, :2] / units, facing, rate,
-                             "straight" if wanted.root == "STRAIGHT" else "smooth")
-    way = np.tile(np.eye(4), (len(yaw), 1, 1))
-    way[:, :3, :3] = quaternion.to_matrix(quaternion.about_up(yaw))
-    way[:, :2, 3] = place * units
-    inward = np.linalg.inv(shown.lies)
-    own = table.get("root")
-    if wanted.root == "IN_PLACE":
-        return table["hips"], own, None, inward @ way[:1] @ np.linalg.inv(way) @ shown.lies
-    if own is not None:
-        rest = np.array(rig.data.bones[own].matrix_local)
-        return table["hips"], own, inward @ way @ _standing(rig, table) @ rest, None
-    told.append(f"{rig.name} has no root bone: the file contains an added one named {ROOT_BONE!r}")
-    return table["hips"], None, inward @ way @ _standing(rig, table), None
+    units, rate = units_per_metre(bpy.context.scene), options.rate or frames_per_second(bpy.context.scene)
+    place, yaw = compute_root_path(legs.mean(axis=1)[:, :2] / units, facing, rate,
+                             "straight" if options.root == "STRAIGHT" else "smooth")
+    path = np.tile(np.eye(4), (len(yaw), 1, 1))
+    path[:, :3, :3] = quaternion.to_matrix(quaternion.from_up_angle(yaw))
+    path[:, :2, 3] = place * units
+    inward = np.linalg.inv(sampled.object_matrices)
+    root_bone = table.get("root")
+    if options.root == "IN_PLACE":
+        return table["hips"], root_bone, None, inward @ path[:1] @ np.linalg.inv(path) @ sampled.object_matrices
+    if root_bone is not None:
+        rest = np.array(rig.data.bones[root_bone].matrix_local)
+        return table["hips"], root_bone, inward @ path @ _compute_upright_matrix(rig, table) @ rest, None
+    messages.append(f"{rig.name} has no root bone: the file contains an added one named {ROOT_BONE!r}")
+    return table["hips"], None, inward @ path @ _compute_upright_matrix(rig, table), None
 
 
-def _standing(rig: bpy.types.Object, table: dict[str, str]) -> np.ndarray:
+def _compute_upright_matrix(rig: bpy.types.Object, table: dict[str, str]) -> np.ndarray:
     """Compute the matrix (4, 4) from the armature's space at rest to a body over the origin, facing +X."""
     heads = {part: np.array(rig.data.bones[table[part]].head_local) for part in bone_maps.LEGS}
-    axes, out = upright_axes(heads), np.eye(4)
+    axes, out = compute_upright_axes(heads), np.eye(4)
     hips, up = 0.5 * (heads["left upper_leg"] + heads["right upper_leg"]), axes[2]
     turn = out[:3, :3] = axes * np.cbrt(abs(np.linalg.det(np.array(rig.matrix_world.to_3x3()))))
     out[:3, 3] = -turn @ (hips - (hips @ up) * up)

@@ -16,7 +16,7 @@ import numpy as np
 from ...beyond_mocap.base.digest import hex_digest
 from ...beyond_mocap.base.errors import InputError
 from ...beyond_mocap.files.whole import atomic_write
-from ...beyond_mocap.motion.humanoid import Humanoid, identify, roles_of, side_and_part
+from ...beyond_mocap.motion.humanoid import Humanoid, identify_joints, list_roles, split_joint_name
 from ...beyond_mocap.motion.skeleton import Skeleton
 from ..core.preferences import EXTENSION
 
@@ -29,67 +29,67 @@ JOINTS = {"hips": "Hips", **{f"spine {i}": f"Spine{i}" for i in range(1, SPINES 
 """Part -> the name of its joint, whose meaning the core knows."""
 PARTS = ("root", *JOINTS)
 LEGS = tuple(f"{side} {part}" for side in ("left", "right") for part in ("upper_leg", "lower_leg", "foot"))
-NEEDED = ("hips", *LEGS)
+REQUIRED_PARTS = ("hips", *LEGS)
 
 _FK = re.compile(r"(?i)(?<![a-z])fk(?![a-z])")
-_NO_CONTROL = re.compile(
+_NOT_CONTROL = re.compile(
     r"(?i)^(mch|org|def|wgt|vis)[-_]|(?<![a-z])(ik|pole|tweak|target|twist|roll|corrective\w*|helper)(?![a-z])"
 )
-_NO_JOINT = re.compile(r"(?i)^(mch|wgt|vis)[-_]|(?<![a-z])(ik|pole|tweak|target|twist|corrective\w*|helper)(?![a-z])")
+_NOT_JOINT = re.compile(r"(?i)^(mch|wgt|vis)[-_]|(?<![a-z])(ik|pole|tweak|target|twist|corrective\w*|helper)(?![a-z])")
 _ARM = re.compile(r"arm|hand|wrist|elbow|shoulder|clavicle|finger")
 _ROOT = re.compile(r"(?i)^(.*:)?(root|master|root_?bone|ctrl_?root|c_pos)$")
 
 
-def suggest(rig: bpy.types.Object) -> dict[str, str]:
+def find_bone_map(rig: bpy.types.Object) -> dict[str, str]:
     """Find the bones of an armature's parts by names and structure; InputError where no legs can be found."""
-    skeleton, bones = _named_tree(rig)
+    skeleton, bones = _build_named_tree(rig)
     try:
-        body = identify(skeleton)
+        body = identify_joints(skeleton)
     except InputError as error:
         found = str(error).partition(": ")[2].partition(";")[0]
         raise InputError(f"armature {rig.name}", f"no legs: {found}", "a humanoid with two legs",
                          "choose its bones in the bone map") from None
-    parts = _parts(skeleton, body)
-    armed = [bones[parts[leg]] for leg in LEGS if _ARM.search(side_and_part(skeleton.names[parts[leg]])[1])]
+    parts = _list_parts(skeleton, body)
+    armed = [bones[parts[leg]] for leg in LEGS if _ARM.search(split_joint_name(skeleton.names[parts[leg]])[1])]
     if armed:  # structure found arms instead of legs
         raise InputError(f"armature {rig.name}", f"no legs (only bones such as {armed[0]})", "a humanoid with two legs",
                          "choose its bones in the bone map")
     found = {part: bones[joint] for part, joint in parts.items()}
-    root = _root_above(rig, found["hips"])
+    root = _find_root_bone(rig, found["hips"])
     return ({"root": root} if root else {}) | found
 
 
-def _parts(skeleton: Skeleton, body: Humanoid) -> dict[str, int]:
-    found = {role: joint for role, joint in roles_of(body).items()}
-    found |= {f"spine {i}": joint for i, joint in enumerate(_thinned(body.spine, SPINES), 1)}
+def _list_parts(skeleton: Skeleton, body: Humanoid) -> dict[str, int]:
+    found = {role: joint for role, joint in list_roles(body).items()}
+    found |= {f"spine {i}": joint for i, joint in enumerate(_thin(body.spine, SPINES), 1)}
     if body.neck is not None and body.head is not None:
         between, joint = [], skeleton.parents[body.head]
         while joint >= 0 and joint != body.neck:
             between.append(joint)
             joint = skeleton.parents[joint]
         if joint == body.neck:
-            found |= {f"neck {i}": joint for i, joint in enumerate(_thinned(between[::-1], NECKS - 1), 2)}
+            found |= {f"neck {i}": joint for i, joint in enumerate(_thin(between[::-1], NECKS - 1), 2)}
     return {part: found[part] for part in JOINTS if part in found}
 
 
-def _thinned(joints, most: int) -> list[int]:
+def _thin(joints, max_count: int) -> list[int]:
     """Thin joints to at most `max_count`, with the first and last."""
     joints = list(joints)
-    if len(joints) <= most:
+    if len(joints) <= max_count:
         return joints
-    return [joints[i] for i in np.round(np.linspace(0, len(joints) - 1, most)).astype(int)]
+    return [joints[i] for i in np.round(np.linspace(0, len(joints) - 1, max_count)).astype(int)]
 
 
-def _named_tree(rig: bpy.types.Object) -> tuple[Skeleton, list[str]]:
+def _build_named_tree(rig: bpy.types.Object) -> tuple[Skeleton, list[str]]:
     """Build a skeleton of the bones that may be parts, under plain names; and their own names, one per joint."""
     bones = list(rig.data.bones)
     has_controls = sum(bool(_FK.search(bone.name)) for bone in bones) >= 6
-    barred = _NO_CONTROL if has_controls else _NO_JOINT
-    plain = {bone.name: _plain(bone, rig) for bone in bones if not barred.search(bone.name)}
+    barred = _NOT_CONTROL if has_controls else _NOT_JOINT
+    plain = {bone.name: _build_joint_name(bone, rig) for bone in bones if not barred.search(bone.name)}
     if has_controls:
         controlled = {name for bone, name in plain.items() if _FK.search(bone)}
         plain = {bone: name for bone, name in plain.items() if _FK.search(bone) or name not in controlled}
-    above = {name: _nearest_above(rig.data.bones[name], plain) for name in plain}
+    above = {name: _find_parent_among(rig.data.bones[name], plain) for name in plain}
     roots = [name for name in plain if above[name] is None]
     if not roots:
         raise InputError(f"armature {rig.name}", "no bones", "a humanoid rig", "choose another armature")
@@ -97,7 +97,7 @@ def _named_tree(rig: bpy.types.Object) -> tuple[Skeleton, list[str]]:
     for name, parent in above.items():
         if parent is not None:
             below[parent].append(name)
-    order = [max(roots, key=lambda name: _count(below, name))]
+    order = [max(roots, key=lambda name: _count_tree(below, name))]
     for name in order:  # grows during the loop
         order.extend(below[name])
     parents = [-1] + [order.index(above[name]) for name in order[1:]]
@@ -105,11 +105,11 @@ def _named_tree(rig: bpy.types.Object) -> tuple[Skeleton, list[str]]:
     tails = np.array([rig.data.bones[name].tail_local for name in order])
     tips = [i for i, name in enumerate(order) if not below[name]]
     offsets = heads - heads[np.maximum(parents, 0)]
-    names = _unique([plain[name] for name in order])
+    names = _make_unique([plain[name] for name in order])
     return Skeleton(names, tuple(parents), offsets, tuple(tips), (tails - heads)[tips]), order
 
 
-def _plain(bone: bpy.types.Bone, rig: bpy.types.Object) -> str:
+def _build_joint_name(bone: bpy.types.Bone, rig: bpy.types.Object) -> str:
     """Build the core's name of a bone; Rigify's hips are its torso, which carries a control named hips."""
     if "torso" in rig.data.bones:
         if bone.name == "torso":
@@ -119,18 +119,18 @@ def _plain(bone: bpy.types.Bone, rig: bpy.types.Object) -> str:
     return re.sub(r"[_\-. ]{2,}", "_", _FK.sub("", bone.name)).strip("_-. ")
 
 
-def _nearest_above(bone: bpy.types.Bone, among) -> str | None:
+def _find_parent_among(bone: bpy.types.Bone, among) -> str | None:
     while (bone := bone.parent) is not None:
         if bone.name in among:
             return bone.name
     return None
 
 
-def _count(below: dict[str, list[str]], name: str) -> int:
-    return 1 + sum(_count(below, child) for child in below[name])
+def _count_tree(below: dict[str, list[str]], name: str) -> int:
+    return 1 + sum(_count_tree(below, child) for child in below[name])
 
 
-def _unique(names: list[str]) -> tuple[str, ...]:
+def _make_unique(names: list[str]) -> tuple[str, ...]:
     taken: dict[str, int] = {}
     out = []
     for name in names:
@@ -139,25 +139,25 @@ def _unique(names: list[str]) -> tuple[str, ...]:
     return tuple(out)
 
 
-def _root_above(rig: bpy.types.Object, hips: str) -> str | None:
+def _find_root_bone(rig: bpy.types.Object, hips: str) -> str | None:
     """Find the bone that carries the whole rig; None where the hips do."""
     named = [bone.name for bone in rig.data.bones if bone.parent is None and _ROOT.match(bone.name)]
     if named and named[0] != hips:
         return named[0]
     above = rig.data.bones[hips].parent_recursive
-    return above[-1].name if above and not _NO_CONTROL.search(above[-1].name) else None
+    return above[-1].name if above and not _NOT_CONTROL.search(above[-1].name) else None
 
 
-def check(rig: bpy.types.Object, table: dict[str, str]) -> None:
+def check_bone_map(rig: bpy.types.Object, table: dict[str, str]) -> None:
     """Check that a map can be used on this armature (InputError)."""
     where = f"bone map of {rig.name}"
-    missing = [part for part in NEEDED if part not in table]
+    missing = [part for part in REQUIRED_PARTS if part not in table]
     if missing:
         raise InputError(where, f"no bone for {', '.join(missing)}", "hips and two legs",
                          "choose them in the list, or press Map Bones")
-    lost = [bone for bone in table.values() if bone not in rig.data.bones]
-    if lost:
-        raise InputError(where, f"no bone {', '.join(lost[:3])}", "bones of this armature", "choose them in the list")
+    unknown = [bone for bone in table.values() if bone not in rig.data.bones]
+    if unknown:
+        raise InputError(where, f"no bone {', '.join(unknown[:3])}", "bones of this armature", "choose them in the list")
     seen: dict[str, str] = {}
     for part, bone in table.items():
         if bone in seen:
@@ -166,13 +166,13 @@ def check(rig: bpy.types.Object, table: dict[str, str]) -> None:
         seen[bone] = part
 
 
-def fingerprint(rig: bpy.types.Object) -> str:
+def compute_rig_fingerprint(rig: bpy.types.Object) -> str:
     """Compute a short hash of all bones' names and parents: the same for every copy of a skeleton."""
     lines = sorted(f"{bone.name}<{bone.parent.name if bone.parent else ''}" for bone in rig.data.bones)
     return hex_digest("\n".join(lines))
 
 
-def kept_folder(create: bool = False) -> Path | None:
+def find_map_folder(create: bool = False) -> Path | None:
     """Find the folder of stored maps in the user's folder of this extension; None where Blender has none."""
     try:
         return Path(bpy.utils.extension_path_user(EXTENSION, path="bone_maps", create=create))
@@ -180,35 +180,35 @@ def kept_folder(create: bool = False) -> Path | None:
         return None
 
 
-def keep(rig: bpy.types.Object, table: dict[str, str]) -> Path | None:
+def store_bone_map(rig: bpy.types.Object, table: dict[str, str]) -> Path | None:
     """Store a map for all armatures with these bones; returns the file, None where there is no folder for it."""
-    folder = kept_folder(create=True)
+    folder = find_map_folder(create=True)
     if folder is None:
         return None
-    path = folder / f"{fingerprint(rig)}.json"
-    save(path, rig, table)
+    path = folder / f"{compute_rig_fingerprint(rig)}.json"
+    write_bone_map(path, rig, table)
     return path
 
 
-def kept(rig: bpy.types.Object) -> dict[str, str] | None:
+def load_stored_map(rig: bpy.types.Object) -> dict[str, str] | None:
     """Load the map stored for these bones; None where there is none, or an unreadable one."""
-    folder = kept_folder()
-    path = folder / f"{fingerprint(rig)}.json" if folder else None
+    folder = find_map_folder()
+    path = folder / f"{compute_rig_fingerprint(rig)}.json" if folder else None
     if path is None or not path.is_file():
         return None
     try:
-        return load(path)
+        return read_bone_map(path)
     except InputError:
         return None
 
 
-def save(path: Path, rig: bpy.types.Object, table: dict[str, str]) -> None:
+def write_bone_map(path: Path, rig: bpy.types.Object, table: dict[str, str]) -> None:
     """Write a map as a JSON file, completely or not at all; InputError where that fails."""
-    text = json.dumps({"skeleton": fingerprint(rig), "rig": rig.name, "bones": table}, indent=1, ensure_ascii=False)
+    text = json.dumps({"skeleton": compute_rig_fingerprint(rig), "rig": rig.name, "bones": table}, indent=1, ensure_ascii=False)
     atomic_write(path, text + "\n")
 
 
-def load(path: Path) -> dict[str, str]:
+def read_bone_map(path: Path) -> dict[str, str]:
     """Read a map from a JSON file; InputError where it is missing or invalid."""
     form = '{"bones": {"hips": "bone name", ...}}'
     try:
@@ -220,7 +220,7 @@ def load(path: Path) -> dict[str, str]:
     table = found.get("bones") if isinstance(found, dict) else None
     if not isinstance(table, dict) or not all(isinstance(bone, str) for bone in table.values()):
         raise InputError(path, "no object of bone names", form, "correct the file")
-    strange = [part for part in table if part not in PARTS]
-    if strange:
-        raise InputError(path, f"unknown part {strange[0]!r}", f"one of {', '.join(PARTS)}", "correct the name")
+    unknown = [part for part in table if part not in PARTS]
+    if unknown:
+        raise InputError(path, f"unknown part {unknown[0]!r}", f"one of {', '.join(PARTS)}", "correct the name")
     return {part: table[part] for part in PARTS if table.get(part)}

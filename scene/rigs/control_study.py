@@ -17,12 +17,12 @@ import numpy as np
 from ...beyond_mocap.motion import quaternion
 
 TRIALS = 4
-RIDES = 2e-4
+CARRIER_TOLERANCE = 2e-4
 """Tolerance of a control's frame within its carrier: of a rotation matrix's entries, and as share of the rig's size."""
 
 STATIC = -1
-_TURN, _WAY = 0.5, 0.05  # random rotation in radians, random shift as a share of the rig's size
-_SURELY = 0.3  # share of another carrier's spread below which a bone is the carrier instead
+_TURN, _SHIFT = 0.5, 0.05  # random rotation in radians, random shift as a share of the rig's size
+_STEADIER_SHARE = 0.3  # share of another carrier's spread below which a bone is the carrier instead
 
 CHANNELS = ("location", "rotation_quaternion", "rotation_euler", "rotation_axis_angle", "scale")
 
@@ -46,7 +46,7 @@ class PosedRig:
         self.rig, self.layer, self.controls = rig, layer, list(controls)
         self._muted = [(constraint, constraint.mute) for constraint in silent]
 
-    def pose(self, turns: np.ndarray, bones: Sequence[str], places: np.ndarray | None = None) -> np.ndarray:
+    def apply_pose(self, rotations: np.ndarray, bones: Sequence[str], places: np.ndarray | None = None) -> np.ndarray:
         """Pose the controls, and read bones as Blender then poses them.
 
         Args:
@@ -56,27 +56,27 @@ class PosedRig:
         Returns:
             (W, 4, 4) the bones' poses in the armature's space.
         """
-        for number, (name, turn) in enumerate(zip(self.controls, turns)):
+        for number, (name, turn) in enumerate(zip(self.controls, rotations)):
             bone = self.rig.pose.bones[name]
             bone.rotation_quaternion = turn
             bone.location = (0.0, 0.0, 0.0) if places is None else places[number]
-        _update(self.rig, self.layer)
-        shown = self.rig.evaluated_get(self.layer.depsgraph)
-        return np.array([shown.pose.bones[name].matrix for name in bones])
+        _update_rig(self.rig, self.layer)
+        evaluated = self.rig.evaluated_get(self.layer.depsgraph)
+        return np.array([evaluated.pose.bones[name].matrix for name in bones])
 
     def __enter__(self) -> PosedRig:
-        self._remember()
+        self._save_state()
         try:
-            self._silence()
+            self._mute()
         except BaseException:
-            self._restore()
+            self._restore_state()
             raise
         return self
 
     def __exit__(self, *_) -> None:
-        self._restore()
+        self._restore_state()
 
-    def _remember(self) -> None:
+    def _save_state(self) -> None:
         data, bones = self.rig.animation_data, self.rig.pose.bones
         self._playing = (data.use_nla, data.action, data.action_slot) if data else None
         self._position = self.rig.data.pose_position
@@ -84,7 +84,7 @@ class PosedRig:
         self._values = {(name, channel): tuple(getattr(bones[name], channel)) for name in self.controls
                         for channel in CHANNELS}
 
-    def _silence(self) -> None:
+    def _mute(self) -> None:
         if self._playing is not None:
             self.rig.animation_data.action = None
             self.rig.animation_data.use_nla = False
@@ -96,7 +96,7 @@ class PosedRig:
             bone = self.rig.pose.bones[name]
             bone.location, bone.scale, bone.rotation_mode = (0, 0, 0), (1, 1, 1), "QUATERNION"
 
-    def _restore(self) -> None:
+    def _restore_state(self) -> None:
         for constraint, mute in self._muted:
             constraint.mute = mute
         for name, mode in self._modes.items():
@@ -110,16 +110,16 @@ class PosedRig:
             data.use_nla, data.action, slot = self._playing
             if data.action is not None and slot is not None:
                 data.action_slot = slot
-        _update(self.rig, bpy.context.view_layer)
+        _update_rig(self.rig, bpy.context.view_layer)
 
 
-def _update(rig: bpy.types.Object, layer: bpy.types.ViewLayer) -> None:
+def _update_rig(rig: bpy.types.Object, layer: bpy.types.ViewLayer) -> None:
     rig.update_tag(refresh={"OBJECT", "DATA", "TIME"})
     layer.update()
 
 
 @dataclass(frozen=True, eq=False)
-class Rides:
+class Carriers:
     """The carriers of n controls.
 
     Attributes:
@@ -133,10 +133,10 @@ class Rides:
 
     controls: list[str]
     carriers: list[str]
-    turn_of: np.ndarray
-    place_of: np.ndarray
-    parent_of: np.ndarray
-    firm: np.ndarray
+    rotation_carrier: np.ndarray
+    position_carrier: np.ndarray
+    parent_carrier: np.ndarray
+    is_reliable: np.ndarray
 
 
 def split_poses(poses: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -145,7 +145,7 @@ def split_poses(poses: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return turn / np.maximum(np.linalg.norm(turn, axis=-2, keepdims=True), 1e-12), poses[..., :3, 3]
 
 
-def turn_spread(carried: np.ndarray, frames: np.ndarray) -> np.ndarray:
+def compute_rotation_spread(carried: np.ndarray, frames: np.ndarray) -> np.ndarray:
     """Compute how much n frames rotate within each of C bones, and within nothing.
 
     Args:
@@ -162,7 +162,7 @@ def turn_spread(carried: np.ndarray, frames: np.ndarray) -> np.ndarray:
     return spread
 
 
-def place_spread(carried: np.ndarray, origin: np.ndarray, places: np.ndarray) -> np.ndarray:
+def compute_position_spread(carried: np.ndarray, origin: np.ndarray, places: np.ndarray) -> np.ndarray:
     """Compute how much n positions move within each of C bones, and within nothing: (C + 1, n).
 
     Args:
@@ -181,7 +181,7 @@ def place_spread(carried: np.ndarray, origin: np.ndarray, places: np.ndarray) ->
     return spread
 
 
-def nearest_carrier(spread: np.ndarray, number: int) -> tuple[int, float]:
+def find_nearest_carrier(spread: np.ndarray, number: int) -> tuple[int, float]:
     """Find the carrier of a bone among those before it: the last of them, unless another is clearly steadier.
 
     Args:
@@ -192,12 +192,12 @@ def nearest_carrier(spread: np.ndarray, number: int) -> tuple[int, float]:
     """
     best, least = STATIC, np.inf
     for d in [*range(number - 1, -1, -1), STATIC]:
-        if spread[d] < _SURELY * least:
+        if spread[d] < _STEADIER_SHARE * least:
             best, least = d, float(spread[d])
     return best, least
 
 
-def steadiest_carrier(spread: np.ndarray, own: int) -> tuple[np.ndarray, np.ndarray]:
+def find_steadiest_carriers(spread: np.ndarray, own: int) -> tuple[np.ndarray, np.ndarray]:
     """Find the steadiest carrier of each of n frames, preferring STATIC, and its spread.
 
     Args:
@@ -208,82 +208,82 @@ def steadiest_carrier(spread: np.ndarray, own: int) -> tuple[np.ndarray, np.ndar
     """
     spread, itself = spread.copy(), np.arange(own)
     spread[itself, itself] = np.inf
-    spread[-1] *= _SURELY  # a frame that does not move has no carrier
+    spread[-1] *= _STEADIER_SHARE  # a frame that does not move has no carrier
     best = np.argmin(spread, axis=0)
     least = spread[best, np.arange(spread.shape[1])]
     return np.where(best == len(spread) - 1, STATIC, best), least
 
 
-def study_rides(rig: bpy.types.Object, side: bpy.types.Scene, controls: list[str], shown: list[str]) -> Rides:
+def find_carriers(rig: bpy.types.Object, side: bpy.types.Scene, controls: list[str], shown: list[str]) -> Carriers:
     """Find the carrier of each control among the controls and `shown` bones, at the side scene's frame.
 
     Inverse kinematics and switches stay as they are, and the rig is restored at the end. side: the scene in which it is
     alone.
     """
     carriers = [*controls, *(bone for bone in shown if bone not in controls)]
-    above = [_above(rig, name) for name in controls]
-    watched = list(dict.fromkeys([*carriers, *(name for name in above if name)]))
+    above = [_find_parent(rig, name) for name in controls]
+    bones = list(dict.fromkeys([*carriers, *(name for name in above if name)]))
     size = float(np.ptp([list(bone.head_local) for bone in rig.data.bones], axis=0).max()) or 1.0
-    poses, own, went = _trials(rig, side, controls, watched, size)
+    poses, own, shifts = _run_trials(rig, side, controls, bones, size)
     turn, place = split_poses(poses)
     base = turn[:, : len(controls)] @ np.swapaxes(own, -1, -2)
     still = np.broadcast_to(np.eye(3), turn[:, 0].shape)
-    parents = np.stack([turn[:, watched.index(name)] if name else still for name in above], axis=1)
-    ups = [poses[:, watched.index(name)] if name else None for name in above]
-    rests = np.stack([_rests(rig, name, up) for name, up in zip(controls, ups)], axis=1)
+    parents = np.stack([turn[:, bones.index(name)] if name else still for name in above], axis=1)
+    ups = [poses[:, bones.index(name)] if name else None for name in above]
+    rests = np.stack([_compute_rest_heads(rig, name, up) for name, up in zip(controls, ups)], axis=1)
     for number, name in enumerate(controls):
         if len(rig.pose.bones[name].constraints):  # such as Child Of, which act before the bone's own channels
-            rests[:, number] = place[:, number] - (base[:, number] @ went[:, number, :, None])[..., 0]
+            rests[:, number] = place[:, number] - (base[:, number] @ shifts[:, number, :, None])[..., 0]
             parents[:, number] = base[:, number]
     carried, origin = turn[:, : len(carriers)], place[:, : len(carriers)]
-    turn_of, worst = steadiest_carrier(turn_spread(carried, base), len(controls))
-    parent_of, _ = steadiest_carrier(turn_spread(carried, parents), 0)
-    place_of, off = steadiest_carrier(place_spread(carried, origin, rests), len(controls))
-    return Rides(list(controls), carriers, turn_of, place_of=place_of, parent_of=parent_of,
-                 firm=(worst < 10 * RIDES) & (off < RIDES * size))
+    turn_of, worst = find_steadiest_carriers(compute_rotation_spread(carried, base), len(controls))
+    parent_of, _ = find_steadiest_carriers(compute_rotation_spread(carried, parents), 0)
+    place_of, off = find_steadiest_carriers(compute_position_spread(carried, origin, rests), len(controls))
+    return Carriers(list(controls), carriers, turn_of, position_carrier=place_of, parent_carrier=parent_of,
+                 is_reliable=(worst < 10 * CARRIER_TOLERANCE) & (off < CARRIER_TOLERANCE * size))
 
 
 def list_moving(rig: bpy.types.Object, side: bpy.types.Scene, controls: list[str], shown: list[str]) -> list[bool]:
     """List for each control whether it moves any of the bones shown, in the rig's current state."""
     found, none = [], quaternion.identity(len(controls))
-    with _posed(rig, side, controls) as posed:
-        start = posed.pose(none, shown)
+    with _pose_rig(rig, side, controls) as posed:
+        start = posed.apply_pose(none, shown)
         for number in range(len(controls)):
-            turned, went = none.copy(), np.zeros((len(controls), 3))
-            turned[number] = quaternion.from_rotation_vector(np.array([0.3, 0.2, 0.1]))
-            went[number] = (0.05, 0.07, 0.03)
-            found.append(bool(np.abs(posed.pose(turned, shown, went) - start).max() > 1e-5))
+            rotations, shifts = none.copy(), np.zeros((len(controls), 3))
+            rotations[number] = quaternion.from_rotation_vector(np.array([0.3, 0.2, 0.1]))
+            shifts[number] = (0.05, 0.07, 0.03)
+            found.append(bool(np.abs(posed.apply_pose(rotations, shown, shifts) - start).max() > 1e-5))
     return found
 
 
-def _posed(rig: bpy.types.Object, side: bpy.types.Scene, controls: list[str]) -> PosedRig:
+def _pose_rig(rig: bpy.types.Object, side: bpy.types.Scene, controls: list[str]) -> PosedRig:
     """Create the context of the rig without its animation and limits, otherwise unchanged."""
     limits = [c for name in controls for c in rig.pose.bones[name].constraints if c.type.startswith("LIMIT")
               and not c.mute]
     return PosedRig(rig, side.view_layers[0], controls, limits)
 
 
-def _trials(rig, side, controls: list[str], watched: list[str], size: float) -> tuple[np.ndarray, ...]:
+def _run_trials(rig, side, controls: list[str], watched: list[str], size: float) -> tuple[np.ndarray, ...]:
     """Run random trials: poses (K, W, 4, 4) of the bones watched, the controls' rotations (K, n, 3, 3) and locations
     (K, n, 3).
     """
-    dice, own, went, poses = np.random.default_rng(5), [], [], []
-    with _posed(rig, side, controls) as posed:
+    random, own, shifts, poses = np.random.default_rng(5), [], [], []
+    with _pose_rig(rig, side, controls) as posed:
         for _ in range(TRIALS):
-            vectors = dice.normal(size=(2, len(controls), 3))
+            vectors = random.normal(size=(2, len(controls), 3))
             vectors /= np.linalg.norm(vectors, axis=-1, keepdims=True)
             own.append(quaternion.from_rotation_vector(_TURN * vectors[0]))
-            went.append(_WAY * size * vectors[1])
-            poses.append(posed.pose(own[-1], watched, went[-1]))
-    return np.array(poses), quaternion.to_matrix(np.array(own)), np.array(went)
+            shifts.append(_SHIFT * size * vectors[1])
+            poses.append(posed.apply_pose(own[-1], watched, shifts[-1]))
+    return np.array(poses), quaternion.to_matrix(np.array(own)), np.array(shifts)
 
 
-def _above(rig: bpy.types.Object, name: str) -> str:
+def _find_parent(rig: bpy.types.Object, name: str) -> str:
     parent = rig.data.bones[name].parent
     return parent.name if parent is not None else ""
 
 
-def _rests(rig: bpy.types.Object, name: str, parent: np.ndarray | None) -> np.ndarray:
+def _compute_rest_heads(rig: bpy.types.Object, name: str, parent: np.ndarray | None) -> np.ndarray:
     """Compute a bone's head while its location is zero (K, 3), from the pose (K, 4, 4) of the bone above it."""
     bone = rig.data.bones[name]
     if parent is None:

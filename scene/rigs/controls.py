@@ -16,10 +16,10 @@ import numpy as np
 
 from ...beyond_mocap.base.errors import InputError
 from ...beyond_mocap.motion import quaternion
-from .control_study import RIDES, STATIC, TRIALS, PosedRig, nearest_carrier, place_spread, split_poses, turn_spread
+from .control_study import CARRIER_TOLERANCE, STATIC, TRIALS, PosedRig, find_nearest_carrier, compute_position_spread, split_poses, compute_rotation_spread
 
-_TURN = 0.7
-_TO_FK, _FROM_FK = re.compile(r"(?i)ik.*fk"), re.compile(r"(?i)fk.*ik")
+_TRIAL_ANGLE = 0.7
+_IK_TO_FK, _FK_TO_IK = re.compile(r"(?i)ik.*fk"), re.compile(r"(?i)fk.*ik")
 _FOLLOW = re.compile(r"(?i)follow")
 
 
@@ -43,14 +43,14 @@ class Override:
 
 
 @dataclass
-class _Ride:
+class _Carrier:
     """The carrier of one control: its index (-1: the armature itself) and the constant part seen in it."""
 
-    turn_of: int
-    turn: np.ndarray
-    place_of: int
-    place: np.ndarray
-    axes_of: int = STATIC
+    rotation_carrier: int
+    rotation: np.ndarray
+    position_carrier: int
+    position: np.ndarray
+    axes_carrier: int = STATIC
     axes: np.ndarray | None = None
 
 
@@ -68,40 +68,40 @@ class Controls:
         """
         self.rig, self.bones, self.movers = rig, list(bones), [bone for bone in bones if bone in movers]
         self.switches, self.overrides = list_switches(rig), overrides
-        self.loose: list[str] = []
-        with self._posed() as posed:
-            self._study(posed)
+        self.unreliable: list[str] = []
+        with self._pose_rig() as posed:
+            self._run_study(posed)
 
-    def _study(self, posed: PosedRig) -> None:
+    def _run_study(self, posed: PosedRig) -> None:
         """Pose the rig in random trials and find carriers and axes."""
-        dice, none = np.random.default_rng(7), quaternion.identity(len(self.bones))
-        self.rest_turn, self.rest_place = split_poses(posed.pose(none, self.bones))
-        self.size = float(np.ptp(self.rest_place, axis=0).max()) or 1.0
+        random, none = np.random.default_rng(7), quaternion.identity(len(self.bones))
+        self.rest_rotations, self.rest_positions = split_poses(posed.apply_pose(none, self.bones))
+        self.size = float(np.ptp(self.rest_positions, axis=0).max()) or 1.0
         own, poses = [], []
         for _ in range(TRIALS):
-            vectors = dice.normal(size=(len(self.bones), 3))
-            vectors *= _TURN / np.linalg.norm(vectors, axis=1, keepdims=True)
+            vectors = random.normal(size=(len(self.bones), 3))
+            vectors *= _TRIAL_ANGLE / np.linalg.norm(vectors, axis=1, keepdims=True)
             own.append(quaternion.from_rotation_vector(vectors))
-            poses.append(posed.pose(own[-1], self.bones))
+            poses.append(posed.apply_pose(own[-1], self.bones))
         turns, places = split_poses(np.array(poses))
-        self.rides = self._carried(turns, places, quaternion.to_matrix(np.array(own)))
+        self.carriers = self._find_carriers(turns, places, quaternion.to_matrix(np.array(own)))
         for bone in self.movers:
             self._measure_axes(posed, bone, own[-1], turns[-1])
 
-    def _carried(self, turns: np.ndarray, places: np.ndarray, own: np.ndarray) -> list[_Ride]:
+    def _find_carriers(self, turns: np.ndarray, places: np.ndarray, own: np.ndarray) -> list[_Carrier]:
         """Find each bone's carriers from the trials' poses (K, B, 3, 3), (K, B, 3) and own rotations (K, B, 3, 3)."""
         base, found = turns @ own.transpose(0, 1, 3, 2), []
-        turning, going = turn_spread(turns, base), place_spread(turns, places, places)
+        turning, going = compute_rotation_spread(turns, base), compute_position_spread(turns, places, places)
         for i, bone in enumerate(self.bones):
-            turn_of, worst = nearest_carrier(turning[:, i], i)
-            place_of, off = nearest_carrier(going[:, i], i)
-            seen = np.swapaxes(self._of(turns, turn_of), -1, -2) @ base[:, i]
+            turn_of, worst = find_nearest_carrier(turning[:, i], i)
+            place_of, off = find_nearest_carrier(going[:, i], i)
+            seen = np.swapaxes(self._get_rotation(turns, turn_of), -1, -2) @ base[:, i]
             away = places[:, i] - (places[:, place_of] if place_of >= 0 else np.zeros((len(places), 3)))
-            carrier = np.broadcast_to(self._of(turns, place_of), base[:, i].shape)
+            carrier = np.broadcast_to(self._get_rotation(turns, place_of), base[:, i].shape)
             place = np.einsum("kji,kj->ki", carrier, away).mean(axis=0)
-            found.append(_Ride(turn_of, _nearest_turn(seen.mean(axis=0)), place_of, place))
-            if worst > 10 * RIDES or off > RIDES * self.size:
-                self.loose.append(bone)
+            found.append(_Carrier(turn_of, _find_nearest_rotation(seen.mean(axis=0)), place_of, place))
+            if worst > 10 * CARRIER_TOLERANCE or off > CARRIER_TOLERANCE * self.size:
+                self.unreliable.append(bone)
         return found
 
     def _measure_axes(self, posed: PosedRig, bone: str, own: np.ndarray, turns: np.ndarray) -> None:
@@ -110,27 +110,27 @@ class Controls:
         At rest, and in the last trial, in which the bones were rotated by `own` (B, 4) and posed as `turns` (B, 3, 3).
         """
         i = self.bones.index(bone)
-        measured = [self._axes_of(posed, i, turn) for turn in (quaternion.identity(len(self.bones)), own)]
+        measured = [self._measure_motion_axes(posed, i, turn) for turn in (quaternion.identity(len(self.bones)), own)]
         if abs(np.linalg.det(measured[0])) < 1e-3:
             raise InputError(f"rig {self.rig.name}", f"bone {bone} does not move when its location is set",
                              "a bone that is free to move", "choose another one in the bone map")
-        carriers = [(d, self.rest_turn[d], turns[d]) for d in range(i - 1, -1, -1)]
+        carriers = [(d, self.rest_rotations[d], turns[d]) for d in range(i - 1, -1, -1)]
         carriers.append((STATIC, np.eye(3), np.eye(3)))
         spread = [np.abs(a.T @ measured[0] - b.T @ measured[1]).max() for _, a, b in carriers]
         d, rest, _ = carriers[int(np.argmin(spread))]
-        self.rides[i].axes_of, self.rides[i].axes = d, rest.T @ measured[0]
+        self.carriers[i].axes_carrier, self.carriers[i].axes = d, rest.T @ measured[0]
 
-    def _axes_of(self, posed: PosedRig, i: int, own: np.ndarray) -> np.ndarray:
+    def _measure_motion_axes(self, posed: PosedRig, i: int, own: np.ndarray) -> np.ndarray:
         """Measure how bone i moves (3, 3), one column per location channel, while the bones are rotated by `own`."""
-        _, start = split_poses(posed.pose(own, self.bones))
+        _, start = split_poses(posed.apply_pose(own, self.bones))
         columns = []
         for axis in range(3):
-            went = np.zeros((len(self.bones), 3))
-            went[i, axis] = self.size
-            columns.append((split_poses(posed.pose(own, self.bones, went))[1][i] - start[i]) / self.size)
+            shifts = np.zeros((len(self.bones), 3))
+            shifts[i, axis] = self.size
+            columns.append((split_poses(posed.apply_pose(own, self.bones, shifts))[1][i] - start[i]) / self.size)
         return np.stack(columns, axis=1)
 
-    def basis(self, turns: dict[str, np.ndarray], places: dict[str, np.ndarray]):
+    def compute_channels(self, turns: dict[str, np.ndarray], places: dict[str, np.ndarray]):
         """Compute the channels for given poses of the driven bones.
 
         Args:
@@ -142,21 +142,21 @@ class Controls:
         count = len(next(iter(turns.values())))
         turn = np.stack([turns[bone] for bone in self.bones], axis=1)
         heads, out = np.zeros((count, len(self.bones), 3)), {}
-        for i, (bone, ride) in enumerate(zip(self.bones, self.rides)):
-            base = self._of(turn, ride.turn_of) @ ride.turn
-            origin = heads[:, ride.place_of] if ride.place_of >= 0 else 0.0
-            heads[:, i] = self._of(turn, ride.place_of) @ ride.place + origin
+        for i, (bone, ride) in enumerate(zip(self.bones, self.carriers)):
+            base = self._get_rotation(turn, ride.rotation_carrier) @ ride.rotation
+            origin = heads[:, ride.position_carrier] if ride.position_carrier >= 0 else 0.0
+            heads[:, i] = self._get_rotation(turn, ride.position_carrier) @ ride.position + origin
             location = None
             if bone in places:
-                axes = self._of(turn, ride.axes_of) @ ride.axes
+                axes = self._get_rotation(turn, ride.axes_carrier) @ ride.axes
                 # the location channels that move the head from where its carrier puts it to the given position
                 location = np.linalg.solve(axes, (places[bone] - heads[:, i])[..., None])[..., 0]
                 heads[:, i] = places[bone]
             rotation = quaternion.from_matrix(np.swapaxes(base, -1, -2) @ turn[:, i])
-            out[bone] = quaternion.continuous(rotation), location
+            out[bone] = quaternion.unify_signs(rotation), location
         return out, heads
 
-    def forward(self, turns: dict[str, np.ndarray], locations: dict[str, np.ndarray | None]) -> np.ndarray:
+    def compute_heads(self, turns: dict[str, np.ndarray], locations: dict[str, np.ndarray | None]) -> np.ndarray:
         """Compute heads (F, B, 3) in the armature's space from channels: the inverse of `compute_channels`.
 
         Args:
@@ -168,21 +168,21 @@ class Controls:
         count = len(next(iter(turns.values())))
         turn = np.zeros((count, len(self.bones), 3, 3))
         heads = np.zeros((count, len(self.bones), 3))
-        for i, (bone, ride) in enumerate(zip(self.bones, self.rides)):
-            turn[:, i] = self._of(turn, ride.turn_of) @ ride.turn @ quaternion.to_matrix(turns[bone])
-            origin = heads[:, ride.place_of] if ride.place_of >= 0 else 0.0
-            heads[:, i] = self._of(turn, ride.place_of) @ ride.place + origin
+        for i, (bone, ride) in enumerate(zip(self.bones, self.carriers)):
+            turn[:, i] = self._get_rotation(turn, ride.rotation_carrier) @ ride.rotation @ quaternion.to_matrix(turns[bone])
+            origin = heads[:, ride.position_carrier] if ride.position_carrier >= 0 else 0.0
+            heads[:, i] = self._get_rotation(turn, ride.position_carrier) @ ride.position + origin
             if locations[bone] is not None and ride.axes is not None:
-                axes = self._of(turn, ride.axes_of) @ ride.axes
+                axes = self._get_rotation(turn, ride.axes_carrier) @ ride.axes
                 heads[:, i] += (axes @ locations[bone][..., None])[..., 0]
         return heads
 
     @staticmethod
-    def _of(turn: np.ndarray, d: int) -> np.ndarray:
+    def _get_rotation(turn: np.ndarray, d: int) -> np.ndarray:
         return turn[:, d] if d >= 0 else np.eye(3)
 
     @contextmanager
-    def _posed(self):
+    def _pose_rig(self):
         """Pose the rig without its animation, its switches on FK, overrides muted; all is restored afterwards."""
         bones = self.rig.pose.bones
         silent = [bones[one.bone].constraints[one.constraint] for one in self.overrides]
@@ -196,7 +196,7 @@ class Controls:
                     bones[switch.bone][switch.name] = switch.before
 
 
-def _nearest_turn(matrix: np.ndarray) -> np.ndarray:
+def _find_nearest_rotation(matrix: np.ndarray) -> np.ndarray:
     """Find the rotation (3, 3) nearest to a matrix."""
     u, _, v = np.linalg.svd(matrix)
     return u @ np.diag([1.0, 1.0, np.sign(np.linalg.det(u @ v))]) @ v
@@ -209,8 +209,8 @@ def list_switches(rig: bpy.types.Object) -> list[Switch]:
         for name, value in bone.items():
             if isinstance(value, bool) or not isinstance(value, (int, float)):
                 continue
-            if _TO_FK.search(name) or _FROM_FK.search(name):
-                whole = type(value)(1 if _TO_FK.search(name) else 0)
+            if _IK_TO_FK.search(name) or _FK_TO_IK.search(name):
+                whole = type(value)(1 if _IK_TO_FK.search(name) else 0)
             elif _FOLLOW.search(name) and 0.0 < value < 1.0:
                 whole = 1.0
             else:

@@ -27,7 +27,7 @@ NAME = "Player"
 SHIRT = (0.75, 0.05, 0.06)
 
 
-def write(made: "Take | MatchResult", out: Path) -> tuple[str, ...]:
+def write_result(result: "Take | MatchResult", out: Path) -> tuple[str, ...]:
     """Write a take or a match to `out` in the format of its suffix, completely or not at all.
 
     Returns:
@@ -35,41 +35,41 @@ def write(made: "Take | MatchResult", out: Path) -> tuple[str, ...]:
     """
     from ...beyond_mocap.match.make import MatchResult  # imports scipy, which is slow
 
-    lines = stage_match(made) if isinstance(made, MatchResult) else stage(made)
-    export.saved(out, EXPORTERS[out.suffix.lower()])
+    lines = create_match_scene(result) if isinstance(result, MatchResult) else create_take_scene(result)
+    export.write_whole_file(out, EXPORTERS[out.suffix.lower()])
     return lines
 
 
-def stage(take: Take) -> tuple[str, ...]:
+def create_take_scene(take: Take) -> tuple[str, ...]:
     """Create an empty file with the take in it, first frame 0."""
-    scene = _empty(take.motion.fps)
+    scene = _create_empty_scene(take.motion.fps)
     scene.frame_start, scene.frame_end = 0, len(take.motion) - 1
-    room = bake.collection(scene)
-    player = armature.create(bpy.context, take.motion.skeleton, NAME, room)
-    body.create(player, NAME, SHIRT, collection=room, scene=scene, example=take.motion)
-    action.write(player, take.motion, scene, 0.0, f"{NAME} take")
+    collection = bake.find_or_create_collection(scene)
+    player = armature.create_armature(bpy.context, take.motion.skeleton, NAME, collection)
+    body.create_character(player, NAME, SHIRT, collection=collection, scene=scene, example=take.motion)
+    action.write_motion(player, take.motion, scene, 0.0, f"{NAME} take")
     if take.ball is not None:
         first = (float(take.ball.times[0]) - take.start_time) * take.motion.fps
-        ball.write(ball.create(bpy.context, bake.BALL, room), take.ball, scene, first)
+        ball.write_trajectory(ball.create_ball(bpy.context, bake.BALL, collection), take.ball, scene, first)
     return ()
 
 
-def stage_match(made: "MatchResult") -> tuple[str, ...]:
+def create_match_scene(result: "MatchResult") -> tuple[str, ...]:
     """Create an empty file with the whole match in it, first frame 0."""
     from ...beyond_mocap.match.folder import read_state
 
-    order, state = made.order, read_state(made.order.out)
-    scene = _empty(order.fps)
+    order, state = result.request, read_state(result.request.out)
+    scene = _create_empty_scene(order.fps)
     colours = {team["ground"]: team["colour"] for team in state["teams"]}
     build = {"cache_dir": order.cache, "skeleton": order.skeleton, "seed": order.seed}
-    wanted = load.Wanted(str(order.out), *made.span, (), colours, str(order.library), order.unit, build)
-    _, scenery, lines = load.scenery(wanted, None, lambda fraction, text: None, lambda: False)
+    options = load.DisplayRequest(str(order.out), *result.span, (), colours, str(order.library), order.unit, build)
+    _, scenery, lines = load.load_section(options, None, lambda fraction, text: None, lambda: False)
     scene.frame_start = scene.frame_end = 0
-    show.show(bpy.context, scenery, 0)
+    show.show_match(bpy.context, scenery, 0)
     return lines
 
 
-def _empty(rate: float) -> bpy.types.Scene:
+def _create_empty_scene(rate: float) -> bpy.types.Scene:
     """Create an empty file with a frame rate; returns its scene."""
     bpy.ops.wm.read_homefile(use_empty=True)
     scene = bpy.context.scene
@@ -78,14 +78,14 @@ def _empty(rate: float) -> bpy.types.Scene:
     return scene
 
 
-def _blend(path: str) -> None:
+def _write_blend(path: str) -> None:
     bpy.ops.wm.save_as_mainfile(filepath=path, copy=True, check_existing=False)
 
 
-def _by(format: str):
+def _build_exporter(format: str):
     """Build the exporter of a format for everything in the file, axes as in Blender's exporters."""
     return lambda path: export.EXPORTERS[format](path, "BLENDER", False)
 
 
-EXPORTERS = {".blend": _blend, ".fbx": _by("FBX"), ".glb": _by("GLB"), ".usdc": _by("USD")}
-WRITERS = dict.fromkeys(EXPORTERS, write)
+EXPORTERS = {".blend": _write_blend, ".fbx": _build_exporter("FBX"), ".glb": _build_exporter("GLB"), ".usdc": _build_exporter("USD")}
+WRITERS = dict.fromkeys(EXPORTERS, write_result)

@@ -17,24 +17,24 @@ import bpy
 import numpy as np
 
 from ...beyond_mocap.base.errors import InputError
-from ...beyond_mocap.files.whole import beside
+from ...beyond_mocap.files.whole import atomic_path
 from ...beyond_mocap.motion import quaternion
 from ..core import channels
 from ..core.measure import frames_per_second
-from ..core.set_aside import scene_aside
-from .bone_curves import ROOT_BONE, root_motion
-from .fit import evaluated, extent
+from ..core.set_aside import use_temporary_scene
+from .bone_curves import ROOT_BONE, compute_root_motion
+from .fit import sample_motion, find_common_extent
 
 SUFFIXES = {"FBX": ".fbx", "GLB": ".glb", "USD": ".usdc", "BVH": ".bvh"}
 _OPERATORS = {"FBX": ("export_scene", "fbx"), "GLB": ("export_scene", "gltf"), "USD": ("wm", "usd_export")}
 _FBX_AXES = {"BLENDER": ("-Z", "Y"), "UNITY": ("-Z", "Y"), "GODOT": ("-Z", "Y"), "UNREAL": ("Y", "Z")}
 _USD_AXES = {"UNITY": ("NEGATIVE_Z", "Y"), "GODOT": ("NEGATIVE_Z", "Y")}
-_EVEN = 1e-4  # deviation of a scale from 1 that is ignored
-HIDDEN = {"hide_viewport", "hide_render"}  # keyed channels of a mesh that is visible for a part of the time only
+_SCALE_TOLERANCE = 1e-4  # deviation of a scale from 1 that is ignored
+VISIBILITY_CHANNELS = {"hide_viewport", "hide_render"}  # keyed channels of a mesh that is visible for a part of the time only
 
 
 @dataclass(frozen=True)
-class Wanted:
+class ExportOptions:
     """What to export.
 
     Attributes:
@@ -56,16 +56,16 @@ class Wanted:
 
 
 @dataclass(frozen=True, eq=False)
-class _Shown:
+class _SampledPoses:
     """The displayed motion: bones' poses (F, B, 4, 4) in the armature's space, the object's (F, 4, 4) in the world."""
 
     bones: list[str]
     poses: np.ndarray
-    lies: np.ndarray
+    object_matrices: np.ndarray
 
 
-def write(
-    context: bpy.types.Context, rigs: list[bpy.types.Object], wanted: Wanted, things: list[bpy.types.Object] = ()
+def export_motion(
+    context: bpy.types.Context, rigs: list[bpy.types.Object], options: ExportOptions, things: list[bpy.types.Object] = ()
 ) -> list[str]:
     """Export the rigs' motions.
 
@@ -79,37 +79,37 @@ def write(
     Raises:
         InputError: if an armature does not move or the file cannot be written.
     """
-    check(wanted.format)
+    check_exporter(options.format)
     if not rigs:
         raise InputError("export", "no armature", "an armature that moves", "select one or choose players")
-    if not wanted.path.parent.is_dir() or not os.access(wanted.path.parent, os.W_OK):
-        raise InputError(wanted.path, "the folder cannot be written", "a folder that you can write to",
+    if not options.path.parent.is_dir() or not os.access(options.path.parent, os.W_OK):
+        raise InputError(options.path, "the folder cannot be written", "a folder that you can write to",
                          "choose another folder")
     scene = context.scene
-    first, last = extent(rigs)
-    rate = wanted.rate or frames_per_second(scene)
+    first, last = find_common_extent(rigs)
+    rate = options.rate or frames_per_second(scene)
     times = first + np.arange(int(np.floor((last - first) * rate / frames_per_second(scene) + 1e-6)) + 1) * (
         frames_per_second(scene) / rate)
-    things = [] if wanted.format == "BVH" else list(things)
-    shown = _look(scene, rigs, times, things)
-    worn = {rig.name: _dress(scene, rig) for rig in rigs} if wanted.meshes and wanted.format != "BVH" else {}
-    told = []
-    with _stage(context, rate, len(times)) as stage:
-        copies = [_copy(stage, rig, shown[rig.name], wanted, told) for rig in rigs]
-        meshes = [_worn(stage, thing, rig, copy) for rig, copy in zip(rigs, copies) for thing in worn.get(rig.name, ())]
-        free = [_free(stage, thing, shown[thing.name].lies) for thing in things]
-        if wanted.format == "GLB" and not meshes:
-            told.append("no mesh on the armature: glTF then stores its bones as plain nodes")
-        dressed = [thing for rig in rigs for thing in worn.get(rig.name, ())]
-        with _names([*rigs, *dressed, *things], [*copies, *meshes, *free]):
-            _save(stage, copies, wanted)
-    told.insert(0, f"{len(times)} frames at {rate:g} per second, {len(rigs)} armature{'s' * (len(rigs) > 1)}, "
+    things = [] if options.format == "BVH" else list(things)
+    sampled = _sample_poses(scene, rigs, times, things)
+    meshes_by_rig = {rig.name: _list_meshes(scene, rig) for rig in rigs} if options.meshes and options.format != "BVH" else {}
+    messages = []
+    with _export_scene(context, rate, len(times)) as stage:
+        copies = [_copy_armature(stage, rig, sampled[rig.name], options, messages) for rig in rigs]
+        meshes = [_copy_mesh(stage, thing, rig, copy) for rig, copy in zip(rigs, copies) for thing in meshes_by_rig.get(rig.name, ())]
+        free_meshes = [_copy_free_mesh(stage, thing, sampled[thing.name].object_matrices) for thing in things]
+        if options.format == "GLB" and not meshes:
+            messages.append("no mesh on the armature: glTF then stores its bones as plain nodes")
+        dressed = [thing for rig in rigs for thing in meshes_by_rig.get(rig.name, ())]
+        with _original_names([*rigs, *dressed, *things], [*copies, *meshes, *free_meshes]):
+            _save_file(stage, copies, options)
+    messages.insert(0, f"{len(times)} frames at {rate:g} per second, {len(rigs)} armature{'s' * (len(rigs) > 1)}, "
                    f"{len(meshes)} mesh{'es' * (len(meshes) != 1)}"
                    + (f", {len(things)} object{'s' * (len(things) > 1)} beside them" if things else ""))
-    return told
+    return messages
 
 
-def check(format: str) -> None:
+def check_exporter(format: str) -> None:
     """Check that this Blender has the exporter (InputError)."""
     if format not in _OPERATORS:
         return
@@ -122,9 +122,9 @@ def check(format: str) -> None:
                          "choose another format or enable the exporter's add-on") from None
 
 
-def _look(
+def _sample_poses(
     scene: bpy.types.Scene, rigs: list[bpy.types.Object], times: np.ndarray, things: list[bpy.types.Object]
-) -> dict[str, _Shown]:
+) -> dict[str, _SampledPoses]:
     """Sample armatures and objects without bones at scene frames (F,), which may be fractional."""
     now, subframe = scene.frame_current, scene.frame_subframe
     names = {rig.name: [bone.name for bone in rig.data.bones] for rig in rigs}
@@ -140,17 +140,17 @@ def _look(
     scene.frame_set(now, subframe=subframe)
     ordered = {rig.name: [bone.name for bone in rig.pose.bones] for rig in rigs}
     none = np.empty((len(times), 0, 4, 4), np.float32)
-    return {name: _Shown(ordered.get(name, []), poses.get(name, none).astype(float), lies[name]) for name in lies}
+    return {name: _SampledPoses(ordered.get(name, []), poses.get(name, none).astype(float), lies[name]) for name in lies}
 
 
 @contextmanager
-def _stage(context: bpy.types.Context, rate: float, frames: int):
+def _export_scene(context: bpy.types.Context, rate: float, frames: int):
     """Create a temporary scene at this rate; afterwards selection and mode are restored."""
     units, chosen = context.scene.unit_settings, list(context.selected_objects)
     active = context.view_layer.objects.active
     mode = active.mode if active is not None else "OBJECT"
     try:
-        with scene_aside("Beyond Mocap export") as stage:
+        with use_temporary_scene("Beyond Mocap export") as stage:
             stage.unit_settings.system, stage.unit_settings.scale_length = units.system, units.scale_length
             stage.render.fps = max(1, round(rate))
             stage.render.fps_base = stage.render.fps / rate
@@ -165,25 +165,25 @@ def _stage(context: bpy.types.Context, rate: float, frames: int):
             bpy.ops.object.mode_set(mode=mode)
 
 
-def _copy(stage: bpy.types.Scene, rig: bpy.types.Object, shown: _Shown, wanted: Wanted, told: list[str]):
+def _copy_armature(stage: bpy.types.Scene, rig: bpy.types.Object, shown: _SampledPoses, wanted: ExportOptions, told: list[str]):
     """Copy a rig to a plain armature that plays its displayed motion."""
     data = rig.data.copy()
     copy = bpy.data.objects.new(rig.name, data)
     stage.collection.objects.link(copy)
     data.pose_position = "POSE"
-    hips, root, line, in_place = root_motion(rig, shown, wanted, told)
-    kept = _kept(rig, wanted, root)
-    poses = {name: shown.poses[:, number] for number, name in enumerate(shown.bones) if name in kept}
+    hips, root, line, in_place = compute_root_motion(rig, shown, wanted, told)
+    bones = _select_bones(rig, wanted, root)
+    poses = {name: shown.poses[:, number] for number, name in enumerate(shown.bones) if name in bones}
     if in_place is not None:
         poses = {name: in_place @ pose for name, pose in poses.items()}
     if line is not None:
         poses[root or ROOT_BONE] = line
-    parents = _plain(stage, copy, rig, kept=kept, hips=hips if line is not None and root is None else None, told=told)
-    _play(copy, poses, parents, shown.lies, wanted)
+    parents = _simplify_bones(stage, copy, rig, kept=bones, hips=hips if line is not None and root is None else None, told=told)
+    _create_action(copy, poses, parents, shown.object_matrices, wanted)
     return copy
 
 
-def _kept(rig: bpy.types.Object, wanted: Wanted, root: str | None) -> set[str]:
+def _select_bones(rig: bpy.types.Object, wanted: ExportOptions, root: str | None) -> set[str]:
     """Select the bones that are exported."""
     every = {bone.name for bone in rig.data.bones}
     deform = {bone.name for bone in rig.data.bones if bone.use_deform}
@@ -193,12 +193,12 @@ def _kept(rig: bpy.types.Object, wanted: Wanted, root: str | None) -> set[str]:
     return deform | ({named} if named else set())
 
 
-def _plain(stage, copy, rig, kept: set[str], hips: str | None, told: list[str]) -> dict[str, str | None]:
+def _simplify_bones(stage, copy, rig, kept: set[str], hips: str | None, told: list[str]) -> dict[str, str | None]:
     """Simplify the copy's bones: only the selected ones, each below the nearest selected one, with plain inheritance.
 
     With `hips` a root bone is added above all. Returns bone -> parent.
     """
-    parents = {name: _above(rig, name, kept) for name in kept}
+    parents = {name: _find_parent(rig, name, kept) for name in kept}
     layer = stage.view_layers[0]
     layer.update()
     layer.objects.active = copy
@@ -226,7 +226,7 @@ def _plain(stage, copy, rig, kept: set[str], hips: str | None, told: list[str]) 
     return parents
 
 
-def _above(rig: bpy.types.Object, name: str, kept: set[str]) -> str | None:
+def _find_parent(rig: bpy.types.Object, name: str, kept: set[str]) -> str | None:
     """Find the nearest selected bone above; Rigify's deform bones hang on bones "ORG-x", which correspond to "DEF-x".
     """
     bone = rig.data.bones[name].parent
@@ -238,7 +238,7 @@ def _above(rig: bpy.types.Object, name: str, kept: set[str]) -> str | None:
     return None
 
 
-def _play(copy, poses: dict[str, np.ndarray], parents: dict[str, str | None], lies: np.ndarray, wanted: Wanted) -> None:
+def _create_action(copy, poses: dict[str, np.ndarray], parents: dict[str, str | None], lies: np.ndarray, wanted: ExportOptions) -> None:
     """Create one action of the copy: its bones as `poses` (F, 4, 4) in its space, the object as `lies` (F, 4, 4)."""
     rest = {name: np.array(copy.data.bones[name].matrix_local) for name in parents}
     curves: dict[str, tuple[str, np.ndarray]] = {}
@@ -248,14 +248,14 @@ def _play(copy, poses: dict[str, np.ndarray], parents: dict[str, str | None], li
             np.linalg.inv(rest[name]) @ rest[parent] @ np.linalg.inv(poses[parent]) @ pose)
         path = f'pose.bones["{bpy.utils.escape_identifier(name)}"]'
         copy.pose.bones[name].rotation_mode = "QUATERNION"
-        curves |= {f"{path}.{channel}": (name, values) for channel, values in _channels(local).items()}
-    channels.animate(copy, copy.name, np.arange(len(lies)), curves | _lying(copy, lies))
+        curves |= {f"{path}.{channel}": (name, values) for channel, values in _compute_channels(local).items()}
+    channels.create_action(copy, copy.name, np.arange(len(lies)), curves | _place_object(copy, lies))
 
 
-def _lying(copy: bpy.types.Object, lies: np.ndarray) -> dict[str, tuple[str, np.ndarray]]:
+def _place_object(copy: bpy.types.Object, lies: np.ndarray) -> dict[str, tuple[str, np.ndarray]]:
     """Place an object at its first matrix (F, 4, 4); returns curves of its movement, none where it stays there."""
     copy.rotation_mode = "QUATERNION"
-    moves = _channels(lies)
+    moves = _compute_channels(lies)
     for channel, values in moves.items():
         setattr(copy, channel, values[0])
     if "scale" not in moves:
@@ -265,7 +265,7 @@ def _lying(copy: bpy.types.Object, lies: np.ndarray) -> dict[str, tuple[str, np.
     return {channel: ("Object", values) for channel, values in moves.items()}
 
 
-def _free(stage: bpy.types.Scene, thing: bpy.types.Object, lies: np.ndarray) -> bpy.types.Object:
+def _copy_free_mesh(stage: bpy.types.Scene, thing: bpy.types.Object, lies: np.ndarray) -> bpy.types.Object:
     """Copy a mesh without a parent, moving (F, 4, 4) in the world as the original does."""
     copy = thing.copy()
     copy.animation_data_clear()
@@ -275,54 +275,54 @@ def _free(stage: bpy.types.Scene, thing: bpy.types.Object, lies: np.ndarray) -> 
     copy.delta_location, copy.delta_scale = (0, 0, 0), (1, 1, 1)
     copy.constraints.clear()
     copy.hide_viewport = copy.hide_render = copy.hide_select = False
-    curves = _lying(copy, lies)
+    curves = _place_object(copy, lies)
     if curves:
-        channels.animate(copy, copy.name, np.arange(len(lies)), curves)
+        channels.create_action(copy, copy.name, np.arange(len(lies)), curves)
     return copy
 
 
-def _channels(matrices: np.ndarray) -> dict[str, np.ndarray]:
+def _compute_channels(matrices: np.ndarray) -> dict[str, np.ndarray]:
     """Compute location, rotation and, where it is not 1, scale of matrices (F, 4, 4)."""
     size = np.linalg.norm(matrices[:, :3, :3], axis=1)
     turn = matrices[:, :3, :3] / np.maximum(size, 1e-12)[:, None, :]
-    found = {"location": matrices[:, :3, 3], "rotation_quaternion": quaternion.continuous(quaternion.from_matrix(turn))}
-    return found | ({"scale": size} if np.abs(size - 1.0).max() > _EVEN else {})
+    found = {"location": matrices[:, :3, 3], "rotation_quaternion": quaternion.unify_signs(quaternion.from_matrix(turn))}
+    return found | ({"scale": size} if np.abs(size - 1.0).max() > _SCALE_TOLERANCE else {})
 
 
-def _dress(scene: bpy.types.Scene, rig: bpy.types.Object) -> list[bpy.types.Object]:
+def _list_meshes(scene: bpy.types.Scene, rig: bpy.types.Object) -> list[bpy.types.Object]:
     """List the meshes that an armature moves, visible now or at some other time by their keys."""
     moved = [thing for thing in scene.objects if thing.type == "MESH" and (
         thing.parent == rig or any(m.type == "ARMATURE" and m.object == rig for m in thing.modifiers))]
-    return [thing for thing in moved if thing.visible_get() or _keyed(thing, HIDDEN)]
+    return [thing for thing in moved if thing.visible_get() or _has_only_keys_on(thing, VISIBILITY_CHANNELS)]
 
 
-def _keyed(thing: bpy.types.Object, paths: set[str]) -> bool:
+def _has_only_keys_on(thing: bpy.types.Object, paths: set[str]) -> bool:
     """Whether an object has keys on all of these properties and on no other."""
-    playing, slot = channels.playing(thing)
-    return playing is not None and {path for path, _ in channels.curves(playing, slot)} == paths
+    playing, slot = channels.find_playing_action(thing)
+    return playing is not None and {path for path, _ in channels.collect_curves(playing, slot)} == paths
 
 
-def _worn(stage: bpy.types.Scene, thing: bpy.types.Object, rig: bpy.types.Object, copy: bpy.types.Object):
+def _copy_mesh(stage: bpy.types.Scene, thing: bpy.types.Object, rig: bpy.types.Object, copy: bpy.types.Object):
     """Copy a mesh so that the rig's copy moves it."""
     place = thing.matrix_world.copy()
-    twin = thing.copy()
-    stage.collection.objects.link(twin)
+    copied = thing.copy()
+    stage.collection.objects.link(copied)
     if thing.parent == rig and (thing.parent_type != "BONE" or thing.parent_bone in copy.data.bones):
         inverse = thing.matrix_parent_inverse.copy()
-        twin.parent, twin.matrix_parent_inverse = copy, inverse
+        copied.parent, copied.matrix_parent_inverse = copy, inverse
     else:
-        twin.parent, twin.matrix_world = None, place
-    for modifier in twin.modifiers:
+        copied.parent, copied.matrix_world = None, place
+    for modifier in copied.modifiers:
         if modifier.type == "ARMATURE" and modifier.object == rig:
             modifier.object = copy
-    if _keyed(thing, HIDDEN):  # the formats cannot store it
-        twin.animation_data_clear()
-        twin.hide_viewport = twin.hide_render = False
-    return twin
+    if _has_only_keys_on(thing, VISIBILITY_CHANNELS):  # the formats cannot store it
+        copied.animation_data_clear()
+        copied.hide_viewport = copied.hide_render = False
+    return copied
 
 
 @contextmanager
-def _names(rigs, copies):
+def _original_names(rigs, copies):
     """Give the copies the rigs' own names, and their bones' data too, while they are exported."""
     local = [(rig, copy, rig.name) for rig, copy in zip(rigs, copies) if rig.library is None]
     for rig, copy, name in local:
@@ -340,7 +340,7 @@ def _names(rigs, copies):
             rig.name = name
 
 
-def _save(stage, copies, wanted: Wanted) -> None:
+def _save_file(stage, copies, wanted: ExportOptions) -> None:
     """Select the scene's objects and export them."""
     layer = stage.view_layers[0]
     layer.update()
@@ -350,20 +350,20 @@ def _save(stage, copies, wanted: Wanted) -> None:
     if wanted.format == "BVH":
         _write_bvh(stage, copies, wanted.path)
         return
-    saved(wanted.path, lambda path: EXPORTERS[wanted.format](path, wanted.engine, True))
+    write_whole_file(wanted.path, lambda path: EXPORTERS[wanted.format](path, wanted.engine, True))
 
 
-def with_ending(path: Path, ending: str) -> Path:
+def replace_ending(path: Path, ending: str) -> Path:
     """Return a path with this ending: replacing another format's, else appended ("walk.v2" keeps its ".v2")."""
     if path.suffix.lower() in {ending, *SUFFIXES.values()}:
         return path.with_suffix(ending)
     return path.with_name(path.name + ending)
 
 
-def saved(out: Path, write_to) -> None:
+def write_whole_file(out: Path, write_to) -> None:
     """Let `write_to(path)` write a temporary file, then rename it to `out`; InputError for exporters' exceptions."""
     try:
-        with beside(out, out.suffix) as part:
+        with atomic_path(out, out.suffix) as part:
             write_to(str(part))
             if not part.is_file():
                 raise RuntimeError("nothing was written")
@@ -378,10 +378,10 @@ def _write_bvh(stage: bpy.types.Scene, copies, path: Path) -> None:
     frames = np.arange(stage.frame_end + 1)
     for copy in copies:
         own = path if len(copies) == 1 else path.with_name(f"{path.stem} {copy.name}{path.suffix}")
-        bvh.write(own, evaluated(copy, stage, frames))
+        bvh.write_bvh(own, sample_motion(copy, stage, frames))
 
 
-def _fbx(path: str, engine: str, selected: bool) -> None:
+def _export_fbx(path: str, engine: str, selected: bool) -> None:
     forward, up = _FBX_AXES[engine]
     bpy.ops.export_scene.fbx(filepath=path, check_existing=False, use_selection=selected,
                              object_types={"ARMATURE", "MESH", "EMPTY"}, axis_forward=forward, axis_up=up,
@@ -391,14 +391,14 @@ def _fbx(path: str, engine: str, selected: bool) -> None:
                              bake_anim_force_startend_keying=True, bake_anim_simplify_factor=0.0)
 
 
-def _glb(path: str, _engine: str, selected: bool) -> None:
+def _export_glb(path: str, _engine: str, selected: bool) -> None:
     bpy.ops.export_scene.gltf(filepath=path, check_existing=False, export_format="GLB", use_selection=selected,
                               use_active_scene=True, export_yup=True, export_animations=True,
                               export_animation_mode="ACTIVE_ACTIONS", export_frame_range=True,
                               export_force_sampling=True, export_optimize_animation_size=False)
 
 
-def _usd(path: str, engine: str, selected: bool) -> None:
+def _export_usd(path: str, engine: str, selected: bool) -> None:
     turned = {}
     if engine in _USD_AXES:
         forward, up = _USD_AXES[engine]
@@ -408,5 +408,5 @@ def _usd(path: str, engine: str, selected: bool) -> None:
                           export_armatures=True, **turned)
 
 
-EXPORTERS = {"FBX": _fbx, "GLB": _glb, "USD": _usd}
+EXPORTERS = {"FBX": _export_fbx, "GLB": _export_glb, "USD": _export_usd}
 """Format -> function (path, engine, selected only) that exports the scene in the window."""

@@ -10,19 +10,19 @@ import bpy
 import numpy as np
 
 from ...beyond_mocap.base.errors import InputError
-from ...beyond_mocap.base.vectors import nearest_axis
+from ...beyond_mocap.base.vectors import find_nearest_axis
 from ...beyond_mocap.motion import quaternion
 from ...beyond_mocap.motion.motion import Motion, forward_kinematics
 from ...beyond_mocap.motion.skeleton import Skeleton
 from ..core import action, channels
 from ..core.measure import frames_per_second, units_per_metre
 from . import armature
-from .driven import Driven
+from .driven import DrivenRig
 
-LEGS_ALIKE = (0.8, 1.25)
-_FLOOR = (-0.01, 0.05)  # heights of toe joints in contact, metres, whose soles are on the scene's ground
-_MOST_LEAN = np.radians(30.0)
-_MISS = 0.005  # metres from which a miss is reported
+SIMILAR_LEGS = (0.8, 1.25)
+_ZERO_FLOOR_RANGE = (-0.01, 0.05)  # heights of toe joints in contact, metres, whose soles are on the scene's ground
+_MAX_LEAN = np.radians(30.0)
+_REPORTED_MISS = 0.005  # metres from which a miss is reported
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class BakeOptions:
     root: str = "KEEP"
     keeps_travel: bool | None = None
     bakes_ik: bool = False
-    plants: bool = True
+    plants_feet: bool = True
     exact: bool = False
 
 
@@ -57,39 +57,39 @@ class Slide:
     worst_mm: float
 
 
-class Fit:
+class FittedMotion:
     """A source's motion on the driven skeleton, feet planted."""
 
-    def __init__(self, driven: Driven, source: Source, options: BakeOptions):
+    def __init__(self, driven: DrivenRig, source: SourceMotion, options: BakeOptions):
         from ...beyond_mocap.motion import contacts  # these import scipy, which is slow
-        from ...beyond_mocap.motion.foot_plant import plant
+        from ...beyond_mocap.motion.foot_plant import plant_feet
         from ...beyond_mocap.motion.retargeting.retarget import Retargeter
 
         if options.exact:
-            self.scale, self.slides, self.motion, self.told = 1.0, 3 * (Slide(0.0, 0.0),), source.motion, []
+            self.scale, self.slides, self.motion, self.messages = 1.0, 3 * (Slide(0.0, 0.0),), source.motion, []
             return
-        motion, skeleton = source.motion, _looking_ahead(driven.skeleton, source.motion.skeleton)
-        points = contacts.points(motion)
-        if source.standing is not None:
-            points = points | source.standing[:, :, None]
-        flat = points.all(axis=2)
-        ground = 0.0 if source.standing is not None else contacts.ground_height(motion)
-        floor = 0.0 if _FLOOR[0] <= ground <= _FLOOR[1] else ground
-        motion = _raised(motion, -ground)
-        carrier = Retargeter(motion, skeleton, standing=flat)
-        self.scale = carrier.target.leg / carrier.source.leg
-        keeps = LEGS_ALIKE[0] <= self.scale <= LEGS_ALIKE[1] if options.keeps_travel is None else options.keeps_travel
-        carrier.keeps_travel = keeps
-        carried = carrier.carry(motion)
-        level = _stand_spread(motion, points) < 0.05
-        planted = plant(skeleton, carried.root_positions, carried.rotations, points, motion.fps, levels=level)
-        fitted = Motion(skeleton, planted.root, planted.rotations, motion.fps) if options.plants else carried
-        self.slides = tuple(slide(m, flat) for m in (source.motion, carried, fitted))
-        self.lift = driven.sole - contacts.sole_height(skeleton)
-        self.motion = _raised(fitted, floor + self.lift)
-        self.told = self._lines(driven, planted.miss if options.plants else None, points, keeps)
+        motion, skeleton = source.motion, _add_head_tip(driven.skeleton, source.motion.skeleton)
+        heel_toe_contacts = contacts.detect_heel_toe_contacts(motion)
+        if source.foot_contacts is not None:
+            heel_toe_contacts = heel_toe_contacts | source.foot_contacts[:, :, None]
+        foot_contacts = heel_toe_contacts.all(axis=2)
+        ground = 0.0 if source.foot_contacts is not None else contacts.measure_ground_height(motion)
+        floor = 0.0 if _ZERO_FLOOR_RANGE[0] <= ground <= _ZERO_FLOOR_RANGE[1] else ground
+        motion = _raise_motion(motion, -ground)
+        retargeter = Retargeter(motion, skeleton, standing=foot_contacts)
+        self.scale = retargeter.target.leg / retargeter.source.leg
+        keeps_travel = SIMILAR_LEGS[0] <= self.scale <= SIMILAR_LEGS[1] if options.keeps_travel is None else options.keeps_travel
+        retargeter.keeps_travel = keeps_travel
+        retargeted = retargeter.retarget(motion)
+        is_level = _measure_height_spread(motion, heel_toe_contacts) < 0.05
+        planted = plant_feet(skeleton, retargeted.root_positions, retargeted.rotations, heel_toe_contacts, motion.fps, level_feet=is_level)
+        fitted = Motion(skeleton, planted.root, planted.rotations, motion.fps) if options.plants_feet else retargeted
+        self.slides = tuple(measure_slide(m, foot_contacts) for m in (source.motion, retargeted, fitted))
+        self.lift = driven.sole - contacts.measure_sole_height(skeleton)
+        self.motion = _raise_motion(fitted, floor + self.lift)
+        self.messages = self._build_messages(driven, planted.miss if options.plants_feet else None, heel_toe_contacts, keeps_travel)
 
-    def _lines(self, driven: Driven, miss: np.ndarray | None, points: np.ndarray, keeps: bool) -> list[str]:
+    def _build_messages(self, driven: DrivenRig, miss: np.ndarray | None, points: np.ndarray, keeps: bool) -> list[str]:
         """Build messages about size, sliding feet, floor, and legs that are too short."""
         lines = [
             f"legs {self.scale:.2f} of the source's; {'footprints kept' if keeps else 'steps scaled with the legs'}"
@@ -103,20 +103,20 @@ class Fit:
         lines.append(f"floor: the front of the foot is {100 * driven.sole:.1f} cm high, as in the rig's rest pose")
         short = np.where(points.any(axis=2), miss, 0.0) if miss is not None else np.zeros((1, 2))
         for side, name in enumerate(("left", "right")):
-            if short[:, side].max(initial=0.0) > _MISS:
+            if short[:, side].max(initial=0.0) > _REPORTED_MISS:
                 lines.append(f"the {name} leg is up to {1000 * short[:, side].max():.0f} mm short of its target in "
-                             f"{int(np.sum(short[:, side] > _MISS))} frames")
+                             f"{int(np.sum(short[:, side] > _REPORTED_MISS))} frames")
         return lines
 
 
-def _looking_ahead(skeleton: Skeleton, source: Skeleton) -> Skeleton:
+def _add_head_tip(skeleton: Skeleton, source: Skeleton) -> Skeleton:
     """Add a tip to the driven skeleton's head, as far off the vertical as the source's in its rest pose.
 
     Heads that look straight ahead at rest then match. Unchanged where the source's rest pose shows nothing.
     """
-    from ...beyond_mocap.motion.humanoid import identify
+    from ...beyond_mocap.motion.humanoid import identify_joints
 
-    body = identify(source)
+    body = identify_joints(source)
     if body.head is None or body.head not in source.end_parents or "Head" not in skeleton.names:
         return skeleton
     rest = source.rest_positions
@@ -125,44 +125,44 @@ def _looking_ahead(skeleton: Skeleton, source: Skeleton) -> Skeleton:
     trunk = rest[body.head] - 0.5 * (rest[body.left.upper_leg] + rest[body.right.upper_leg])
     if min(np.linalg.norm(v) for v in (crown, across, trunk)) < 1e-3:
         return skeleton
-    up = nearest_axis(trunk)
+    up = find_nearest_axis(trunk)
     ahead = np.cross(across - (across @ up) * up, up)
     lean = np.arctan2(crown @ ahead / np.linalg.norm(ahead), crown @ up)
-    if trunk @ up < 0.9 * np.linalg.norm(trunk) or abs(lean) > _MOST_LEAN:
+    if trunk @ up < 0.9 * np.linalg.norm(trunk) or abs(lean) > _MAX_LEAN:
         return skeleton
     tip = 0.2 * np.array([np.sin(lean), 0.0, np.cos(lean)])
     return Skeleton(skeleton.names, skeleton.parents, skeleton.offsets,
                     (*skeleton.end_parents, skeleton.names.index("Head")), np.vstack([skeleton.end_offsets, tip]))
 
 
-def _stand_spread(motion: Motion, points: np.ndarray) -> float:
+def _measure_height_spread(motion: Motion, points: np.ndarray) -> float:
     """Measure how uneven the heights of toes in contact are, metres: 5 % to 95 %."""
-    from ...beyond_mocap.motion.humanoid import identify
+    from ...beyond_mocap.motion.humanoid import identify_joints
 
-    body = identify(motion.skeleton)
+    body = identify_joints(motion.skeleton)
     places, _ = forward_kinematics(motion)
     heights = places[:, [body.left.toe_or_foot, body.right.toe_or_foot], 2][points[:, :, 1]]
     return float(np.ptp(np.percentile(heights, (5, 95)))) if len(heights) else 0.0
 
 
-def slide(motion: Motion, standing: np.ndarray) -> Slide:
+def measure_slide(motion: Motion, foot_contacts: np.ndarray) -> Slide:
     """Measure how far the feet of a motion slide while in contact, `foot_contacts` (T, 2) bool."""
     from ...beyond_mocap.synthesis.quality import movement
 
-    joints = movement.foot_joints(motion.skeleton)
+    joints = movement.list_foot_joints(motion.skeleton)
     places = forward_kinematics(motion)[0][:, joints]
-    speeds = movement.contact_speeds(places, standing, motion.fps)
-    travel = movement.stance_travel(places[:, :, 1], movement.stances(standing))
+    speeds = movement.measure_contact_speeds(places, foot_contacts, motion.fps)
+    travel = movement.measure_stance_travel(places[:, :, 1], movement.list_stances(foot_contacts))
     mean = float(np.nanmean(speeds)) if np.isfinite(speeds).any() else 0.0
     return Slide(100.0 * mean, 1000.0 * float(travel.max(initial=0.0)))
 
 
-def _raised(motion: Motion, by: float) -> Motion:
-    return Motion(motion.skeleton, motion.root_positions + [0.0, 0.0, by], motion.rotations, motion.fps)
+def _raise_motion(motion: Motion, height: float) -> Motion:
+    return Motion(motion.skeleton, motion.root_positions + [0.0, 0.0, height], motion.rotations, motion.fps)
 
 
 @dataclass(frozen=True, eq=False)
-class Source:
+class SourceMotion:
     """The motion that a body plays, in metres at the scene's rate.
 
     Attributes:
@@ -175,10 +175,10 @@ class Source:
     motion: Motion
     start: int
     name: str
-    standing: np.ndarray | None = None
+    foot_contacts: np.ndarray | None = None
 
 
-def source_of(body: bpy.types.Object | None, scene: bpy.types.Scene, standing=None) -> Source:
+def read_source(body: bpy.types.Object | None, scene: bpy.types.Scene, find_contacts=None) -> SourceMotion:
     """Read the motion that an armature plays: its action, or the result of its NLA strips.
 
     Args:
@@ -196,36 +196,36 @@ def source_of(body: bpy.types.Object | None, scene: bpy.types.Scene, standing=No
     data = body.animation_data
     strips = [strip for track in (data.nla_tracks if data and data.use_nla else ()) if not track.mute
               for strip in track.strips if not strip.mute]
-    playing, _ = channels.playing(body)
+    playing, _ = channels.find_playing_action(body)
     if playing is None and not strips:
         raise InputError(f"armature {body.name}", "plays no action", "an armature that moves",
                          "synthesize and press Apply first, or choose another source")
     if strips:
-        first, last = _extent(body, strips)
-        motion, start, name = evaluated(body, scene, np.arange(first, last + 1)), first, strips[0].name
+        first, last = _find_extent(body, strips)
+        motion, start, name = sample_motion(body, scene, np.arange(first, last + 1)), first, strips[0].name
     else:
-        motion, start, name = action.read(body, scene), action.first_frame(body), playing.name
+        motion, start, name = action.read_motion(body, scene), action.find_first_frame(body), playing.name
     frames = start + np.arange(len(motion))
-    return Source(motion, start, name, None if standing is None else standing(frames))
+    return SourceMotion(motion, start, name, None if find_contacts is None else find_contacts(frames))
 
 
-def _extent(body: bpy.types.Object, strips) -> tuple[int, int]:
+def _find_extent(body: bpy.types.Object, strips) -> tuple[int, int]:
     ends = [(strip.frame_start, strip.frame_end) for strip in strips]
-    if action.first_frame(body) is not None:
-        playing, slot = channels.playing(body)
-        ends.append(channels.keyed_range(channels.curves(playing, slot)))
+    if action.find_first_frame(body) is not None:
+        playing, slot = channels.find_playing_action(body)
+        ends.append(channels.find_key_range(channels.collect_curves(playing, slot)))
     return int(np.ceil(min(a for a, _ in ends))), int(np.floor(max(b for _, b in ends)))
 
 
-def extent(rigs: list[bpy.types.Object]) -> tuple[float, float]:
+def find_common_extent(rigs: list[bpy.types.Object]) -> tuple[float, float]:
     """Find the first and last scene frame of the armatures' motions; InputError where one plays nothing."""
     ends = []
     for rig in rigs:
         data = rig.animation_data
         own = []
-        playing, slot = channels.playing(rig)
+        playing, slot = channels.find_playing_action(rig)
         if playing is not None:
-            found = channels.keyed_range(channels.curves(playing, slot))
+            found = channels.find_key_range(channels.collect_curves(playing, slot))
             own += [found] if found else []
         own += [(s.frame_start, s.frame_end) for t in (data.nla_tracks if data and data.use_nla else ())
                 if not t.mute for s in t.strips if not s.mute]
@@ -236,10 +236,10 @@ def extent(rigs: list[bpy.types.Object]) -> tuple[float, float]:
     return min(a for a, _ in ends), max(b for _, b in ends)
 
 
-def evaluated(body: bpy.types.Object, scene: bpy.types.Scene, frames: np.ndarray) -> Motion:
+def sample_motion(body: bpy.types.Object, scene: bpy.types.Scene, frames: np.ndarray) -> Motion:
     """Sample the motion that Blender displays on an armature at these frames, with NLA and constraints."""
-    skeleton = armature.skeleton_of(body, scene)
-    rest = armature.rest_rotations(body, skeleton.names)
+    skeleton = armature.build_skeleton(body, scene)
+    rest = armature.compute_rest_rotations(body, skeleton.names)
     now, subframe, rows = scene.frame_current, scene.frame_subframe, []
     for frame in frames:
         scene.frame_set(int(frame))

@@ -37,7 +37,7 @@ ENGINES = (("BLENDER", "Blender", "Axes of Blender's exporters: Y up, -Z forward
            ("UNREAL", "Unreal", "For Unreal Engine: FBX in centimetres, X forward, Z up"),
            ("UNITY", "Unity", "For Unity: FBX with its scale as units, Y up, -Z forward"),
            ("GODOT", "Godot", "For Godot: Y up, -Z forward, in USD too"))
-WHO = (("ACTIVE", "Active", "The active player's rig or body; without players the active armature"),
+EXPORT_CHOICES = (("ACTIVE", "Active", "The active player's rig or body; without players the active armature"),
        ("SELECTED", "Selected", "All selected armatures"),
        ("PLAYERS", "All Players", "The rig or body of every selected player"))
 
@@ -49,7 +49,7 @@ class BeyondMocapRigBone(bpy.types.PropertyGroup):
                          description="Bone or control that moves this part; empty for none")
 
 
-def fill(settings: "BeyondMocapRig", again: bool = False) -> str:
+def fill_bone_map(settings: "BeyondMocapRig", ignores_stored: bool = False) -> str:
     """Map the bones of the chosen rig: the map stored for its skeleton, else by names and structure (always, if
     `ignores_stored`).
 
@@ -61,13 +61,13 @@ def fill(settings: "BeyondMocapRig", again: bool = False) -> str:
     from . import bone_maps
 
     rig = settings.target
-    kept = None if again else bone_maps.kept(rig)
-    table = kept or bone_maps.suggest(rig)
-    show(settings, table)
-    return "from the map stored for this skeleton" if kept else "by names and structure"
+    stored = None if ignores_stored else bone_maps.load_stored_map(rig)
+    table = stored or bone_maps.find_bone_map(rig)
+    show_bone_map(settings, table)
+    return "from the map stored for this skeleton" if stored else "by names and structure"
 
 
-def show(settings: "BeyondMocapRig", table: dict[str, str]) -> None:
+def show_bone_map(settings: "BeyondMocapRig", table: dict[str, str]) -> None:
     """Show a map in the list."""
     from .bone_maps import PARTS
 
@@ -77,18 +77,18 @@ def show(settings: "BeyondMocapRig", table: dict[str, str]) -> None:
         line.name, line.bone = part, table.get(part, "")
 
 
-def table_of(settings: "BeyondMocapRig") -> dict[str, str]:
+def read_bone_list(settings: "BeyondMocapRig") -> dict[str, str]:
     """Read the map from the list."""
     return {line.name: line.bone for line in settings.bones if line.bone}
 
 
-def _chosen(settings, _context) -> None:
+def _on_rig_chosen(settings, _context) -> None:
     """Map the bones of a newly chosen rig."""
     settings.bones.clear()
     settings.told = ""
     if settings.target is not None:
         try:
-            settings.told = f"Bones mapped {fill(settings)}"
+            settings.told = f"Bones mapped {fill_bone_map(settings)}"
         except BeyondMocapError as error:
             settings.told = str(error)
 
@@ -99,12 +99,12 @@ class BeyondMocapRig(bpy.types.PropertyGroup):
     source: PointerProperty(name="Source", type=bpy.types.Object, poll=lambda _, thing: thing.type == "ARMATURE",
                             description="Armature whose motion is baked; empty uses the active player's body")
     target: PointerProperty(
-        name="Rig", type=bpy.types.Object, poll=lambda _, thing: thing.type == "ARMATURE", update=_chosen,
+        name="Rig", type=bpy.types.Object, poll=lambda _, thing: thing.type == "ARMATURE", update=_on_rig_chosen,
         description="Rig that the motion is baked to: Rigify, Mixamo, Unreal, MetaHuman or any humanoid",
     )
     bones: CollectionProperty(type=BeyondMocapRigBone, description="Bones of the rig by part of the body")
     active_bone: IntProperty(name="Part", min=0, description="Active row of the list")
-    told: StringProperty(options={"HIDDEN"}, description="Messages of the last step")
+    messages: StringProperty(options={"HIDDEN"}, description="Messages of the last step")
     root: EnumProperty(name="Root Motion", items=ROOTS, default="KEEP", description="Motion of the root bone")
     steps: EnumProperty(name="Steps", items=STEPS, default="AUTO", description="Steps of legs with a different length")
     ik: EnumProperty(name="IK", items=IK, default="MUTE", description="Treatment of inverse kinematics on the rig")
@@ -118,7 +118,7 @@ class BeyondMocapRig(bpy.types.PropertyGroup):
                                   description="Angle that a bone may be off after keys are removed")
     format: EnumProperty(name="Format", items=FORMATS, default="FBX", description="File format to export")
     engine: EnumProperty(name="For", items=ENGINES, default="BLENDER", description="Program to export for")
-    who: EnumProperty(name="Export", items=WHO, default="ACTIVE", description="Armatures to export")
+    who: EnumProperty(name="Export", items=EXPORT_CHOICES, default="ACTIVE", description="Armatures to export")
     own_rate: BoolProperty(name="Take Rate", default=False,
                            description="Export at the frame rate of the take instead of the scene's")
     deform_only: BoolProperty(name="Deform Bones Only", default=True,

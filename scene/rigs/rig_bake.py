@@ -18,19 +18,19 @@ from ...beyond_mocap.base.digest import hex_digest
 from ...beyond_mocap.base.errors import InputError
 from ..core import channels
 from ..path_editing import riders
-from .bone_curves import bone_curves, setting_curves, wanted
+from .bone_curves import build_bone_curves, build_setting_curves, compute_bone_poses
 from .control_study import CHANNELS
-from .driven import Driven
-from .fit import BakeOptions, Fit, Slide, Source
+from .driven import DrivenRig
+from .fit import BakeOptions, FittedMotion, Slide, SourceMotion
 
-_OFF = 1e-3  # metres from which a deviation is reported
+_REPORTED_DISTANCE = 1e-3  # metres from which a deviation is reported
 MARK = "beyond_mocap_rig"
-BEFORE = "beyond_mocap_before"
+PREVIOUS_STATE = "beyond_mocap_before"
 KEYS = "beyond_mocap_keys"  # digest of the baked keys: if it differs, the user has edited them
 
 
 @dataclass
-class Baked:
+class BakeResult:
     """The result of a bake.
 
     Attributes:
@@ -45,11 +45,11 @@ class Baked:
     frames: np.ndarray
     scale: float
     slides: tuple[Slide, Slide, Slide]
-    told: list[str] = field(default_factory=list)
+    messages: list[str] = field(default_factory=list)
 
 
 @dataclass(frozen=True, eq=False)
-class Fitted:
+class PreparedBake:
     """A motion prepared for a rig that is still unchanged.
 
     Attributes:
@@ -63,44 +63,44 @@ class Fitted:
     """
 
     name: str
-    driven: Driven
-    fit: Fit
+    driven: DrivenRig
+    fit: FittedMotion
     frames: np.ndarray
     curves: dict
     heads: np.ndarray
-    told: list[str]
+    messages: list[str]
 
 
-def fitted(
-    rig: bpy.types.Object, table: dict[str, str], source: Source, scene: bpy.types.Scene, options: BakeOptions
-) -> Fitted:
+def prepare_bake(
+    rig: bpy.types.Object, table: dict[str, str], source: SourceMotion, scene: bpy.types.Scene, options: BakeOptions
+) -> PreparedBake:
     """Prepare a bake of `source` onto the rig's bones; InputError where the map or the rig cannot be used."""
-    driven = Driven(rig, table, scene, options.bakes_ik)
-    fit = Fit(driven, source, options)
+    driven = DrivenRig(rig, table, scene, options.bakes_ik)
+    fit = FittedMotion(driven, source, options)
     frames = source.start + np.arange(len(source.motion))
-    turns, places, told = wanted(driven, fit.motion, frames, options.root)
-    basis, heads = driven.controls.basis(turns, places)
-    curves = bone_curves(rig, basis) | setting_curves(driven, options.bakes_ik)
-    return Fitted(source.name, driven, fit, frames=frames, curves=curves, heads=heads,
-                  told=[*_told(driven, options), *told, *fit.told])
+    turns, places, messages = compute_bone_poses(driven, fit.motion, frames, options.root)
+    basis, heads = driven.controls.compute_channels(turns, places)
+    curves = build_bone_curves(rig, basis) | build_setting_curves(driven, options.bakes_ik)
+    return PreparedBake(source.name, driven, fit, frames=frames, curves=curves, heads=heads,
+                  messages=[*_describe_rig(driven, options), *messages, *fit.messages])
 
 
-def lay(one: Fitted) -> Baked:
+def apply_bake(prepared: PreparedBake) -> BakeResult:
     """Apply a prepared bake to its rig as a new action."""
-    rig, driven = one.driven.rig, one.driven
-    left = riders.leave(rig)
-    before, kept = record_before(rig, driven), keep_edited_bake(rig)
-    channels.discard(rig, MARK)
-    made = channels.animate(rig, f"{one.name} on {rig.name}", one.frames, one.curves)
-    made[MARK], made[BEFORE] = True, json.dumps(before)
-    note_keys(rig)
+    rig, driven = prepared.driven.rig, prepared.driven
+    reverted = riders.revert_path_edits(rig)
+    previous_state, kept_messages = record_previous_state(rig, driven), keep_edited_bake(rig)
+    channels.remove_marked_action(rig, MARK)
+    action = channels.create_action(rig, f"{prepared.name} on {rig.name}", prepared.frames, prepared.curves)
+    action[MARK], action[PREVIOUS_STATE] = True, json.dumps(previous_state)
+    record_keys(rig)
     for switch in driven.controls.switches:
         rig.pose.bones[switch.bone][switch.name] = switch.value
-    told = [*left, *one.told, *kept, *_off(driven, one.frames, one.heads, driven.scene)]
-    return Baked(made, one.frames, one.fit.scale, one.fit.slides, told)
+    messages = [*reverted, *prepared.messages, *kept_messages, *_describe_deviation(driven, prepared.frames, prepared.heads, driven.scene)]
+    return BakeResult(action, prepared.frames, prepared.fit.scale, prepared.fit.slides, messages)
 
 
-def _told(driven: Driven, options: BakeOptions) -> list[str]:
+def _describe_rig(driven: DrivenRig, options: BakeOptions) -> list[str]:
     """Describe what the user has to know about this rig."""
     lines = []
     if driven.controls.switches:
@@ -116,12 +116,12 @@ def _told(driven: Driven, options: BakeOptions) -> list[str]:
               if any(bones[bone].lock_rotation) or part in ("hips", "root") and any(bones[bone].lock_location)]
     if locked:
         lines.append(f"locked channels were keyed on {', '.join(locked[:4])}")
-    if driven.controls.loose:
-        lines.append(f"{', '.join(driven.controls.loose[:4])}: carried by more than one bone, may be inaccurate")
+    if driven.controls.unreliable:
+        lines.append(f"{', '.join(driven.controls.unreliable[:4])}: carried by more than one bone, may be inaccurate")
     return lines
 
 
-def _off(driven: Driven, frames: np.ndarray, heads: np.ndarray, scene: bpy.types.Scene) -> list[str]:
+def _describe_deviation(driven: DrivenRig, frames: np.ndarray, heads: np.ndarray, scene: bpy.types.Scene) -> list[str]:
     """Describe where Blender poses the rig differently from the computed pose, checked on a few frames."""
     now, subframe, worst, where = scene.frame_current, scene.frame_subframe, 0.0, ""
     for i in np.unique(np.linspace(0, len(frames) - 1, 4).astype(int)):
@@ -132,16 +132,16 @@ def _off(driven: Driven, frames: np.ndarray, heads: np.ndarray, scene: bpy.types
             if off > worst:
                 worst, where = off, bone
     scene.frame_set(now, subframe=subframe)
-    if worst > _OFF:
+    if worst > _REPORTED_DISTANCE:
         return [f"{where} is up to {1000 * worst:.0f} mm from its computed position; check the rig's constraints"]
     return []
 
 
-def record_before(rig: bpy.types.Object, driven: Driven) -> dict:
+def record_previous_state(rig: bpy.types.Object, driven: DrivenRig) -> dict:
     """Record the rig's state for `remove_bake`; while an earlier bake is still on, the state recorded with it."""
-    playing, slot = channels.playing(rig)
-    if playing is not None and playing.get(MARK) and BEFORE in playing:
-        return json.loads(playing[BEFORE])
+    playing, slot = channels.find_playing_action(rig)
+    if playing is not None and playing.get(MARK) and PREVIOUS_STATE in playing:
+        return json.loads(playing[PREVIOUS_STATE])
     bones = rig.pose.bones
     return {
         "action": playing.name if playing else "", "slot": slot.identifier if slot else "",
@@ -152,19 +152,19 @@ def record_before(rig: bpy.types.Object, driven: Driven) -> dict:
     }
 
 
-def note_keys(rig: bpy.types.Object) -> None:
+def record_keys(rig: bpy.types.Object) -> None:
     """Record the keys of the action that the rig plays as the baked ones."""
-    channels.playing(rig)[0][KEYS] = _digest(rig)
+    channels.find_playing_action(rig)[0][KEYS] = _compute_key_digest(rig)
 
 
-def is_as_baked(rig: bpy.types.Object) -> bool:
+def has_baked_keys(rig: bpy.types.Object) -> bool:
     """Whether the keys of the baked action that the rig plays are unchanged."""
-    return channels.playing(rig)[0].get(KEYS) == _digest(rig)
+    return channels.find_playing_action(rig)[0].get(KEYS) == _compute_key_digest(rig)
 
 
-def _digest(rig: bpy.types.Object) -> str:
+def _compute_key_digest(rig: bpy.types.Object) -> str:
     parts: list = []
-    for place, curve in sorted(channels.curves(*channels.playing(rig)).items()):
+    for place, curve in sorted(channels.collect_curves(*channels.find_playing_action(rig)).items()):
         points = np.empty(2 * len(curve.keyframe_points), np.float32)
         curve.keyframe_points.foreach_get("co", points)
         parts += [repr(place), points]
@@ -173,10 +173,10 @@ def _digest(rig: bpy.types.Object) -> str:
 
 def keep_edited_bake(rig: bpy.types.Object) -> list[str]:
     """Keep a baked action with edited keys as the user's own; returns a message about it."""
-    playing, _ = channels.playing(rig)
-    if playing is None or not playing.get(MARK) or is_as_baked(rig):
+    playing, _ = channels.find_playing_action(rig)
+    if playing is None or not playing.get(MARK) or has_baked_keys(rig):
         return []
-    for name in (MARK, BEFORE, KEYS):
+    for name in (MARK, PREVIOUS_STATE, KEYS):
         if name in playing:
             del playing[name]
     return [f"the previous bake has edited keys and is kept as the action {playing.name}"]
@@ -184,12 +184,12 @@ def keep_edited_bake(rig: bpy.types.Object) -> list[str]:
 
 def remove_bake(rig: bpy.types.Object) -> None:
     """Remove a baked action from a rig and the file and restore the rig's state; InputError where it plays none."""
-    playing, _ = channels.playing(rig) if rig is not None else (None, None)
+    playing, _ = channels.find_playing_action(rig) if rig is not None else (None, None)
     if playing is None or not playing.get(MARK):
         raise InputError(f"rig {rig.name if rig else ''}", "plays no baked action", "a baked rig",
                          "press Bake to Rig first")
-    channels.check_free(rig)
-    before = json.loads(playing.get(BEFORE, "{}"))
+    channels.check_editable(rig)
+    before = json.loads(playing.get(PREVIOUS_STATE, "{}"))
     rig.animation_data.action = None
     if playing.users - playing.use_fake_user == 0:
         bpy.data.actions.remove(playing)
@@ -205,5 +205,5 @@ def remove_bake(rig: bpy.types.Object) -> None:
             rig.pose.bones[bone].constraints[name].influence = value
     found = bpy.data.actions.get(before.get("action", ""))
     if found is not None:
-        slot = next((slot for slot in found.slots if slot.identifier == before.get("slot")), None)
-        channels.assign(rig, found, slot)
+        slot = next((slot for slot in found.count_slots if slot.identifier == before.get("slot")), None)
+        channels.assign_action(rig, found, slot)

@@ -6,37 +6,37 @@ import bmesh
 import bpy
 import numpy as np
 
-from ...beyond_mocap.base.time_series import interpolate
+from ...beyond_mocap.base.time_series import interpolate_columns
 from ...beyond_mocap.motion import quaternion
 from ...beyond_mocap.motion.track.ball_path import BallPath
 from ..core import channels
-from ..core.material import colour
+from ..core.material import get_material
 from ..core.measure import frames_per_second, units_per_metre, whole_frames
 
 RADIUS = 0.11  # metres, Laws of the Game: circumference 0.68 to 0.70 m
 ROLLING_BELOW = 0.16  # metres, height of the centre up to which the ball rolls on the ground
 
 
-def create(context: bpy.types.Context, name: str, collection, radius: float = RADIUS) -> bpy.types.Object:
+def create_ball(context: bpy.types.Context, name: str, collection, radius: float = RADIUS) -> bpy.types.Object:
     """Create a ball of `radius` metres in a collection, with dark patches where a football has its pentagons."""
     mesh = bpy.data.meshes.new(name)
     shape = bmesh.new()
     bmesh.ops.create_icosphere(shape, subdivisions=4, radius=radius * units_per_metre(context.scene))
-    patches = _pentagons()
+    patches = _build_pentagons()
     for face in shape.faces:
         face.smooth = True
         face.material_index = int(np.max(patches @ np.array(face.normal)) > 0.94)
     shape.to_mesh(mesh)
     shape.free()
-    mesh.materials.append(colour("Ball white", (0.9, 0.9, 0.9), 0.4))
-    mesh.materials.append(colour("Ball black", (0.01, 0.01, 0.012), 0.4))
+    mesh.materials.append(get_material("Ball white", (0.9, 0.9, 0.9), 0.4))
+    mesh.materials.append(get_material("Ball black", (0.01, 0.01, 0.012), 0.4))
     ball = bpy.data.objects.new(name, mesh)
     ball.rotation_mode = "QUATERNION"
     collection.objects.link(ball)
     return ball
 
 
-def write(ball: bpy.types.Object, path: BallPath, scene: bpy.types.Scene, start: float) -> bpy.types.Action:
+def write_trajectory(ball: bpy.types.Object, path: BallPath, scene: bpy.types.Scene, start: float) -> bpy.types.Action:
     """Bake the ball's trajectory and roll with a key on every whole scene frame.
 
     Args:
@@ -51,22 +51,22 @@ def write(ball: bpy.types.Object, path: BallPath, scene: bpy.types.Scene, start:
     seconds = path.times - path.times[0]
     frames = whole_frames(start, float(seconds[-1]), fps)
     at = (frames - start) / fps
-    places = interpolate(at, seconds, path.positions)
+    places = interpolate_columns(at, seconds, path.positions)
     group = "Object Transforms"
     curves = {"location": (group, places * units_per_metre(scene)),
-              "rotation_quaternion": (group, rolling(places) if path.rotations is None else _turned(path, at))}
-    return channels.animate(ball, f"{ball.name} path", frames, curves)
+              "rotation_quaternion": (group, compute_roll(places) if path.rotations is None else _sample_rotations(path, at))}
+    return channels.create_action(ball, f"{ball.name} path", frames, curves)
 
 
-def _turned(path: BallPath, at: np.ndarray) -> np.ndarray:
+def _sample_rotations(path: BallPath, at: np.ndarray) -> np.ndarray:
     """Interpolate the rotations (F, 4) of a path that has its own, at seconds (F,) after its first sample."""
     seconds = path.times - path.times[0]
     after = np.clip(np.searchsorted(seconds, at), 1, len(seconds) - 1)
     share = np.clip((at - seconds[after - 1]) / (seconds[after] - seconds[after - 1]), 0.0, 1.0)
-    return quaternion.continuous(quaternion.slerp(path.rotations[after - 1], path.rotations[after], share))
+    return quaternion.unify_signs(quaternion.slerp(path.rotations[after - 1], path.rotations[after], share))
 
 
-def rolling(places: np.ndarray) -> np.ndarray:
+def compute_roll(places: np.ndarray) -> np.ndarray:
     """Compute the rotations of a ball that rolls on the ground; in the air it keeps its rotation per frame.
 
     Args:
@@ -75,16 +75,16 @@ def rolling(places: np.ndarray) -> np.ndarray:
         (F, 4) quaternions.
     """
     step = np.diff(places, axis=0)
-    turn = np.stack([-step[:, 1], step[:, 0], np.zeros(len(step))], axis=1) / RADIUS  # up x step: rotation vectors
+    rotation_steps = np.stack([-step[:, 1], step[:, 0], np.zeros(len(step))], axis=1) / RADIUS  # up x step: rotation vectors
     for i in np.flatnonzero(places[1:, 2] > ROLLING_BELOW):
-        turn[i] = turn[i - 1] if i else turn[i]
+        rotation_steps[i] = rotation_steps[i - 1] if i else rotation_steps[i]
     out = quaternion.identity(len(places))
-    for i, spin in enumerate(quaternion.from_rotation_vector(turn)):
+    for i, spin in enumerate(quaternion.from_rotation_vector(rotation_steps)):
         out[i + 1] = quaternion.multiply(spin, out[i])
-    return quaternion.continuous(quaternion.normalized(out))
+    return quaternion.unify_signs(quaternion.normalize(out))
 
 
-def _pentagons() -> np.ndarray:
+def _build_pentagons() -> np.ndarray:
     """Return the directions (12, 3) of a football's pentagons: the corners of an icosahedron."""
     golden = (1.0 + 5.0**0.5) / 2.0
     corners = [(0.0, a, b * golden) for a in (-1.0, 1.0) for b in (-1.0, 1.0)]

@@ -8,16 +8,16 @@ import bpy
 import numpy as np
 
 from ..core import channels
-from ..core.material import colour
+from ..core.material import get_material
 from ..core.measure import units_per_metre
 
 NAME = "Stage"
 FOCUS = "Stage focus"
 MARK = "beyond_mocap_focus"
-OURS = "beyond_mocap_stage"
+STAGE_MARK = "beyond_mocap_stage"
 """Custom property of the collection and of everything that `create_stage` adds to it."""
 
-EARLIER = {"Grass", "Lines", "Sun", "Camera", FOCUS}  # objects of stages in older files, without that property
+OLDER_NAMES = {"Grass", "Lines", "Sun", "Camera", FOCUS}  # objects of stages in older files, without that property
 HALF_WIDTH = 0.36  # metres to either side that the camera shows with some margin, for each metre of distance
 CAMERA_FROM = (-1.5, -8.5, 1.3)  # metres from the focus: from the touchline, a little above the players' heads
 
@@ -28,34 +28,34 @@ MESH, CORD = 0.15, 0.003  # metres between the net's cords, and half a cord's wi
 BEYOND = 6.0  # metres of grass beyond the lines
 
 
-def create(context: bpy.types.Context, camera: bool = True) -> bpy.types.Collection:
+def create_stage(context: bpy.types.Context, camera: bool = True) -> bpy.types.Collection:
     """Create the collection "Stage" with pitch, sun and, if wanted, a camera; an older stage is removed first."""
     scene = context.scene
-    remove(scene)
+    remove_stage(scene)
     stage = bpy.data.collections.new(NAME)
     scene.collection.children.link(stage)
     units = units_per_metre(scene)
-    lay_grass(stage, units)
-    lay_lines(stage, units)
-    sun(stage)
+    create_grass(stage, units)
+    create_lines(stage, units)
+    create_sun(stage)
     if camera:
-        scene.camera = _camera(stage, units)
+        scene.camera = _create_camera(stage, units)
     for thing in (stage, *stage.objects):
-        thing[OURS] = True
+        thing[STAGE_MARK] = True
     if scene.world is None:
-        scene.world = sky()
+        scene.world = create_sky()
     return stage
 
 
-def remove(scene: bpy.types.Scene) -> None:
+def remove_stage(scene: bpy.types.Scene) -> None:
     """Remove the stage with the meshes, lights and cameras that only it used.
 
     Objects that the user added to its collection stay, and so does another collection of that name.
     """
-    stage = _stage(scene)
+    stage = _find_stage(scene)
     if stage is None:
         return
-    for thing in _own(stage):
+    for thing in _list_own_objects(stage):
         data = thing.data
         bpy.data.objects.remove(thing)
         if data is not None and not data.users:
@@ -64,13 +64,13 @@ def remove(scene: bpy.types.Scene) -> None:
         bpy.data.collections.remove(stage)
 
 
-def focus(scene: bpy.types.Scene) -> bpy.types.Object | None:
+def find_focus(scene: bpy.types.Scene) -> bpy.types.Object | None:
     """Return the empty that the stage's camera is attached to; None where there is no such camera."""
-    stage = _stage(scene)
+    stage = _find_stage(scene)
     return stage.objects.get(FOCUS) if stage else None
 
 
-def follow(scene: bpy.types.Scene, frames: np.ndarray, places: np.ndarray, reach: np.ndarray) -> None:
+def animate_camera(scene: bpy.types.Scene, frames: np.ndarray, places: np.ndarray, reach: np.ndarray) -> None:
     """Animate the stage's camera to follow the players at a sufficient distance; nothing happens without such a camera.
 
     The camera is a child of an empty, whose scale is its distance.
@@ -81,27 +81,27 @@ def follow(scene: bpy.types.Scene, frames: np.ndarray, places: np.ndarray, reach
         places: (F, 2) metres, the middle of what should be visible.
         reach: (F,) metres from there to the farthest player.
     """
-    target = focus(scene)
+    target = find_focus(scene)
     if target is None:
         return
     path = np.column_stack([places * units_per_metre(scene), np.full(len(frames), target.location.z)])
     distance = np.maximum(1.0, reach / (HALF_WIDTH * np.linalg.norm(CAMERA_FROM)))
     group = "Object Transforms"
     curves = {"location": (group, path), "scale": (group, np.repeat(distance[:, None], 3, axis=1))}
-    channels.discard(target, MARK)
-    channels.animate(target, FOCUS, frames, curves)[MARK] = True
+    channels.remove_marked_action(target, MARK)
+    channels.create_action(target, FOCUS, frames, curves)[MARK] = True
 
 
-def sun(collection) -> bpy.types.Object:
+def create_sun(collection) -> bpy.types.Object:
     """Create daylight from above, slightly from the side."""
     light = bpy.data.lights.new("Sun", "SUN")
-    light.energy, light.angle = 2.8, 0.03
-    thing = place_object(collection, "Sun", light)
+    light.compute_energy, light.angle = 2.8, 0.03
+    thing = create_object(collection, "Sun", light)
     thing.rotation_euler = (0.75, 0.25, 0.5)
     return thing
 
 
-def sky() -> bpy.types.World:
+def create_sky() -> bpy.types.World:
     """Create a world of pale blue."""
     world = bpy.data.worlds.new("Sky")
     if world.node_tree is None:
@@ -112,50 +112,50 @@ def sky() -> bpy.types.World:
     return world
 
 
-def lay_grass(collection, units: float, size: tuple[float, float] = SIZE) -> bpy.types.Object:
+def create_grass(collection, units: float, size: tuple[float, float] = SIZE) -> bpy.types.Object:
     """Create mown grass in stripes, a little larger than a pitch of `size` (length, width) metres."""
     x, y = (size[0] / 2 + BEYOND) * units, (size[1] / 2 + BEYOND) * units
     stripes = np.linspace(-x, x, 25)
     corners = [(a, b, 0.0) for a in stripes for b in (-y, y)]
     faces = [(2 * i, 2 * i + 2, 2 * i + 3, 2 * i + 1) for i in range(len(stripes) - 1)]
-    mesh = _mesh("Grass", corners, faces)
-    mesh.materials.append(colour("Grass", (0.055, 0.16, 0.035), 0.95))
-    mesh.materials.append(colour("Grass mown", (0.07, 0.195, 0.045), 0.95))
+    mesh = _create_mesh("Grass", corners, faces)
+    mesh.materials.append(get_material("Grass", (0.055, 0.16, 0.035), 0.95))
+    mesh.materials.append(get_material("Grass mown", (0.07, 0.195, 0.045), 0.95))
     mesh.polygons.foreach_set("material_index", np.arange(len(faces), dtype=np.int32) % 2)
-    return place_object(collection, "Grass", mesh)
+    return create_object(collection, "Grass", mesh)
 
 
-def lay_lines(collection, units: float, size: tuple[float, float] = SIZE) -> bpy.types.Object:
+def create_lines(collection, units: float, size: tuple[float, float] = SIZE) -> bpy.types.Object:
     """Create all markings as ribbons a few millimetres above the grass, each a little higher to avoid z-fighting."""
     corners, faces = [], []
-    for number, stroke in enumerate(_strokes(*size)):
+    for number, stroke in enumerate(_build_strokes(*size)):
         height = 0.004 + 0.0004 * number
         first = len(corners)
-        corners += [((*corner, height)) for corner in _ribbon(np.array(stroke, float))]
+        corners += [((*corner, height)) for corner in _build_ribbon(np.array(stroke, float))]
         faces += [(i, i + 1, i + 3, i + 2) for i in range(first, len(corners) - 2, 2)]
-    mesh = _mesh("Lines", np.array(corners) * units, faces)
-    mesh.materials.append(colour("Line white", (0.85, 0.85, 0.85), 0.9))
-    return place_object(collection, "Lines", mesh)
+    mesh = _create_mesh("Lines", np.array(corners) * units, faces)
+    mesh.materials.append(get_material("Line white", (0.85, 0.85, 0.85), 0.9))
+    return create_object(collection, "Lines", mesh)
 
 
-def set_goals(collection, units: float, length: float = SIZE[0]) -> list[bpy.types.Object]:
+def create_goals(collection, units: float, length: float = SIZE[0]) -> list[bpy.types.Object]:
     """Create both goals of a pitch of `length` metres: posts and bar with the net behind, one shared mesh each."""
-    frame = _tubes(_frame())
-    frame.materials.append(colour("Goal white", (0.9, 0.9, 0.9), 0.35))
-    net = _cords(_net())
-    net.materials.append(colour("Net white", (0.75, 0.75, 0.75), 0.9))
-    made = []
+    frame = _create_tubes(_build_goal_frame())
+    frame.materials.append(get_material("Goal white", (0.9, 0.9, 0.9), 0.35))
+    net = _create_cords(_build_net())
+    net.materials.append(get_material("Net white", (0.75, 0.75, 0.75), 0.9))
+    objects = []
     for side, turn in (("right", 0.0), ("left", np.pi)):
         for mesh, name in ((frame, f"Goal {side}"), (net, f"Net {side}")):
-            thing = place_object(collection, name, mesh)
+            thing = create_object(collection, name, mesh)
             thing.location.x = (length / 2 if turn == 0.0 else -length / 2) * units
             thing.rotation_euler.z = turn
             thing.scale = (units,) * 3
-            made.append(thing)
-    return made
+            objects.append(thing)
+    return objects
 
 
-def place_object(collection, name: str, data) -> bpy.types.Object:
+def create_object(collection, name: str, data) -> bpy.types.Object:
     """Create an object in a collection; meshes are not selectable in the view."""
     thing = bpy.data.objects.new(name, data)
     thing.hide_select = data is not None and isinstance(data, bpy.types.Mesh)
@@ -163,57 +163,57 @@ def place_object(collection, name: str, data) -> bpy.types.Object:
     return thing
 
 
-def _stage(scene: bpy.types.Scene) -> bpy.types.Collection | None:
+def _find_stage(scene: bpy.types.Scene) -> bpy.types.Collection | None:
     """Find the collection of `create_stage`, of this or an earlier version."""
-    found = next((one for one in scene.collection.children if one.get(OURS) and one.library is None), None)
+    found = next((one for one in scene.collection.children if one.get(STAGE_MARK) and one.library is None), None)
     if found is not None:
         return found
-    named = scene.collection.children.get(NAME)
-    return named if named is not None and _own(named) else None
+    by_name = scene.collection.children.get(NAME)
+    return by_name if by_name is not None and _list_own_objects(by_name) else None
 
 
-def _own(stage: bpy.types.Collection) -> list[bpy.types.Object]:
+def _list_own_objects(stage: bpy.types.Collection) -> list[bpy.types.Object]:
     """List the objects that `create_stage` added to a collection."""
-    if stage.get(OURS):
-        return [thing for thing in stage.objects if thing.get(OURS)]
-    named = {thing: thing.name.split(".")[0] for thing in stage.objects}
-    whole = {"Grass", "Lines"} <= set(named.values())
-    return [thing for thing, name in named.items() if whole and name in EARLIER]
+    if stage.get(STAGE_MARK):
+        return [thing for thing in stage.objects if thing.get(STAGE_MARK)]
+    base_names = {thing: thing.name.split(".")[0] for thing in stage.objects}
+    whole = {"Grass", "Lines"} <= set(base_names.values())
+    return [thing for thing, name in base_names.items() if whole and name in OLDER_NAMES]
 
 
-def _camera(stage, units: float) -> bpy.types.Object:
+def _create_camera(stage, units: float) -> bpy.types.Object:
     """Create the camera with the empty that it looks at and moves with."""
-    focus = place_object(stage, FOCUS, None)
+    focus = create_object(stage, FOCUS, None)
     focus.empty_display_size = 0.5 * units
     focus.location = (0.0, 0.0, 0.9 * units)
     data = bpy.data.cameras.new("Camera")
     data.lens, data.clip_end = 40.0, 1000.0 * units
-    camera = place_object(stage, "Camera", data)
+    camera = create_object(stage, "Camera", data)
     camera.parent = focus
     camera.location = [distance * units for distance in CAMERA_FROM]
     look = camera.constraints.new("TRACK_TO")
     look.target = focus
-    look.track_axis, look.up_axis = "TRACK_NEGATIVE_Z", "UP_Y"
+    look.track_axis, look.detect_up_axis = "TRACK_NEGATIVE_Z", "UP_Y"
     return camera
 
 
-def _strokes(length: float, width: float) -> list:
+def _build_strokes(length: float, width: float) -> list:
     """Build the centre lines of all markings, each a list of points (x, y) in metres."""
     x, y, spot = length / 2, width / 2, LINE_WIDTH / 2
-    strokes = [_box(-x, -y, x, y), [(0, -y), (0, y)], _arc((0, 0), 9.15, 0, 360), _arc((0, 0), spot, 0, 360)]
+    strokes = [_build_box(-x, -y, x, y), [(0, -y), (0, y)], _build_arc((0, 0), 9.15, 0, 360), _build_arc((0, 0), spot, 0, 360)]
     for side in (-1, 1):
         goal, mark, inward = side * x, side * (x - 11.0), 180 if side > 0 else 0
         for half_width, depth in ((20.16, 16.5), (9.16, 5.5)):
             front = goal - side * depth
             strokes.append([(goal, half_width), (front, half_width), (front, -half_width), (goal, -half_width)])
-        strokes += [_arc((mark, 0), 9.15, inward - 53, inward + 53), _arc((mark, 0), spot, 0, 360)]
+        strokes += [_build_arc((mark, 0), 9.15, inward - 53, inward + 53), _build_arc((mark, 0), spot, 0, 360)]
         for touch in (-1, 1):
             middle = np.degrees(np.arctan2(-touch, -side))
-            strokes.append(_arc((goal, touch * y), 1.0, middle - 45, middle + 45))
+            strokes.append(_build_arc((goal, touch * y), 1.0, middle - 45, middle + 45))
     return strokes
 
 
-def _ribbon(points: np.ndarray) -> np.ndarray:
+def _build_ribbon(points: np.ndarray) -> np.ndarray:
     """Build left and right edges, alternating, of a line along points (N, 2), mitred at its corners: (2 N, 2)."""
     along = np.diff(points, axis=0)
     along /= np.linalg.norm(along, axis=1, keepdims=True)
@@ -226,23 +226,23 @@ def _ribbon(points: np.ndarray) -> np.ndarray:
     return np.stack([points + across * LINE_WIDTH / 2, points - across * LINE_WIDTH / 2], axis=1).reshape(-1, 2)
 
 
-def _box(x0, y0, x1, y1):
+def _build_box(x0, y0, x1, y1):
     return [(x0, y0), (x1, y0), (x1, y1), (x0, y1), (x0, y0)]
 
 
-def _arc(centre, radius, start, end):
+def _build_arc(centre, radius, start, end):
     angles = np.radians(np.linspace(start, end, max(8, int((end - start) / 6)) + 1))
     return [(centre[0] + radius * np.cos(a), centre[1] + radius * np.sin(a)) for a in angles]
 
 
-def _frame() -> list[tuple[np.ndarray, np.ndarray]]:
+def _build_goal_frame() -> list[tuple[np.ndarray, np.ndarray]]:
     """Build posts and bar of the goal at x = 0 that opens towards -x: the ends of their centre lines, metres."""
     y, z = GOAL / 2 + POST, BAR + POST
     ends = [((0, -y, 0), (0, -y, z)), ((0, y, 0), (0, y, z)), ((0, -y - POST, z), (0, y + POST, z))]
     return [(np.array(a, float), np.array(b, float)) for a, b in ends]
 
 
-def _net() -> list[tuple[np.ndarray, np.ndarray]]:
+def _build_net() -> list[tuple[np.ndarray, np.ndarray]]:
     """Build the net's cords behind that goal, as ends (3,) metres: roof, back and both sides."""
     y, z = GOAL / 2 + POST, BAR
     roof, floor = np.array([ROOF, 0, z]), np.array([FLOOR, 0, 0])
@@ -264,35 +264,35 @@ def _net() -> list[tuple[np.ndarray, np.ndarray]]:
     return cords
 
 
-def _tubes(ends, sides: int = 12) -> bpy.types.Mesh:
+def _create_tubes(ends, sides: int = 12) -> bpy.types.Mesh:
     """Create round tubes of a post's radius between pairs of ends."""
     corners, faces = [], []
     angles = 2.0 * np.pi * np.arange(sides) / sides
     for low, high in ends:
-        first, second = _across(high - low)
+        first, second = _find_perpendiculars(high - low)
         circle = POST * (np.cos(angles)[:, None] * first + np.sin(angles)[:, None] * second)
         start = len(corners)
         corners += [*(low + circle), *(high + circle)]
         faces += [(start + i, start + (i + 1) % sides, start + sides + (i + 1) % sides, start + sides + i)
                   for i in range(sides)]
         faces += [tuple(start + i for i in reversed(range(sides))), tuple(start + sides + i for i in range(sides))]
-    mesh = _mesh("Goal", np.array(corners), faces)
+    mesh = _create_mesh("Goal", np.array(corners), faces)
     mesh.polygons.foreach_set("use_smooth", np.array([len(face) == 4 for face in faces]))
     return mesh
 
 
-def _cords(ends) -> bpy.types.Mesh:
+def _create_cords(ends) -> bpy.types.Mesh:
     """Create thin crossed ribbons between pairs of ends, visible from all directions."""
     corners, faces = [], []
     for low, high in ends:
-        for aside in _across(high - low):
+        for aside in _find_perpendiculars(high - low):
             start = len(corners)
             corners += [low - CORD * aside, low + CORD * aside, high + CORD * aside, high - CORD * aside]
             faces.append(tuple(range(start, start + 4)))
-    return _mesh("Net", np.array(corners), faces)
+    return _create_mesh("Net", np.array(corners), faces)
 
 
-def _across(along: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _find_perpendiculars(along: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return two unit vectors at right angles to `along` (3,) and to each other."""
     along = along / np.linalg.norm(along)
     first = np.cross(along, [0.0, 0.0, 1.0] if abs(along[2]) < 0.9 else [1.0, 0.0, 0.0])
@@ -300,7 +300,7 @@ def _across(along: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return first, np.cross(along, first)
 
 
-def _mesh(name: str, corners, faces) -> bpy.types.Mesh:
+def _create_mesh(name: str, corners, faces) -> bpy.types.Mesh:
     mesh = bpy.data.meshes.new(name)
     mesh.from_pydata(np.asarray(corners).tolist(), [], faces)
     return mesh

@@ -19,91 +19,91 @@ from ...beyond_mocap.motion import quaternion
 from ...beyond_mocap.motion.motion import Motion
 from ...beyond_mocap.motion.skeleton import Skeleton
 from ...beyond_mocap.passes.hits import HitMotion
-from ...beyond_mocap.passes.stream.bvh_stream import hierarchy_of
-from ...beyond_mocap.passes.stream.listener import Listener, poses
+from ...beyond_mocap.passes.stream.bvh_stream import read_hierarchy
+from ...beyond_mocap.passes.stream.listener import Listener, convert_poses
 from ...beyond_mocap.passes.stream.live_hits import LiveHits
 from ..core import action, window
-from ..core.live import Watcher, attempt
+from ..core.live import Watcher, call_or_describe
 from ..core.measure import frames_per_second
 from ..result import bake
 from ..rigs import armature
 from ..stage import body
 
 TICK, IDLE = 1.0 / 60.0, 0.25  # s between two timer calls, with and without a stream
-TOLD_EVERY, LOOKED_EVERY = 0.25, 0.1  # s between two status updates, and two hit detections
+STATUS_SECONDS, DETECT_SECONDS = 0.25, 0.1  # s between two status updates, and two hit detections
 MOST_BODIES = 20  # characters created in one stream: a sender that keeps changing its skeleton is stopped
 
 MARK = "beyond_mocap_stream"
 SHIRT = (0.55, 0.55, 0.58)
 
-_held: dict[str, object] = {}
+_session: dict[str, object] = {}
 _state = {"seen": 0, "told": 0.0, "looked": 0.0, "bodies": 0}
-_shown: deque[float] = deque(maxlen=60)
+_latencies: deque[float] = deque(maxlen=60)
 _on_hit: list = []
 _on_look: list = []
 
 
-def on_hit(call) -> None:
+def add_hit_call(call) -> None:
     """Call `call(scene, hit, seconds)` for every detected strike, until `remove_call`."""
     _on_hit.append(call)
 
 
-def on_look(call) -> None:
+def add_update_call(call) -> None:
     """Call `call(scene)` at every update, until `remove_call`."""
     _on_look.append(call)
 
 
-def forget(call) -> None:
+def remove_call(call) -> None:
     """Stop calling `call`."""
     for calls in (_on_hit, _on_look):
         if call in calls:
             calls.remove(call)
 
 
-def began() -> None:
+def reset_status() -> None:
     """Reset the status for a stream that has started."""
     _state.update(seen=0, told=0.0, looked=0.0, bodies=0)
-    _shown.clear()
-    tell()
+    _latencies.clear()
+    write_status()
 
 
-def look(scene: bpy.types.Scene) -> HitMotion | None:
+def update_stream(scene: bpy.types.Scene) -> HitMotion | None:
     """Show what has arrived in a scene, update the status, and return the strike that was just detected, if any."""
     listener = current_listener()
-    found = _receive(scene, listener) if listener is not None else None
+    found = _receive_frames(scene, listener) if listener is not None else None
     for call in list(_on_look):
         call(scene)
     return found
 
 
-def _receive(scene: bpy.types.Scene, listener: Listener) -> HitMotion | None:
+def _receive_frames(scene: bpy.types.Scene, listener: Listener) -> HitMotion | None:
     """Pose the character by the latest frame, detect hits, and update the status."""
     now = time.monotonic()
-    latest = listener.latest()
+    latest = listener.latest_frame()
     if latest is not None and latest.number != _state["seen"]:
         _state["seen"] = latest.number
-        if _show(scene, listener, latest) == "posed":
-            _shown.append(time.monotonic() - (latest.time if latest.sent is None else latest.sent))
+        if _show_frame(scene, listener, latest) == "posed":
+            _latencies.append(time.monotonic() - (latest.time if latest.sent is None else latest.sent))
         if current_listener() is None:  # the stream has been stopped
             return None
     found = None
-    if now - _state["looked"] >= LOOKED_EVERY:
+    if now - _state["looked"] >= DETECT_SECONDS:
         _state["looked"] = now
-        found = _hit(scene)
-    if now - _state["told"] >= TOLD_EVERY:
+        found = _detect_hit(scene)
+    if now - _state["told"] >= STATUS_SECONDS:
         _state["told"] = now
-        tell()
+        write_status()
     return found
 
 
-def _show(scene, listener: Listener, latest) -> str:
+def _show_frame(scene, listener: Listener, latest) -> str:
     """Pose the streamed character.
 
     Returns:
         "posed", "made" if it was created first, or "" if it could not be created.
     """
-    settings, (skeleton, root, rotations) = scene.beyond_mocap_stream, poses([latest])
-    made = "posed"
+    settings, (skeleton, root, rotations) = scene.beyond_mocap_stream, convert_poses([latest])
+    result = "posed"
     if not can_show(settings.body, scene, skeleton):
         if _state["bodies"] >= MOST_BODIES:
             _give_up(f"The skeleton has changed {MOST_BODIES} times, so the stream is stopped: check the sender")
@@ -113,15 +113,15 @@ def _show(scene, listener: Listener, latest) -> str:
         # one undo step, so that undo does not remove the new character silently
         if not bpy.app.background:
             bpy.ops.ed.undo_push(message="Streamed Character")
-        made = "made"
+        result = "made"
     pose_body(settings.body, scene, skeleton, root[0], rotations[0])
-    return made
+    return result
 
 
-def _hit(scene) -> HitMotion | None:
+def _detect_hit(scene) -> HitMotion | None:
     """Detect a strike, show it in the panel and pass it on."""
     try:
-        found = _held["hits"].look()
+        found = _session["hits"].look()
     except BeyondMocapError as error:
         bpy.context.window_manager.beyond_mocap_streaming.hit = str(error)
         return None
@@ -135,50 +135,50 @@ def _hit(scene) -> HitMotion | None:
     return hit
 
 
-def tell() -> None:
+def write_status() -> None:
     """Write the status of the stream for the panel."""
-    told, listener = bpy.context.window_manager.beyond_mocap_streaming, current_listener()
+    status_texts, listener = bpy.context.window_manager.beyond_mocap_streaming, current_listener()
     if listener is None:
-        told.on, told.state, told.line, told.figures = False, "stopped", "", ""
+        status_texts.on, status_texts.state, status_texts.line, status_texts.figures = False, "stopped", "", ""
         return
-    status = listener.status()
+    status = listener.measure_status()
     lines = [f"Frames: {status.frames}", f"Frame Rate: {status.rate:.0f}"]
-    if _shown and status.state == "receiving":
-        what = "Latency" if status.way is not None else "Latency, from Arrival"
-        lines.append(f"{what}: {1000.0 * statistics.median(_shown):.0f} ms")
-    if status.rubbish:
-        lines.append(f"Invalid Pieces: {status.rubbish}")
-    told.on, told.state, told.line, told.figures = True, status.state, status.line, "\n".join(lines)
+    if _latencies and status.state == "receiving":
+        latency_name = "Latency" if status.delay is not None else "Latency, from Arrival"
+        lines.append(f"{latency_name}: {1000.0 * statistics.median(_latencies):.0f} ms")
+    if status.invalid_count:
+        lines.append(f"Invalid Pieces: {status.invalid_count}")
+    status_texts.on, status_texts.state, status_texts.line, status_texts.figures = True, status.state, status.line, "\n".join(lines)
 
 
-def _give_up(why: str) -> None:
+def _give_up(reason: str) -> None:
     """Stop the stream because of an error; its message stays."""
     stop_listening()
-    tell()
-    told = bpy.context.window_manager.beyond_mocap_streaming
-    told.state, told.line = "failed", why
+    write_status()
+    status_texts = bpy.context.window_manager.beyond_mocap_streaming
+    status_texts.state, status_texts.line = "failed", reason
 
 
-def _tick() -> float:
+def _run_timer() -> float:
     """Update the stream, and return the seconds until the next call."""
     if current_listener() is None and not _on_look:
         if bpy.context.window_manager.beyond_mocap_streaming.on:
-            tell()
-            window.redraw()
+            write_status()
+            window.redraw_editors()
         return IDLE
     if bpy.app.is_job_running("RENDER"):
         return IDLE
-    before = (told := bpy.context.window_manager.beyond_mocap_streaming).figures, told.played
+    before = (status_texts := bpy.context.window_manager.beyond_mocap_streaming).figures, status_texts.played
     for shown in bpy.context.window_manager.windows[:1]:
         with bpy.context.temp_override(window=shown):
-            attempt(lambda: look(shown.scene), _give_up, "The stream has stopped because of an error")
-    told = bpy.context.window_manager.beyond_mocap_streaming
-    if (told.figures, told.played) != before:
-        window.redraw()
+            call_or_describe(lambda: update_stream(shown.scene), _give_up, "The stream has stopped because of an error")
+    status_texts = bpy.context.window_manager.beyond_mocap_streaming
+    if (status_texts.figures, status_texts.played) != before:
+        window.redraw_editors()
     return TICK
 
 
-def _end() -> None:
+def _end_session() -> None:
     stop_listening()
     _on_hit.clear()
     _on_look.clear()
@@ -192,31 +192,31 @@ def start_listening(settings) -> Listener:
         changed then.
     """
     clip = bpy.path.abspath(settings.clip) if settings.clip else ""
-    hierarchy = hierarchy_of(clip) if clip else None
+    hierarchy = read_hierarchy(clip) if clip else None
     before = current_listener()
     if before is not None:
         raise InputError(f"port {before.port}", "a stream is already received", "one at a time", "press Stop Stream")
     one = Listener(settings.port, settings.protocol, hierarchy, settings.unit or None).start()
-    _held["listener"] = one
-    _held["hits"] = LiveHits(one, settings.part, "" if settings.side == "either" else settings.side,
+    _session["listener"] = one
+    _session["hits"] = LiveHits(one, settings.part, "" if settings.side == "either" else settings.side,
                              settings.threshold or None)
     return one
 
 
 def stop_listening() -> None:
     """Stop listening."""
-    one = _held.pop("listener", None)
-    _held.clear()
+    one = _session.pop("listener", None)
+    _session.clear()
     if one is not None:
         one.stop()
 
 
 def current_listener() -> Listener | None:
     """The listener of the session, or None."""
-    return _held.get("listener")
+    return _session.get("listener")
 
 
-WATCHER = Watcher(name="Stream", look=_tick, closing=stop_listening, ends=_end)
+WATCHER = Watcher(name="Stream", look=_run_timer, closing=stop_listening, ends=_end_session)
 
 
 def can_show(thing: bpy.types.Object | None, scene: bpy.types.Scene, skeleton: Skeleton) -> bool:
@@ -229,9 +229,9 @@ def can_show(thing: bpy.types.Object | None, scene: bpy.types.Scene, skeleton: S
 
 def create_body(context: bpy.types.Context, motion: Motion, name: str = "Stream") -> bpy.types.Object:
     """Create a character with the skeleton of `motion`."""
-    where = bake.collection(context.scene)
-    thing = armature.create(context, motion.skeleton, name, where)
-    body.create(thing, name, SHIRT, collection=where, scene=context.scene, example=motion)
+    where = bake.find_or_create_collection(context.scene)
+    thing = armature.create_armature(context, motion.skeleton, name, where)
+    body.create_character(thing, name, SHIRT, collection=where, scene=context.scene, example=motion)
     thing[MARK] = True
     return thing
 
@@ -250,20 +250,20 @@ def pose_body(
         root: (3,) m, root position.
         local: (J, 4) local rotations.
     """
-    lie, rest = armature.placement_now(thing, scene), armature.rest_rotations(thing, skeleton.names)
+    placement, rest = armature.find_current_placement(thing, scene), armature.compute_rest_rotations(thing, skeleton.names)
     # the object's rotation about the vertical turns the streamed motion with it
-    turn = quaternion.about_up(quaternion.yaw(lie.rotation))
-    root, local = lie.origin + quaternion.rotate(turn, root), np.array(local)
-    local[0] = quaternion.multiply(quaternion.inverse(lie.rotation), quaternion.multiply(turn, local[0]))
+    turn = quaternion.from_up_angle(quaternion.to_yaw(placement.rotation))
+    root, local = placement.origin + quaternion.rotate(turn, root), np.array(local)
+    local[0] = quaternion.multiply(quaternion.inverse(placement.rotation), quaternion.multiply(turn, local[0]))
     # pose rotations are relative to the bones' rest rotations
-    turned = quaternion.multiply(quaternion.inverse(rest), quaternion.multiply(local, rest))
+    pose_rotations = quaternion.multiply(quaternion.inverse(rest), quaternion.multiply(local, rest))
     bones = thing.pose.bones
-    every = np.empty((len(bones), 4), np.float32)
-    bones.foreach_get("rotation_quaternion", every.ravel())
-    every[[bones.find(name) for name in skeleton.names]] = turned
-    bones.foreach_set("rotation_quaternion", every.ravel())
+    all_rotations = np.empty((len(bones), 4), np.float32)
+    bones.foreach_get("rotation_quaternion", all_rotations.ravel())
+    all_rotations[[bones.find(name) for name in skeleton.names]] = pose_rotations
+    bones.foreach_set("rotation_quaternion", all_rotations.ravel())
     top = bones[skeleton.names[0]]
-    shift = lie.to_armature(root) - np.array(top.bone.head_local)
+    shift = placement.to_armature(root) - np.array(top.bone.head_local)
     top.location = quaternion.rotate(quaternion.inverse(rest[0]), shift)  # assigning also makes Blender update
 
 
@@ -272,5 +272,5 @@ def keep_recording(context: bpy.types.Context, motion: Motion, name: str = "Reco
     if motion.duration * frames_per_second(context.scene) < 1.0:
         raise InputError("stream", "less than a frame", "a second or more", "let the stream run for a while")
     thing = create_body(context, motion, name)
-    action.write(thing, motion, context.scene, float(context.scene.frame_current), f"{thing.name} motion")
+    action.write_motion(thing, motion, context.scene, float(context.scene.frame_current), f"{thing.name} motion")
     return thing

@@ -24,13 +24,13 @@ from . import follow
 
 if TYPE_CHECKING:
     from ...beyond_mocap.library.library import Library
-    from ...beyond_mocap.passes.live_passes import Piece, Rally
+    from ...beyond_mocap.passes.live_passes import LivePass, Rally
 
-_held: dict[str, object] = {}
+_session: dict[str, object] = {}
 
 
 @dataclass(frozen=True, eq=False)
-class Begun:
+class NewRally:
     """A rally that is ready to start.
 
     Attributes:
@@ -44,54 +44,54 @@ class Begun:
     rally: Rally
 
 
-def begin(order: make.Order, holder: str, start: float, progress, cancelled) -> Begun:
+def start_rally(order: make.Order, holder: str, start: float, progress, cancelled) -> NewRally:
     """Build the library if it is not loaded, and start a rally with all players standing. Does not use bpy."""
-    from ...beyond_mocap.library.build import build
+    from ...beyond_mocap.library.build import build_library
     from ...beyond_mocap.passes import live_passes
 
     library = order.library
     if library is None:
-        library = build(order.folder, unit=order.unit, **order.build, progress=progress, cancelled=cancelled)
-    return Begun(order, library, live_passes.begin(library, order.scene, holder, start=start, progress=progress,
+        library = build_library(order.folder, unit=order.unit, **order.build, progress=progress, cancelled=cancelled)
+    return NewRally(order, library, live_passes.start_rally(library, order.scene, holder, start=start, progress=progress,
                                                    cancelled=cancelled))
 
 
-def show(scene: bpy.types.Scene, begun: Begun) -> None:
+def apply_rally(scene: bpy.types.Scene, new_rally: NewRally) -> None:
     """Apply a rally to characters and ball, and answer the user's strikes from now on."""
-    stop()
-    make.session.keep_library(begun.library, begun.order.unit)
-    _held.update(scene=scene.session_uid, library=begun.library, rally=begun.rally, seen=None, took=0.0)
+    stop_rally()
+    make.session.store_library(new_rally.library, new_rally.order.unit)
+    _session.update(scene=scene.session_uid, library=new_rally.library, rally=new_rally.rally, seen=None, took=0.0)
     for name in ("strikes", "figures", "told"):
         scene.beyond_mocap_passes.property_unset(name)
     scene.beyond_mocap_passes.made_of = PLAYED
-    _lay(scene, begun.rally, [player.name for player in begun.rally.scene.players])
-    follow.on_hit(struck)
-    follow.on_look(look)
-    _tell(scene)
+    _apply_players(scene, new_rally.rally, [player.name for player in new_rally.rally.scene.players])
+    follow.add_hit_call(store_strike)
+    follow.add_update_call(update_rally)
+    _write_status(scene)
 
 
-def stop() -> None:
+def stop_rally() -> None:
     """Stop answering; what was played stays."""
-    background.stop("live")
-    follow.forget(struck)
-    follow.forget(look)
-    _held.clear()
+    background.cancel_jobs("live")
+    follow.remove_call(store_strike)
+    follow.remove_call(update_rally)
+    _session.clear()
 
 
-def rally() -> Rally | None:
+def current_rally() -> Rally | None:
     """The rally that is being played, or None."""
-    return _held.get("rally")
+    return _session.get("rally")
 
 
-def seconds(scene: bpy.types.Scene) -> float:
+def rally_seconds(scene: bpy.types.Scene) -> float:
     """Compute the scene's time on the rally's clock."""
     return (scene.frame_current_final - scene.beyond_mocap_passes.start_frame) / frames_per_second(scene)
 
 
-def target(scene: bpy.types.Scene) -> str:
+def find_target(scene: bpy.types.Scene) -> str:
     """Find the receiver of the next pass: the chosen player, otherwise the next one in the list."""
     names = [row.name for row in scene.beyond_mocap_passes.players]
-    chosen, holder = scene.beyond_mocap_stream.target, rally().holder
+    chosen, holder = scene.beyond_mocap_stream.target, current_rally().holder
     if chosen in names and chosen != holder:
         return chosen
     if not names:
@@ -99,79 +99,79 @@ def target(scene: bpy.types.Scene) -> str:
     return names[(names.index(holder) + 1) % len(names)] if holder in names else names[0]
 
 
-def struck(_scene: bpy.types.Scene, hit: HitMotion, _seconds: float) -> None:
+def store_strike(_scene: bpy.types.Scene, hit: HitMotion, _seconds: float) -> None:
     """Store the user's strike; only the latest one counts."""
-    _held["pending"] = hit
+    _session["pending"] = hit
 
 
-def shown_by(scene: bpy.types.Scene, body: bpy.types.Object) -> HitMotion:
+def find_shown_strike(scene: bpy.types.Scene, body: bpy.types.Object) -> HitMotion:
     """Find the strike of an armature's own motion that is nearest to the current frame.
 
     Raises:
         InputError: if it has none.
     """
-    from ...beyond_mocap.passes.hits import analyse
+    from ...beyond_mocap.passes.hits import detect_hits
 
-    settings, motion = scene.beyond_mocap_stream, action.read(body, scene)
+    settings, motion = scene.beyond_mocap_stream, action.read_motion(body, scene)
     sided = settings.part in ("foot", "hand", "tool")
     sides = (("left", "right") if settings.side == "either" else (settings.side,)) if sided else ("",)
-    hits = [hit for side in sides for hit in analyse(motion, settings.part, side, settings.threshold or None).motions]
+    hits = [hit for side in sides for hit in detect_hits(motion, settings.part, side, settings.threshold or None).motions]
     if not hits:
         raise InputError(f"armature {body.name}", f"no strike with the {settings.part}", "at least one",
                          "choose the part under Live Stream")
-    now = scene.frame_current - (action.first_frame(body) or 0)
+    now = scene.frame_current - (action.find_first_frame(body) or 0)
     return min(hits, key=lambda hit: (abs(hit.key - now), -hit.max_speed))
 
 
-def look(scene: bpy.types.Scene) -> None:
+def update_rally(scene: bpy.types.Scene) -> None:
     """Start a requested pass, or insert one that is ready."""
-    if rally() is None or scene.session_uid != _held["scene"]:
+    if current_rally() is None or scene.session_uid != _session["scene"]:
         return
     if scene.beyond_mocap_passes.made_of != PLAYED:
-        _over("The scene has been updated or cleared: press Play Live to continue")
+        _end_rally("The scene has been updated or cleared: press Play Live to continue")
         return
-    _chosen(scene)
-    job = _held.get("job")
+    _update_target(scene)
+    job = _session.get("job")
     if job is not None:
         if job.poll():
-            _held.pop("job")
-            _ended(scene, job)
-    elif _held.get("pending") is not None and seconds(scene) >= rally().free:
+            _session.pop("job")
+            _finish_job(scene, job)
+    elif _session.get("pending") is not None and rally_seconds(scene) >= current_rally().ready_time:
         try:
-            order = _order(scene, _held.pop("pending"))
+            order = _collect_request(scene, _session.pop("pending"))
         except InputError as error:
-            return _over(str(error))
-        _held["job"] = background.Job("live", lambda progress, cancelled, _hurry: _answer(*order, progress, cancelled))
+            return _end_rally(str(error))
+        _session["job"] = background.Job("live", lambda progress, cancelled, _hurry: _build_answer(*order, progress, cancelled))
 
 
-def answer_now(scene: bpy.types.Scene, hit: HitMotion) -> Piece:
+def answer_now(scene: bpy.types.Scene, hit: HitMotion) -> LivePass:
     """Answer a strike at once, for scripts: the pass is computed and inserted before this returns."""
-    if rally() is None:
+    if current_rally() is None:
         raise InputError("play live", "no rally is being played", "a rally", "press Play Live")
-    piece = _answer(*_order(scene, hit), None, None)
-    _apply(scene, piece)
+    piece = _build_answer(*_collect_request(scene, hit), None, None)
+    _apply_pass(scene, piece)
     return piece
 
 
-def _order(scene, hit: HitMotion) -> tuple:
+def _collect_request(scene, hit: HitMotion) -> tuple:
     """Collect what a pass needs: library, rally, time, hit, receiver, bounces."""
     # not before the holder can act
-    now = max(seconds(scene), rally().free)
-    return _held["library"], rally(), now, hit, target(scene), scene.beyond_mocap_stream.bounces
+    now = max(rally_seconds(scene), current_rally().ready_time)
+    return _session["library"], current_rally(), now, hit, find_target(scene), scene.beyond_mocap_stream.bounces
 
 
-def _answer(library, one, now: float, hit: HitMotion, to: str, bounces: int, progress, cancelled) -> Piece:
-    from ...beyond_mocap.passes.live_passes import answer
+def _build_answer(library, one, now: float, hit: HitMotion, to: str, bounces: int, progress, cancelled) -> LivePass:
+    from ...beyond_mocap.passes.live_passes import build_answer
 
-    return answer(library, one, now, hit=hit, target=to, bounces=bounces, progress=progress, cancelled=cancelled)
+    return build_answer(library, one, now, hit=hit, target=to, bounces=bounces, progress=progress, cancelled=cancelled)
 
 
-def _ended(scene, job) -> None:
+def _finish_job(scene, job) -> None:
     """Insert a pass that is ready, or show its error."""
     try:
         if job.error is not None:
             raise job.error
-        _apply(scene, job.result)
+        _apply_pass(scene, job.result)
     except BeyondMocapError as error:
         bpy.context.window_manager.beyond_mocap_streaming.played = str(error)
         return
@@ -179,18 +179,18 @@ def _ended(scene, job) -> None:
         bpy.ops.ed.undo_push(message="Live Pass")
 
 
-def _apply(scene, piece: Piece) -> None:
+def _apply_pass(scene, piece: LivePass) -> None:
     """Insert a pass into the scene from now on."""
-    after = rally().after(piece, max(seconds(scene), rally().free))
-    _lay(scene, after, list(piece.motions))
-    _held["rally"] = after
+    next_rally = current_rally().add_pass(piece, max(rally_seconds(scene), current_rally().ready_time))
+    _apply_players(scene, next_rally, list(piece.motions))
+    _session["rally"] = next_rally
     scene.beyond_mocap_stream.target = ""
-    _tell(scene, piece)
+    _write_status(scene, piece)
 
 
-def _lay(scene, one: Rally, names: list[str]) -> None:
+def _apply_players(scene, one: Rally, names: list[str]) -> None:
     """Apply a rally's motions and ball to the named players."""
-    from ...beyond_mocap.passes.passes import ball_of
+    from ...beyond_mocap.passes.passes import build_ball
 
     # players may have been renamed or removed since the rally started
     rows = {row.name: row for row in scene.beyond_mocap_passes.players}
@@ -200,47 +200,47 @@ def _lay(scene, one: Rally, names: list[str]) -> None:
     start = float(scene.beyond_mocap_passes.start_frame)
     for name in names:
         played = one.players[name]
-        make.lay_body(scene, rows[name], SimpleNamespace(motion=played.motion, start_time=played.start), start)
-    make.lay_ball(scene, SimpleNamespace(ball=one.ball, kind=ball_of(one.scene)), start)
-    bake.lengthen(scene, start + float(one.ball.times[-1]) * frames_per_second(scene))
+        make.apply_motion(scene, rows[name], SimpleNamespace(motion=played.motion, start_time=played.start), start)
+    make.apply_ball(scene, SimpleNamespace(ball=one.ball, kind=build_ball(one.scene)), start)
+    bake.extend_scene(scene, start + float(one.ball.times[-1]) * frames_per_second(scene))
 
 
-def _chosen(scene) -> None:
+def _update_target(scene) -> None:
     """Make a player that has just been clicked the target."""
     active = bpy.context.view_layer.objects.active
     name = active.name if active is not None else None
-    if name == _held.get("seen"):
+    if name == _session.get("seen"):
         return
-    _held["seen"] = name
+    _session["seen"] = name
     for row in scene.beyond_mocap_passes.players:
         # a player is clicked by character, mesh or place
         known = {row.body, row.place, *(row.body.children if row.body else ())}
-        if active is not None and active in known and row.name != rally().holder:
+        if active is not None and active in known and row.name != current_rally().holder:
             scene.beyond_mocap_stream.target = row.name
 
 
-def _over(why: str) -> None:
+def _end_rally(reason: str) -> None:
     """End the rally with a message."""
-    stop()
-    told = bpy.context.window_manager.beyond_mocap_streaming
-    told.playing, told.played = False, why
+    stop_rally()
+    status_texts = bpy.context.window_manager.beyond_mocap_streaming
+    status_texts.playing, status_texts.played = False, reason
 
 
-def _tell(scene, piece: Piece | None = None) -> None:
+def _write_status(scene, piece: LivePass | None = None) -> None:
     """Write the state of the rally for the panel."""
-    told, one = bpy.context.window_manager.beyond_mocap_streaming, rally()
-    told.playing = True
+    status_texts, one = bpy.context.window_manager.beyond_mocap_streaming, current_rally()
+    status_texts.playing = True
     lines = [f"{one.holder} has the ball, passes so far: {one.passes}"]
     if piece is not None:
         lines.append(f"{piece.giver} played {piece.clip} to {piece.receiver}")
         lines += piece.warnings[:2]
-    told.played = "\n".join(lines)
+    status_texts.played = "\n".join(lines)
 
 
 def _after_undo() -> None:
     """End the rally after an undo, which changes the scene that the rally knows."""
-    if rally() is not None:
-        _over("Undo has ended Play Live: press it to start again")
+    if current_rally() is not None:
+        _end_rally("Undo has ended Play Live: press it to start again")
 
 
-WATCHER = Watcher(name="Play Live", restored=_after_undo, closing=stop, ends=stop)
+WATCHER = Watcher(name="Play Live", restored=_after_undo, closing=stop_rally, ends=stop_rally)

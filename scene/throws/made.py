@@ -8,22 +8,22 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .order import Order
+from .order import ThrowTask
 
 if TYPE_CHECKING:
     from ...beyond_mocap.ball.flight import Flight
     from ...beyond_mocap.library.library import Library
     from ...beyond_mocap.motion.motion import Motion
     from ...beyond_mocap.throws.join_throw import JoinedThrow
-    from ...beyond_mocap.throws.throw_order import Thrown
+    from ...beyond_mocap.throws.throw_order import ThrowResult
 
-FOLLOWED, LONGEST = 3.0, 10.0
+FOLLOW_SECONDS, MAX_FLIGHT_SECONDS = 3.0, 10.0
 """Seconds of the ball's flight shown beyond the target, bouncing and rolling, and the longest flight to the target."""
-_GUESS, _ROUNDS = 1.0, 5  # first estimate, s, of the flight to a moving target; largest number of corrections of it
+_FIRST_ESTIMATE, _ROUNDS = 1.0, 5  # first estimate, s, of the flight to a moving target; largest number of corrections of it
 
 
 @dataclass(frozen=True, eq=False)
-class Result:
+class ThrowPreview:
     """A generated throw.
 
     Attributes:
@@ -37,8 +37,8 @@ class Result:
         usual_jerk: m/s^3, usual jerk of the library's recordings, NaN without a library.
     """
 
-    order: Order
-    thrown: "Thrown"
+    order: ThrowTask
+    thrown: "ThrowResult"
     joined: "JoinedThrow"
     flight: "Flight"
     seconds: float
@@ -47,7 +47,7 @@ class Result:
     usual_jerk: float
 
 
-def work(order: Order, progress, cancelled, _hurry) -> Result:
+def generate_throw(order: ThrowTask, progress, cancelled, _hurry) -> ThrowPreview:
     """Generate a throw, and the motion it is part of.
 
     Args:
@@ -55,44 +55,44 @@ def work(order: Order, progress, cancelled, _hurry) -> Result:
         progress: receives a share of 0 .. 1 and a text.
         cancelled: returns True to stop.
     """
-    from ...beyond_mocap.ball.flight import fly
-    from ...beyond_mocap.library.build import build
+    from ...beyond_mocap.ball.flight import simulate_flight
+    from ...beyond_mocap.library.build import build_library
     from ...beyond_mocap.motion.retargeting.retarget import Retargeter
-    from ...beyond_mocap.throws.join_throw import EASED, FADE, join_throw, library_jerk, stand_still, transition_jerk
+    from ...beyond_mocap.throws.join_throw import FADE_WITHOUT_LIBRARY, FADE, join_throw, measure_library_jerk, build_standing_motion, measure_transition_jerk
     from ...beyond_mocap.throws.leave_path import leave_path
 
     library = order.library
     if order.folder and library is None:
-        library = build(order.folder, unit=order.unit, **order.build, progress=progress, cancelled=cancelled)
-    own = order.own
-    if own is None:
-        own = stand_still(order.skeleton, 0.0, order.fps, order.place, order.facing)
+        library = build_library(order.folder, unit=order.unit, **order.build, progress=progress, cancelled=cancelled)
+    own_motion = order.own_motion
+    if own_motion is None:
+        own_motion = build_standing_motion(order.skeleton, 0.0, order.fps, order.place, order.facing)
     elif order.table:
-        own = Retargeter(own, order.skeleton, keeps_travel=True).carry(own)
+        own_motion = Retargeter(own_motion, order.skeleton, keeps_travel=True).retarget(own_motion)
     start = order.first / order.fps
-    asked = order
-    order, thrown, seconds = _met(order, own, start, joined=library is not None, progress=_share(progress, 0.0, 0.3),
+    original = order
+    order, thrown, seconds = _generate_at_target(order, own_motion, start, joined=library is not None, progress=_build_progress(progress, 0.0, 0.3),
                                   cancelled=cancelled)
-    motion, release = _shown(order, thrown, library is not None)
-    told: tuple = ()
+    motion, release = _trim_throw(order, thrown, library is not None)
+    warnings: tuple = ()
     if library is not None:
-        way = leave_path(library, own, start, motion, release, at=order.at, action=order.act,
-                         progress=_share(progress, 0.3, 1.0), cancelled=cancelled)
-        own, start, told = way.motion, way.start, way.warnings
-    fade = FADE if library is not None else EASED[order.act]
-    joined = join_throw(own, start, motion, release, at=order.at, goes_on=library is None, fade=fade)
-    usual = library_jerk(library, order.fps) if library is not None else float("nan")
-    joined = replace(joined, warnings=(*_when(asked, order, joined), *told, *joined.warnings))
-    up = np.array([0.0, 0.0, order.lift])
-    raised = replace(joined.motion, root_positions=joined.motion.root_positions + up)
-    joined = replace(joined, motion=raised)
+        run_up = leave_path(library, own_motion, start, motion, release, at=order.at, action=order.action,
+                         progress=_build_progress(progress, 0.3, 1.0), cancelled=cancelled)
+        own_motion, start, warnings = run_up.motion, run_up.start, run_up.warnings
+    fade = FADE if library is not None else FADE_WITHOUT_LIBRARY[order.action]
+    joined = join_throw(own_motion, start, motion, release, at=order.at, continues=library is None, fade=fade)
+    usual = measure_library_jerk(library, order.fps) if library is not None else float("nan")
+    joined = replace(joined, warnings=(*_describe_timing(original, order, joined), *warnings, *joined.warnings))
+    up = np.array([0.0, 0.0, order.sole_lift])
+    raised_motion = replace(joined.motion, root_positions=joined.motion.root_positions + up)
+    joined = replace(joined, motion=raised_motion)
     launch = replace(thrown.launch, time=0.0, position=thrown.launch.position + up)
-    flight = fly(launch, thrown.ball, seconds + FOLLOWED)
-    return Result(order, thrown, joined, flight=flight, seconds=seconds, library=library,
-                  jerk=float(transition_jerk(joined).max()), usual_jerk=usual)
+    flight = simulate_flight(launch, thrown.ball, seconds + FOLLOW_SECONDS)
+    return ThrowPreview(order, thrown, joined, flight=flight, seconds=seconds, library=library,
+                  jerk=float(measure_transition_jerk(joined).max()), usual_jerk=usual)
 
 
-def _met(order: Order, own: "Motion", start: float, joined: bool, progress, cancelled):
+def _generate_at_target(order: ThrowTask, own: "Motion", start: float, joined: bool, progress, cancelled):
     """Generate the throw, with release time and target adapted to it.
 
     The ball leaves later if the throw would begin before the scene and may wait, and a moving target is aimed at
@@ -101,89 +101,89 @@ def _met(order: Order, own: "Motion", start: float, joined: bool, progress, canc
     Returns:
         The adapted request, the throw, and the s of the ball's flight.
     """
-    seconds = _GUESS
+    seconds = _FIRST_ESTIMATE
     for _ in range(_ROUNDS):
         target = order.targets[min(round(seconds * order.fps), len(order.targets) - 1)]
-        thrown = _thrown(order, target, own, start=start, joined=joined, progress=progress, cancelled=cancelled)
-        guessed, seconds = seconds, _seconds(thrown)
-        late = int(np.ceil((order.begins + _shown(order, thrown, joined)[1] - order.at) * order.fps - 1e-6))
-        if order.waits and late > 0:
-            targets = order.targets[min(late, len(order.targets) - 1) :]
-            order = replace(order, at=order.at + late / order.fps, targets=targets, waits=False)
-        elif len(order.targets) == 1 or abs(seconds - guessed) * order.fps < 0.5:
+        thrown = _generate_placed(order, target, own, start=start, joined=joined, progress=progress, cancelled=cancelled)
+        estimate, seconds = seconds, _find_flight_seconds(thrown)
+        delay_frames = int(np.ceil((order.scene_start + _trim_throw(order, thrown, joined)[1] - order.at) * order.fps - 1e-6))
+        if order.may_wait and delay_frames > 0:
+            targets = order.targets[min(delay_frames, len(order.targets) - 1) :]
+            order = replace(order, at=order.at + delay_frames / order.fps, targets=targets, may_wait=False)
+        elif len(order.targets) == 1 or abs(seconds - estimate) * order.fps < 0.5:
             break
     return order, thrown, seconds
 
 
-def _when(asked: Order, order: Order, joined: "JoinedThrow") -> list[str]:
+def _describe_timing(original: ThrowTask, order: ThrowTask, joined: "JoinedThrow") -> list[str]:
     """List warnings about a throw that begins before the scene."""
-    first = round(order.begins * order.fps)
+    first = round(order.scene_start * order.fps)
     begins = round(joined.start * order.fps) + joined.first
-    if order.at != asked.at:
-        return [f"the ball leaves on frame {round(order.at * order.fps)}: with an earlier release the {order.act} "
+    if order.at != original.at:
+        return [f"the ball leaves on frame {round(order.at * order.fps)}: with an earlier release the {order.action} "
                 f"begins before the scene's first frame"]
     if begins >= first:
         return []
     frame = round(order.at * order.fps) + first - begins
-    return [f"the {order.act} begins on frame {begins}, before the scene's first frame {first}: set Release Frame to "
+    return [f"the {order.action} begins on frame {begins}, before the scene's first frame {first}: set Release Frame to "
             f"{frame} or more to see all of it"]
 
 
-def _shown(order: Order, thrown: "Thrown", joined: bool) -> tuple["Motion", float]:
+def _trim_throw(order: ThrowTask, thrown: "ThrowResult", joined: bool) -> tuple["Motion", float]:
     """Cut the waiting time from a throw, since a moving body does not stop; also return its release (s)."""
-    from ...beyond_mocap.throws.join_throw import EASED, trim_waiting
+    from ...beyond_mocap.throws.join_throw import FADE_WITHOUT_LIBRARY, trim_waiting
     from ...beyond_mocap.throws.run_up import EDGE
 
-    return trim_waiting(thrown.motion, thrown.release, EDGE if joined else EASED[order.act])
+    return trim_waiting(thrown.motion, thrown.release, EDGE if joined else FADE_WITHOUT_LIBRARY[order.action])
 
 
-def _thrown(order: Order, target, own: "Motion", start: float, joined: bool, progress, cancelled) -> "Thrown":
+def _generate_placed(order: ThrowTask, target, own: "Motion", start: float, joined: bool, progress, cancelled) -> "ThrowResult":
     """Generate the throw at its position.
 
     At an armature without motion, it begins there; with a library, the body is where its own motion has it at the
     release; otherwise it begins where the own motion leads, since it is blended with that.
     """
-    from ...beyond_mocap.throws.leave_path import is_in_reach, stopping_place
-    from ...beyond_mocap.throws.network_npz import read_model, shipped_model
+    from ...beyond_mocap.throws.leave_path import is_in_reach, find_stopping_position
+    from ...beyond_mocap.throws.network_npz import read_model, read_shipped_model
 
-    def spot(seconds: float) -> tuple[float, ...]:
+    def find_root(seconds: float) -> tuple[float, ...]:
         return tuple(own.root_positions[int(np.clip(round((seconds - start) * own.fps), 0, len(own) - 1)), :2])
 
-    model = read_model(order.model) if order.model else shipped_model(order.act)
-    throw = partial(_thrown_from, order, target, model, progress=progress, cancelled=cancelled)
+    model = read_model(order.model) if order.model else read_shipped_model(order.action)
+    throw = partial(_generate_from, order, target, model, progress=progress, cancelled=cancelled)
     if order.ball_place is not None:
         return throw(where={"ball_place": tuple(order.ball_place)})
-    if order.own is None:
+    if order.own_motion is None:
         return throw(where={"start": tuple(order.place)})
-    thrown = throw(where={"over": spot(order.at)})
-    motion, release = _shown(order, thrown, joined)
+    thrown = throw(where={"over": find_root(order.at)})
+    motion, release = _trim_throw(order, thrown, joined)
     begin = order.at - release
     if not joined:
-        return throw(where={"start": spot(begin)})
+        return throw(where={"start": find_root(begin)})
     if is_in_reach(own, start, motion, release, order.at):
         return thrown
-    return throw(where={"start": tuple(stopping_place(own, start, begin))})
+    return throw(where={"start": tuple(find_stopping_position(own, start, begin))})
 
 
-def _thrown_from(order: Order, target, model, where: dict, progress, cancelled) -> "Thrown":
+def _generate_from(order: ThrowTask, target, model, where: dict, progress, cancelled) -> "ThrowResult":
     """Generate the throw with `where` as position of its start, its release or its ball."""
     from ...beyond_mocap.throws import throw, throw_order
 
-    asked = throw_order.Order(target=tuple(target - [0.0, 0.0, order.lift]), limb=order.limb,
+    request = throw_order.ThrowRequest(target=tuple(target - [0.0, 0.0, order.sole_lift]), limb=order.limb,
                               speed=order.speed or None, ball=order.kind, fps=order.fps, seed=order.seed, **where)
-    return throw.throw_at(model, asked, order.skeleton, progress, cancelled)
+    return throw.throw_at(model, request, order.skeleton, progress, cancelled)
 
 
-def _seconds(thrown: "Thrown") -> float:
+def _find_flight_seconds(thrown: "ThrowResult") -> float:
     """Find the s from the release at which the ball is nearest to where it passes the target."""
-    from ...beyond_mocap.ball.flight import fly
+    from ...beyond_mocap.ball.flight import simulate_flight
 
-    flight = fly(replace(thrown.launch, time=0.0), thrown.ball, LONGEST)
+    flight = simulate_flight(replace(thrown.launch, time=0.0), thrown.ball, MAX_FLIGHT_SECONDS)
     times = np.arange(0.0, flight.end, 1.0 / 480.0)
-    apart = np.linalg.norm(flight.at(times) - thrown.impact, axis=1)
-    return float(times[int(np.argmin(apart))]) if np.all(np.isfinite(thrown.impact)) else _GUESS
+    distances = np.linalg.norm(flight.at(times) - thrown.impact, axis=1)
+    return float(times[int(np.argmin(distances))]) if np.all(np.isfinite(thrown.impact)) else _FIRST_ESTIMATE
 
 
-def _share(progress, low: float, high: float):
+def _build_progress(progress, low: float, high: float):
     """Build a progress function for a part of the progress bar."""
     return lambda done, text: progress(low + (high - low) * done, text)

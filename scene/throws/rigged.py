@@ -10,65 +10,65 @@ import numpy as np
 from ...beyond_mocap.base.errors import InputError
 from ...beyond_mocap.motion import quaternion
 from ..core import channels
-from ..path_editing.rigs import carrier_of, is_plain
+from ..path_editing.rigs import choose_adapter, is_plain
 from ..rigs import bone_maps, rig_bake
-from ..rigs.driven import Driven, check
-from ..rigs.fit import BakeOptions, Source
+from ..rigs.driven import DrivenRig, check_rig
+from ..rigs.fit import BakeOptions, SourceMotion
 from .settings import MARK
 
 if TYPE_CHECKING:
     from ...beyond_mocap.motion.motion import Motion
 
-_own: dict[int, tuple["Motion | None", int]] = {}
+_own_motions: dict[int, tuple["Motion | None", int]] = {}
 
 
-def rig_of(scene: bpy.types.Scene, body: bpy.types.Object) -> Driven | None:
+def find_rig(scene: bpy.types.Scene, body: bpy.types.Object) -> DrivenRig | None:
     """Find the driven bones of an armature that does not simply play its keys, else None.
 
     Raises:
         InputError: if it cannot be baked.
     """
-    wish = body.beyond_mocap_throw
-    if not wish.rigged and (wish.before.kept or not _posed_otherwise(body)):
+    settings = body.beyond_mocap_throw
+    if not settings.rigged and (settings.before.kept or not _has_other_animation(body)):
         return None
-    check(body)
-    return Driven(body, bone_maps.kept(body) or bone_maps.suggest(body), scene)
+    check_rig(body)
+    return DrivenRig(body, bone_maps.load_stored_map(body) or bone_maps.find_bone_map(body), scene)
 
 
-def own(scene: bpy.types.Scene, body: bpy.types.Object) -> tuple["Motion | None", int]:
+def read_own_motion(scene: bpy.types.Scene, body: bpy.types.Object) -> tuple["Motion | None", int]:
     """Read a rig's motion without its throw, on its own skeleton, or None, and the scene frame of its first pose."""
     if body.beyond_mocap_throw.rigged:
-        if body.session_uid not in _own:
+        if body.session_uid not in _own_motions:
             raise InputError(f"rig {body.name}", "it has a preview from an earlier session", "its own motion",
                              "press Revert first, then throw again")
-        return _own[body.session_uid]
+        return _own_motions[body.session_uid]
     data = body.animation_data
     strips = data is not None and data.use_nla and any(len(one.strips) and not one.mute for one in data.nla_tracks)
-    if channels.playing(body)[0] is None and not strips:
+    if channels.find_playing_action(body)[0] is None and not strips:
         found = None, scene.frame_start
     else:
-        read = carrier_of(body).read(scene)
+        read = choose_adapter(body).read_motion(scene)
         found = read.motion, read.first
-    _own[body.session_uid] = found
+    _own_motions[body.session_uid] = found
     return found
 
 
-def stands(rig: Driven) -> tuple[np.ndarray, float]:
+def find_stance(rig: DrivenRig) -> tuple[np.ndarray, float]:
     """Find position (2,) m and heading (rad) of a rig without motion."""
-    place = rig.placement.to_world(np.array([rig.rest_place[rig.bone("hips")]]))[0]
-    ahead = quaternion.rotate(quaternion.inverse(rig.upright), np.array([1.0, 0.0, 0.0]))
-    ahead = quaternion.rotate(rig.placement.rotation, ahead)
-    return np.asarray(place[:2]), float(np.arctan2(ahead[1], ahead[0]))
+    place = rig.placement.to_world(np.array([rig.rest_positions[rig.bone_of("hips")]]))[0]
+    forward = quaternion.rotate(quaternion.inverse(rig.upright), np.array([1.0, 0.0, 0.0]))
+    forward = quaternion.rotate(rig.placement.rotation, forward)
+    return np.asarray(place[:2]), float(np.arctan2(forward[1], forward[0]))
 
 
-def lift(rig: Driven) -> float:
+def measure_sole_lift(rig: DrivenRig) -> float:
     """Measure by how much (m) the rig's toes are higher than those of its bare skeleton."""
-    from ...beyond_mocap.motion.contacts import sole_height
+    from ...beyond_mocap.motion.contacts import measure_sole_height
 
-    return rig.sole - sole_height(rig.skeleton)
+    return rig.sole - measure_sole_height(rig.skeleton)
 
 
-def lay(scene: bpy.types.Scene, body: bpy.types.Object, table: dict[str, str], motion: "Motion", start: int, name: str):
+def bake_throw(scene: bpy.types.Scene, body: bpy.types.Object, table: dict[str, str], motion: "Motion", start: int, name: str):
     """Bake a motion of the driven skeleton to a rig's controls; `remove_throw` removes it.
 
     Args:
@@ -81,28 +81,28 @@ def lay(scene: bpy.types.Scene, body: bpy.types.Object, table: dict[str, str], m
     Returns:
         Messages for people.
     """
-    source = Source(motion, start, name)
-    fitted = rig_bake.fitted(body, table, source, scene, BakeOptions(exact=True))
-    played = channels.playing(body)[0]
-    if played is not None and not played.get(MARK):
-        played.pop(rig_bake.MARK, None)  # an earlier bake is the rig's own motion, which must not be removed
-    baked = rig_bake.lay(fitted)
+    source = SourceMotion(motion, start, name)
+    fitted = rig_bake.prepare_bake(body, table, source, scene, BakeOptions(exact=True))
+    current_action = channels.find_playing_action(body)[0]
+    if current_action is not None and not current_action.get(MARK):
+        current_action.pop(rig_bake.MARK, None)  # an earlier bake is the rig's own motion, which must not be removed
+    baked = rig_bake.apply_bake(fitted)
     baked.action[MARK] = True
-    return baked.told
+    return baked.messages
 
 
-def take_away(body: bpy.types.Object) -> None:
+def remove_throw(body: bpy.types.Object) -> None:
     """Restore a rig's animation before its throw; an earlier bake can still be removed."""
     rig_bake.remove_bake(body)
-    played = channels.playing(body)[0]
-    if played is not None and rig_bake.BEFORE in played:
-        played[rig_bake.MARK] = True
+    current_action = channels.find_playing_action(body)[0]
+    if current_action is not None and rig_bake.PREVIOUS_STATE in current_action:
+        current_action[rig_bake.MARK] = True
 
 
-def _posed_otherwise(body: bpy.types.Object) -> bool:
+def _has_other_animation(body: bpy.types.Object) -> bool:
     """Return whether constraints, drivers or NLA strips affect an armature's pose, or keys move more than its bones."""
     data = body.animation_data
-    if data is not None and (channels.playing(body)[0] is not None or data.use_nla and len(data.nla_tracks)):
+    if data is not None and (channels.find_playing_action(body)[0] is not None or data.use_nla and len(data.nla_tracks)):
         return not is_plain(body)
     drivers = data.drivers if data is not None else ()
     return any(driver.data_path.startswith("pose.") for driver in drivers) or any(

@@ -8,7 +8,7 @@ from bpy.props import BoolProperty, FloatProperty, IntProperty, PointerProperty,
 from ..core.properties import with_settings
 from ..result.result import BeyondMocapBefore
 
-USUAL = {"throw": "baseball", "kick": "football"}
+DEFAULT_BALLS = {"throw": "baseball", "kick": "football"}
 LIMBS = {"throw": "hand", "kick": "foot"}
 MARK = "beyond_mocap_thrown"  # custom property of data created for a throw; no property group has its name
 
@@ -38,7 +38,7 @@ class BeyondMocapThrow(bpy.types.PropertyGroup):
     rigged: BoolProperty(name="On Rig", options={"HIDDEN"}, description="The preview is on the controls of a rig")
     release: FloatProperty(name="Release", options={"HIDDEN"}, description="Scene frame on which the ball leaves")
     figures: StringProperty(name="Figures", options={"HIDDEN"}, description="Figures of the preview, one per line")
-    told: StringProperty(name="Messages", options={"HIDDEN"}, description="Status and warnings")
+    messages: StringProperty(name="Messages", options={"HIDDEN"}, description="Status and warnings")
     before: PointerProperty(type=BeyondMocapBefore, description="Animation of the armature before the preview")
     flown: PointerProperty(name="Flying Ball", type=bpy.types.Object, options={"HIDDEN"},
                            description="Ball of the preview")
@@ -47,12 +47,12 @@ class BeyondMocapThrow(bpy.types.PropertyGroup):
     curve: PointerProperty(name="Trajectory", type=bpy.types.Object, description="Curve of the ball's trajectory")
 
 
-def thrower(context: bpy.types.Context) -> bpy.types.Object | None:
+def find_thrower(context: bpy.types.Context) -> bpy.types.Object | None:
     """Find the armature to animate: the active object, a selected one, or the one whose ball or target is active."""
     active = context.view_layer.objects.active
-    chosen = [thing for thing in (active, *context.selected_objects) if thing is not None and thing.type == "ARMATURE"]
-    if chosen or active is None:
-        return chosen[0] if chosen else None
+    selected = [thing for thing in (active, *context.selected_objects) if thing is not None and thing.type == "ARMATURE"]
+    if selected or active is None:
+        return selected[0] if selected else None
     bodies = [thing for thing in context.scene.objects if thing.type == "ARMATURE" and thing.beyond_mocap_throw.made]
     return next((body for body in bodies if active in (body.beyond_mocap_throw.flown, body.beyond_mocap_throw.target)),
                 None)

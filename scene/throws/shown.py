@@ -14,195 +14,195 @@ import bpy
 import numpy as np
 
 from ..core import action, background, channels, session
-from ..core.live import Watcher, attempt
+from ..core.live import Watcher, call_or_describe
 from ..core.measure import frames_per_second
-from ..core.set_aside import bring_back, drop, put_aside
+from ..core.set_aside import restore_playback, discard_saved_state, save_playback
 from ..result import bake
-from ..rigs.rig_bake import BEFORE, KEYS
+from ..rigs.rig_bake import PREVIOUS_STATE, KEYS
 from ..rigs.rig_bake import MARK as BAKE_MARK
 from . import flown, made, order, rigged
 from .settings import MARK
 
 if TYPE_CHECKING:
-    from .made import Result
+    from .made import ThrowPreview
 
 MOST_LINES = 12
-BAKED = (BAKE_MARK, BEFORE, KEYS)  # custom properties of a bake that can be removed
+BAKE_PROPERTIES = (BAKE_MARK, PREVIOUS_STATE, KEYS)  # custom properties of a bake that can be removed
 RESULTS = ("made", "made_of", "asked", "rigged", "release", "figures", "told")
 
 HELD_BY = ("BEYOND_MOCAP_OT_throw_at_target", "BEYOND_MOCAP_OT_kick_at_target")
 MODES = ("OBJECT", "POSE")
 KIND = "throw again"
-MATTERS = (bpy.types.Object, bpy.types.Scene)
+WATCHED_TYPES = (bpy.types.Object, bpy.types.Scene)
 
-_seen: dict = {"job": None, "begun": {}, "ended": set(), "restored": False}
+_state: dict = {"job": None, "begun": {}, "ended": set(), "restored": False}
 
 
-def show(scene: bpy.types.Scene, body: bpy.types.Object, result: "Result") -> None:
+def show_throw(scene: bpy.types.Scene, body: bpy.types.Object, result: "ThrowPreview") -> None:
     """Show a throw on its armature and its ball."""
-    wish, joined, fps = body.beyond_mocap_throw, result.joined, frames_per_second(scene)
-    order.check(scene, body)
-    flown.check(wish, result)
+    settings, joined, fps = body.beyond_mocap_throw, result.joined, frames_per_second(scene)
+    order.check_throw(scene, body)
+    flown.check_ball(settings, result)
     if result.library is not None:
-        session.keep_library(result.library, result.order.unit)
-    name, start, more = f"{body.name} {result.order.act}s", joined.start * fps, []
+        session.store_library(result.library, result.order.unit)
+    name, start, messages = f"{body.name} {result.order.action}s", joined.start * fps, []
     if result.order.table:
-        more = rigged.lay(scene, body, result.order.table, motion=joined.motion, start=int(round(start)),
-                          name=result.order.act)
-        wish.rigged = True
+        messages = rigged.bake_throw(scene, body, result.order.table, motion=joined.motion, start=int(round(start)),
+                          name=result.order.action)
+        settings.rigged = True
     else:
-        if not wish.before.kept:
-            put_aside(wish.before, body)
-        channels.discard(body, MARK)
-        action.write(body, joined.motion, scene, start, name, generated=True)[MARK] = True
-    more = [*more, *flown.show(scene, body, result)]
+        if not settings.before.kept:
+            save_playback(settings.before, body)
+        channels.remove_marked_action(body, MARK)
+        action.write_motion(body, joined.motion, scene, start, name, generated=True)[MARK] = True
+    messages = [*messages, *flown.show_ball(scene, body, result)]
     last = joined.start + (len(joined.motion) - 1) / fps
-    bake.lengthen(scene, fps * max(joined.release + result.seconds, last))
-    wish.made, wish.release = result.order.act, joined.release * fps
-    wish.made_of, wish.asked = result.order.digest, round(result.order.at * fps)
-    wish.figures = "\n".join(figures(result))
-    told = [*result.thrown.warnings, *joined.warnings, *more]
-    wish.told = "\n".join(list(dict.fromkeys(str(line) for line in told))[:MOST_LINES])
+    bake.extend_scene(scene, fps * max(joined.release + result.seconds, last))
+    settings.made, settings.release = result.order.action, joined.release * fps
+    settings.made_of, settings.asked = result.order.digest, round(result.order.at * fps)
+    settings.figures = "\n".join(list_figures(result))
+    all_messages = [*result.thrown.warnings, *joined.warnings, *messages]
+    settings.told = "\n".join(list(dict.fromkeys(str(line) for line in all_messages))[:MOST_LINES])
 
 
-def leave(scene: bpy.types.Scene, body: bpy.types.Object) -> None:
+def revert_throw(scene: bpy.types.Scene, body: bpy.types.Object) -> None:
     """Revert the preview: armature and ball play what they did before, and data created for the throw is removed."""
-    wish = body.beyond_mocap_throw
-    channels.check_local(body, wish.flown)
-    channels.check_free(body)
-    flown.give_back(scene, body)
-    played = channels.playing(body)[0]
-    if wish.rigged and played is not None and played.get(MARK):
-        rigged.take_away(body)
-    elif wish.before.kept:
-        bring_back(wish.before, body, MARK)
-    _reset(wish)
+    settings = body.beyond_mocap_throw
+    channels.check_local(body, settings.flown)
+    channels.check_editable(body)
+    flown.restore_ball(scene, body)
+    current_action = channels.find_playing_action(body)[0]
+    if settings.rigged and current_action is not None and current_action.get(MARK):
+        rigged.remove_throw(body)
+    elif settings.before.kept:
+        restore_playback(settings.before, body, MARK)
+    _reset_results(settings)
 
 
-def keep(body: bpy.types.Object) -> None:
+def apply_throw(body: bpy.types.Object) -> None:
     """Apply the preview: the throw becomes the armature's own motion, its ball a normal object."""
-    wish = body.beyond_mocap_throw
-    channels.check_local(body, wish.flown)
-    played = channels.playing(body)[0]
-    if played is not None and played.get(MARK):
-        for name in (MARK, *BAKED):
-            played.pop(name, None)
-    drop(wish.before, MARK)
-    flown.keep(body)
-    _reset(wish)
+    settings = body.beyond_mocap_throw
+    channels.check_local(body, settings.flown)
+    current_action = channels.find_playing_action(body)[0]
+    if current_action is not None and current_action.get(MARK):
+        for name in (MARK, *BAKE_PROPERTIES):
+            current_action.pop(name, None)
+    discard_saved_state(settings.before, MARK)
+    flown.apply_ball(body)
+    _reset_results(settings)
 
 
-def figures(result: "Result") -> list[str]:
+def list_figures(result: "ThrowPreview") -> list[str]:
     """List lines "name: value" about a throw."""
     thrown, joined, fps = result.thrown, result.joined, result.order.fps
     velocity = thrown.launch.velocity
-    speed, level = float(np.linalg.norm(velocity)), float(np.linalg.norm(velocity[:2]))
-    up = np.degrees(np.arctan2(velocity[2], level))
-    limb = "Wrist" if result.order.act == "throw" else "Ankle"
+    speed, level_speed = float(np.linalg.norm(velocity)), float(np.linalg.norm(velocity[:2]))
+    elevation = np.degrees(np.arctan2(velocity[2], level_speed))
+    limb = "Wrist" if result.order.action == "throw" else "Ankle"
     lines = [f"Release frame: {joined.release * fps:.2f}", f"Ball speed: {speed:.1f} m/s",
-             f"Launch angle: {up:.0f}\N{DEGREE SIGN}", f"Target error: {100.0 * thrown.impact_error:.1f} cm",
-             f"Flight to target: {result.seconds:.2f} s", f"{limb} correction: {100.0 * thrown.moved:.1f} cm",
-             f"Lowest speed: {thrown.slowest:.1f} m/s"]
+             f"Launch angle: {elevation:.0f}\N{DEGREE SIGN}", f"Target error: {100.0 * thrown.impact_error:.1f} cm",
+             f"Flight to target: {result.seconds:.2f} s", f"{limb} correction: {100.0 * thrown.displacement:.1f} cm",
+             f"Lowest speed: {thrown.min_speed:.1f} m/s"]
     if np.isfinite(result.usual_jerk):
         lines.append(f"Transition jerk: {100.0 * result.jerk / result.usual_jerk:.0f} %")
     return lines
 
 
-def _reset(wish) -> None:
+def _reset_results(settings) -> None:
     for name in RESULTS:
-        wish.property_unset(name)
+        settings.property_unset(name)
 
 
-def due(scene: bpy.types.Scene) -> bpy.types.Object | None:
+def find_outdated(scene: bpy.types.Scene) -> bpy.types.Object | None:
     """Find an armature whose preview is not up to date.
 
     Each request is started once, also if undo or redo restores it.
     """
-    asked = {}
+    requested = {}
     for body in scene.objects:
         if body.type != "ARMATURE" or body.library is not None:
             continue
-        wish = body.beyond_mocap_throw
-        if wish.made and wish.live and wish.made_of:
-            asked[body.name] = order.digest(scene, body, wish.made)
-    if _seen["restored"]:
-        _seen["begun"].update(_seen["ended"] & asked.items())
-        _seen["restored"] = False
-    for name, digest in asked.items():
+        settings = body.beyond_mocap_throw
+        if settings.made and settings.live and settings.made_of:
+            requested[body.name] = order.build_digest(scene, body, settings.made)
+    if _state["restored"]:
+        _state["begun"].update(_state["ended"] & requested.items())
+        _state["restored"] = False
+    for name, digest in requested.items():
         body = scene.objects[name]
-        if digest != body.beyond_mocap_throw.made_of and _seen["begun"].get(name) != digest:
-            _seen["begun"][name] = digest
+        if digest != body.beyond_mocap_throw.made_of and _state["begun"].get(name) != digest:
+            _state["begun"][name] = digest
             return body
     return None
 
 
-def begin(scene: bpy.types.Scene, body: bpy.types.Object) -> background.Job:
+def start_update(scene: bpy.types.Scene, body: bpy.types.Object) -> background.Job:
     """Regenerate an armature's throw in a thread, on its present frame."""
-    wish = body.beyond_mocap_throw
-    asked = order.order_of(scene, body, wish.made, wish.frame or wish.asked)
-    return background.Job(KIND, lambda *asking: made.work(asked, *asking))
+    settings = body.beyond_mocap_throw
+    task = order.build_request(scene, body, settings.made, settings.frame or settings.asked)
+    return background.Job(KIND, lambda *asking: made.generate_throw(task, *asking))
 
 
-def finish(scene: bpy.types.Scene, job: background.Job) -> None:
+def finish_update(scene: bpy.types.Scene, job: background.Job) -> None:
     """Show a thread's result as an undo step if it is still requested; raise its BeyondMocapError if it failed."""
-    if background.cancelled(job):
+    if background.is_cancelled(job):
         return
     if job.error is not None:
         raise job.error
-    asked = job.result.order
-    body = scene.objects.get(asked.body)
+    task = job.result.order
+    body = scene.objects.get(task.body)
     if body is None or not body.beyond_mocap_throw.made:
         return
-    if order.digest(scene, body, asked.act) == asked.digest:
-        show(scene, body, job.result)
-        _seen["ended"].add((body.name, asked.digest))
-        bpy.ops.ed.undo_push(message=f"Update {body.name} {asked.act}")
-    elif _seen["begun"].get(body.name) == asked.digest:  # it may be requested again
-        del _seen["begun"][body.name]
+    if order.build_digest(scene, body, task.act) == task.digest:
+        show_throw(scene, body, job.result)
+        _state["ended"].add((body.name, task.digest))
+        bpy.ops.ed.undo_push(message=f"Update {body.name} {task.act}")
+    elif _state["begun"].get(body.name) == task.digest:  # it may be requested again
+        del _state["begun"][body.name]
 
 
-def settle(scene: bpy.types.Scene) -> bool:
+def process_updates(scene: bpy.types.Scene) -> bool:
     """Show finished results and start due updates; return whether something runs or has to wait."""
     active = bpy.context.view_layer.objects.active
     if active is not None and active.mode not in MODES:  # undo steps contain only the active object in other modes
         return True
-    name = _seen["job"][0] if _seen["job"] else ""
-    if _seen["job"]:
-        uid, job = _seen["job"][1:]
-        if not job.poll() and not job.stale:
+    name = _state["job"][0] if _state["job"] else ""
+    if _state["job"]:
+        uid, job = _state["job"][1:]
+        if not job.poll() and not job.is_stale:
             return True
-        _seen["job"] = None
+        _state["job"] = None
         if uid != scene.session_uid:
-            _seen["begun"].pop(name, None)
+            _state["begun"].pop(name, None)
         else:
-            _try(scene, name, lambda: finish(scene, job))
-    body = due(scene)
+            _attempt_update(scene, name, lambda: finish_update(scene, job))
+    body = find_outdated(scene)
     if body is not None:
-        _try(scene, body.name, lambda: _seen.update(job=(body.name, scene.session_uid, begin(scene, body))))
+        _attempt_update(scene, body.name, lambda: _state.update(job=(body.name, scene.session_uid, start_update(scene, body))))
     return body is not None
 
 
-def _try(scene: bpy.types.Scene, name: str, call) -> None:
+def _attempt_update(scene: bpy.types.Scene, name: str, call) -> None:
     """Call a function; if it fails, show at the armature why its unchanged preview is out of date."""
 
-    def tell(text: str) -> None:
+    def show_message(text: str) -> None:
         body = scene.objects.get(name)
         if body is not None:
             body.beyond_mocap_throw.told = text
 
-    attempt(call, tell, f"{name}: the preview cannot be updated")
+    call_or_describe(call, show_message, f"{name}: the preview cannot be updated")
 
 
-def restored() -> None:
+def note_restored() -> None:
     """Note that undo or redo restored previews, which are not regenerated."""
-    _seen["restored"] = True
+    _state["restored"] = True
 
 
-def forget() -> None:
+def clear_state() -> None:
     """Clear all state when another file is opened or the extension is disabled."""
-    background.stop(KIND)
-    _seen.update(job=None, begun={}, ended=set(), restored=False)
+    background.cancel_jobs(KIND)
+    _state.update(job=None, begun={}, ended=set(), restored=False)
 
 
-WATCHER = Watcher(name="Throws", matters=MATTERS, settle=settle, held_by=HELD_BY, restored=restored, loaded=forget,
-                  ends=forget)
+WATCHER = Watcher(name="Throws", watched_types=WATCHED_TYPES, settle=process_updates, busy_operators=HELD_BY, restored=note_restored, loaded=clear_state,
+                  ends=clear_state)

@@ -15,8 +15,8 @@ from bpy.props import StringProperty
 
 from ...beyond_mocap.annotation import KeyMoment, Span, Timeline
 from ...beyond_mocap.base.errors import InputError
-from ..core.measure import Clock, nearest_frame
-from .strip_lines import key_of, recorded_span, span_of
+from ..core.measure import Clock, round_frame
+from .strip_lines import read_key_moment, read_recorded_span, read_span
 
 WORDS, MOMENTS, AUTOMATIC = "Words", "Moments", "Automatic"
 
@@ -48,9 +48,9 @@ class PlacedSpan:
     strip: str
     first: int
     last: int
-    off: bool = False
-    automatic: bool = False
-    selected: bool = False
+    is_muted: bool = False
+    is_automatic: bool = False
+    is_selected: bool = False
 
 
 @dataclass(frozen=True)
@@ -70,8 +70,8 @@ class PlacedMoment:
     strip: str
     index: int
     frame: int
-    off: bool = False
-    selected: bool = False
+    is_muted: bool = False
+    is_selected: bool = False
 
     @property
     def time(self) -> float:
@@ -79,22 +79,22 @@ class PlacedMoment:
         return self.key.time
 
     @property
-    def words(self) -> tuple[str, ...]:
+    def labels(self) -> tuple[str, ...]:
         """The labels of the moment."""
         return self.key.words
 
 
-def has(target: bpy.types.Object) -> bool:
+def has_label_tracks(target: bpy.types.Object) -> bool:
     """Return whether the object has label tracks."""
     return bool(target.beyond_mocap_lanes.clock) and target.animation_data is not None
 
 
-def written_for(target: bpy.types.Object) -> Clock | None:
+def read_clock(target: bpy.types.Object) -> Clock | None:
     """Read the clock for which the strips were written; None without one."""
-    return Clock.read(target.beyond_mocap_lanes.clock)
+    return Clock.from_text(target.beyond_mocap_lanes.clock)
 
 
-def read(target: bpy.types.Object, where: str = "") -> Timeline | None:
+def read_timeline(target: bpy.types.Object, where: str = "") -> Timeline | None:
     """Read the timeline of an object's strips.
 
     Args:
@@ -105,100 +105,100 @@ def read(target: bpy.types.Object, where: str = "") -> Timeline | None:
     Raises:
         InputError: for a strip or marker whose name cannot be parsed.
     """
-    if not has(target):
+    if not has_label_tracks(target):
         return None
-    asked = [placed.span for placed in spans(target, where) if not placed.off and not placed.automatic]
-    return Timeline(tuple(asked), tuple(placed.key for placed in moments(target, where) if not placed.off))
+    active_spans = [placed.span for placed in list_spans(target, where) if not placed.is_muted and not placed.is_automatic]
+    return Timeline(tuple(active_spans), tuple(placed.key for placed in list_moments(target, where) if not placed.is_muted))
 
 
-def spans(target: bpy.types.Object, where: str = "") -> list[PlacedSpan]:
+def list_spans(target: bpy.types.Object, where: str = "") -> list[PlacedSpan]:
     """List all spans by start, also muted and automatic ones.
 
     An automatic strip that was moved, renamed, unmuted or put on another track counts as an ordinary one. Raises
     InputError as `read_timeline`.
     """
-    clock, where = written_for(target), where or target.name
-    found = [placed_span(track, strip, clock, where) for track, strip in strips(target)
+    clock, where = read_clock(target), where or target.name
+    found = [read_placed_span(track, strip, clock, where) for track, strip in iter_strips(target)
              if strip.action.beyond_mocap.kind != "moments"]
     return sorted(found, key=lambda placed: (placed.span.start, placed.span.end))
 
 
-def placed_span(track: bpy.types.NlaTrack, strip: bpy.types.NlaStrip, clock: Clock, where: str) -> PlacedSpan:
+def read_placed_span(track: bpy.types.NlaTrack, strip: bpy.types.NlaStrip, clock: Clock, where: str) -> PlacedSpan:
     """Read the span of one strip. Raises InputError as `read_timeline`."""
-    span, made = span_of(strip, clock, where), strip.action.beyond_mocap.kind == "automatic"
-    untouched = made and track.name.startswith(AUTOMATIC) and strip.mute and span == recorded_span(strip.action)
-    off = (track.mute or strip.mute) and not made
-    frames = nearest_frame(strip.frame_start), nearest_frame(strip.frame_end)
-    return PlacedSpan(span, track.name, strip.name, *frames, off, untouched, strip.select)
+    span, is_generated = read_span(strip, clock, where), strip.action.beyond_mocap.kind == "automatic"
+    is_unchanged = is_generated and track.name.startswith(AUTOMATIC) and strip.mute and span == read_recorded_span(strip.action)
+    is_muted = (track.mute or strip.mute) and not is_generated
+    frames = round_frame(strip.frame_start), round_frame(strip.frame_end)
+    return PlacedSpan(span, track.name, strip.name, *frames, is_muted, is_unchanged, strip.select)
 
 
-def moments(target: bpy.types.Object, where: str = "") -> list[PlacedMoment]:
+def list_moments(target: bpy.types.Object, where: str = "") -> list[PlacedMoment]:
     """List all key moments by time.
 
     A marker beyond the ends of its strip is ignored; copies on several strips at the same frame count once. Raises
     InputError as `read_timeline`.
     """
-    clock, where, found = written_for(target), where or target.name, {}
-    for track, strip in strips(target):
+    clock, where, found = read_clock(target), where or target.name, {}
+    for track, strip in iter_strips(target):
         for index, marker in enumerate(strip.action.pose_markers):
-            if shows(strip, marker):
-                frame = marker_frame(strip, marker)
-                off = track.mute or strip.mute
-                placed = PlacedMoment(key_of(marker, frame, clock, where), strip.name, index, frame=frame, off=off,
-                                      selected=marker.select)
-                others = found.setdefault((frame, placed.words), [])
+            if is_marker_visible(strip, marker):
+                frame = compute_marker_frame(strip, marker)
+                is_muted = track.mute or strip.mute
+                placed = PlacedMoment(read_key_moment(marker, frame, clock, where), strip.name, index, frame=frame, is_muted=is_muted,
+                                      is_selected=marker.select)
+                others = found.setdefault((frame, placed.labels), [])
                 if all(other.strip == strip.name for other in others):
                     others.append(placed)
     return sorted((placed for same in found.values() for placed in same), key=lambda placed: placed.key.time)
 
 
-def span_at(target: bpy.types.Object, seconds: float) -> PlacedSpan | None:
+def find_span(target: bpy.types.Object, seconds: float) -> PlacedSpan | None:
     """Find the active span at a time, else the automatic one there, else None."""
-    there = [placed for placed in spans(target) if placed.span.start <= seconds < placed.span.end and not placed.off]
-    return min(there, key=lambda placed: (placed.automatic, placed.last - placed.first), default=None)
+    there = [placed for placed in list_spans(target) if placed.span.start <= seconds < placed.span.end and not placed.is_muted]
+    return min(there, key=lambda placed: (placed.is_automatic, placed.last - placed.first), default=None)
 
 
-def strips(target: bpy.types.Object) -> Iterator[tuple[bpy.types.NlaTrack, bpy.types.NlaStrip]]:
+def iter_strips(target: bpy.types.Object) -> Iterator[tuple[bpy.types.NlaTrack, bpy.types.NlaStrip]]:
     """Iterate over the strips of a timeline with their tracks, also within meta strips."""
     data = target.animation_data
     for track in list(data.nla_tracks) if data else ():
-        for strip in [inner for top in track.strips for inner in within(top)]:
-            if strip.action is not None and (strip.action.beyond_mocap.kind != "none" or is_lane(track)):
+        for strip in [inner for top in track.strips for inner in iter_inner_strips(top)]:
+            if strip.action is not None and (strip.action.beyond_mocap.kind != "none" or is_label_track(track)):
                 yield track, strip
 
 
-def within(strip: bpy.types.NlaStrip) -> Iterator[bpy.types.NlaStrip]:
+def iter_inner_strips(strip: bpy.types.NlaStrip) -> Iterator[bpy.types.NlaStrip]:
     """Iterate over the strip itself, or all strips of a meta strip."""
     if strip.type != "META":
         yield strip
     for inner in strip.strips:
-        yield from within(inner)
+        yield from iter_inner_strips(inner)
 
 
-def is_lane(track: bpy.types.NlaTrack) -> bool:
+def is_label_track(track: bpy.types.NlaTrack) -> bool:
     """Return whether strips that a user adds to this track are labels."""
-    return track.name == MOMENTS or bool(lane_number(track))
+    return track.name == MOMENTS or bool(parse_track_number(track))
 
 
-def lane_number(track: bpy.types.NlaTrack) -> int:
+def parse_track_number(track: bpy.types.NlaTrack) -> int:
     """Parse the number of a label track: 1 for "Words", 2 for "Words 2"; 0 for any other track."""
     first, _, number = track.name.partition(" ")
     return 0 if first != WORDS else 1 if not number else int(number) if number.isdecimal() else 0
 
 
-def strip_named(target: bpy.types.Object, name: str) -> bpy.types.NlaStrip:
+def find_strip(target: bpy.types.Object, name: str) -> bpy.types.NlaStrip:
     """Find the strip of that name. Raises InputError if there is none."""
-    found = next((strip for _, strip in strips(target) if strip.name == name), None)
+    found = next((strip for _, strip in iter_strips(target) if strip.name == name), None)
     if found is None:
         raise InputError(target.name, f"has no strip {name!r}", "a strip of this object", "select it again")
     return found
 
 
-def shows(strip: bpy.types.NlaStrip, marker: bpy.types.TimelineMarker) -> bool:
+def is_marker_visible(strip: bpy.types.NlaStrip, marker: bpy.types.TimelineMarker) -> bool:
     """Return whether a marker of its action is between a strip's ends."""
     return strip.action_frame_start - 0.5 <= marker.frame <= strip.action_frame_end + 0.5
 
 
-def marker_frame(strip: bpy.types.NlaStrip, marker: bpy.types.TimelineMarker) -> int:
+def compute_marker_frame(strip: bpy.types.NlaStrip, marker: bpy.types.TimelineMarker) -> int:
     """Compute the scene frame at which a strip shows a marker of its action."""
-    return nearest_frame(strip.frame_start + (marker.frame - strip.action_frame_start) * strip.scale)
+    return round_frame(strip.frame_start + (marker.frame - strip.action_frame_start) * strip.scale)

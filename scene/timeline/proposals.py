@@ -20,7 +20,7 @@ from . import lanes, lay_strips
 if TYPE_CHECKING:
     from ...beyond_mocap.library.word_sources import Proposal, Sources
 
-SAME = 0.1
+SAME_SECONDS = 0.1
 """Seconds within which two key moments are the same one."""
 
 STATES = (("OPEN", "Open", "Not reviewed yet"),
@@ -28,12 +28,12 @@ STATES = (("OPEN", "Open", "Not reviewed yet"),
           ("REFUSED", "Refused", "Not what the clip shows"))
 
 
-def _go(group, context):
+def _go_to_proposal(group, context):
     """Move the playhead to the active proposal."""
-    target, one = group.id_data, chosen(group.id_data)
-    if one is not None and lanes.written_for(target) is not None:
+    target, one = group.id_data, find_active(group.id_data)
+    if one is not None and lanes.read_clock(target) is not None:
         seconds = (one.start if one.key < 0 else one.key) / target[RATE]
-        context.scene.frame_current = lanes.written_for(target).whole(seconds)
+        context.scene.frame_current = lanes.read_clock(target).to_whole_frame(seconds)
 
 
 class BeyondMocapProposal(bpy.types.PropertyGroup):
@@ -54,10 +54,10 @@ class BeyondMocapProposals(bpy.types.PropertyGroup):
 
     attached_to = ("Object.beyond_mocap_proposals",)
     listed: CollectionProperty(type=BeyondMocapProposal, description="Proposals by their first frame")
-    active: IntProperty(name="Proposal", min=0, update=_go, description="The proposal under review")
+    active: IntProperty(name="Proposal", min=0, update=_go_to_proposal, description="The proposal under review")
 
 
-def keep(target: bpy.types.Object, found: Iterable["Proposal"], state: str = "OPEN", beside: bool = True) -> None:
+def store_proposals(target: bpy.types.Object, found: Iterable["Proposal"], state: str = "OPEN", keep_accepted: bool = True) -> None:
     """List proposals in place of the previous ones, and activate the first.
 
     Args:
@@ -68,15 +68,15 @@ def keep(target: bpy.types.Object, found: Iterable["Proposal"], state: str = "OP
     """
     group = target.beyond_mocap_proposals
     for index in reversed(range(len(group.listed))):
-        if not beside or group.listed[index].state != "ACCEPTED":
+        if not keep_accepted or group.listed[index].state != "ACCEPTED":
             group.listed.remove(index)
     first = len(group.listed)
     for one in found:
-        add(target, one.annotation, one.source, confidence=one.confidence, state=state, why=one.why)
+        add_proposal(target, one.annotation, one.source, confidence=one.confidence, state=state, why=one.why)
     group.active = first if first < len(group.listed) else 0
 
 
-def add(target: bpy.types.Object, row: ClipAnnotation, source: str, confidence: float, state: str,
+def add_proposal(target: bpy.types.Object, row: ClipAnnotation, source: str, confidence: float, state: str,
         why: str = "") -> None:
     """Add one proposal to the list."""
     one = target.beyond_mocap_proposals.listed.add()
@@ -85,62 +85,62 @@ def add(target: bpy.types.Object, row: ClipAnnotation, source: str, confidence: 
     one.confidence, one.state = confidence, state
 
 
-def said_already(told: Timeline, row: ClipAnnotation, fps: float) -> bool:
+def has_labels(timeline: Timeline, row: ClipAnnotation, fps: float) -> bool:
     """Return whether a timeline already has the labels of a row.
 
     That is a key moment with the same first label within SAME_SECONDS seconds of the row's key, or a span with the same
     labels over half of a row without a key.
     """
     if row.key is not None:
-        return any(key.words[:1] == row.words[:1] and abs(key.time - row.key / fps) <= SAME for key in told.keys)
+        return any(key.words[:1] == row.words[:1] and abs(key.time - row.key / fps) <= SAME_SECONDS for key in timeline.keys)
     start, end = row.start / fps, row.end / fps
-    same = (span for span in told.spans if span.words == row.words)
-    return any(min(span.end, end) - max(span.start, start) >= 0.5 * (end - start) for span in same)
+    equal_spans = (span for span in timeline.spans if span.words == row.words)
+    return any(min(span.end, end) - max(span.start, start) >= 0.5 * (end - start) for span in equal_spans)
 
 
-def chosen(target: bpy.types.Object) -> BeyondMocapProposal | None:
+def find_active(target: bpy.types.Object) -> BeyondMocapProposal | None:
     """Find the active proposal; None if the list is empty."""
     group = target.beyond_mocap_proposals
     return group.listed[group.active] if 0 <= group.active < len(group.listed) else None
 
 
-def row_of(one: BeyondMocapProposal) -> ClipAnnotation:
+def to_row(one: BeyondMocapProposal) -> ClipAnnotation:
     """Convert a proposal to a row of annotation."""
     return ClipAnnotation(one.start, one.end, None if one.key < 0 else one.key, tuple(one.name.split()))
 
 
-def accept(target: bpy.types.Object, index: int) -> str:
+def accept_proposal(target: bpy.types.Object, index: int) -> str:
     """Add a proposal to the clip's labels, unless it was accepted before. Returns a line for the user."""
-    from ...beyond_mocap.library.keep_words import as_timeline
+    from ...beyond_mocap.library.keep_words import to_timeline
 
-    one = _at(target, index)
+    one = _find_proposal(target, index)
     if one.state != "ACCEPTED":
-        clock, told = lanes.written_for(target), as_timeline([row_of(one)], target[RATE])
-        for span in told.spans:
+        clock, timeline = lanes.read_clock(target), to_timeline([to_row(one)], target[RATE])
+        for span in timeline.spans:
             lay_strips.add_span(target, span, clock)
-        for key in told.keys:
+        for key in timeline.keys:
             lay_strips.add_moment(target, key, clock)
         one.state = "ACCEPTED"
     return f"{one.name} accepted"
 
 
-def refuse(target: bpy.types.Object, index: int) -> str:
+def refuse_proposal(target: bpy.types.Object, index: int) -> str:
     """Refuse a proposal; labels that it had added are removed if they are unchanged. Returns a line for the user."""
-    one = _at(target, index)
+    one = _find_proposal(target, index)
     if one.state == "ACCEPTED":
-        _take_back(target, row_of(one))
+        _remove_labels(target, to_row(one))
     one.state = "REFUSED"
     return f"{one.name} refused"
 
 
-def go_on(target: bpy.types.Object, step: int, only_open: bool = False) -> bool:
+def go_to_next(target: bpy.types.Object, step: int, open_only: bool = False) -> bool:
     """Activate the next (step 1) or previous (-1) proposal, of all or of open ones; returns whether there is one.
 
     After the last open one the search continues from the other end.
     """
     group = target.beyond_mocap_proposals
     count = len(group.listed)
-    if only_open:
+    if open_only:
         order = [(group.active + step * (1 + k)) % count for k in range(count)]
         order = [index for index in order if group.listed[index].state == "OPEN"]
     else:
@@ -150,33 +150,33 @@ def go_on(target: bpy.types.Object, step: int, only_open: bool = False) -> bool:
     return bool(order)
 
 
-def left(target: bpy.types.Object) -> int:
+def count_open(target: bpy.types.Object) -> int:
     """Count the proposals that are still open."""
     return sum(one.state == "OPEN" for one in target.beyond_mocap_proposals.listed)
 
 
-def sources(target: bpy.types.Object) -> "Sources":
+def collect_sources(target: bpy.types.Object) -> "Sources":
     """Collect the sources of the accepted rows."""
     listed = target.beyond_mocap_proposals.listed
-    return {row_of(one): (one.source, one.confidence) for one in listed if one.state == "ACCEPTED"}
+    return {to_row(one): (one.source, one.confidence) for one in listed if one.state == "ACCEPTED"}
 
 
-def _at(target: bpy.types.Object, index: int) -> BeyondMocapProposal:
+def _find_proposal(target: bpy.types.Object, index: int) -> BeyondMocapProposal:
     listed = target.beyond_mocap_proposals.listed
     if not 0 <= index < len(listed):
         raise InputError(target.name, f"has no proposal {index}", "one of the list", "press Look Through")
     return listed[index]
 
 
-def _take_back(target: bpy.types.Object, row: ClipAnnotation) -> None:
+def _remove_labels(target: bpy.types.Object, row: ClipAnnotation) -> None:
     """Remove the strips and markers with the labels and times of a row."""
     fps = target[RATE]
     if row.key is not None:
-        for placed in lanes.moments(target):
-            if placed.words == row.words and abs(placed.time - row.key / fps) < 0.5 / fps:
+        for placed in lanes.list_moments(target):
+            if placed.labels == row.words and abs(placed.time - row.key / fps) < 0.5 / fps:
                 lay_strips.remove_moment(target, placed.strip, placed.index)
                 break
-    for placed in lanes.spans(target):
+    for placed in lanes.list_spans(target):
         span = placed.span
         if span.words == row.words and abs(span.start - row.start / fps) < 0.5 / fps:
             lay_strips.remove_span(target, placed.strip)

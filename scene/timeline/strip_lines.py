@@ -16,15 +16,15 @@ from bpy.props import EnumProperty, StringProperty
 
 from ...beyond_mocap.annotation import KeyMoment, Span, Timeline, format_timeline, parse_timeline
 from ...beyond_mocap.base.errors import InputError
-from ..core.measure import Clock, nearest_frame
+from ..core.measure import Clock, round_frame
 
-NO_WORDS = "(automatic)"  # the name of a span without labels: a strip's name cannot be empty
+NO_LABELS = "(automatic)"  # the name of a span without labels: a strip's name cannot be empty
 KINDS = (("none", "None", "Not part of a timeline"),
          ("span", "Span", "A span with labels"),
          ("automatic", "Automatic", "A span added by a synthesis"),
          ("moments", "Moments", "The NLA track of key moments"),
          ("moment", "Moment", "A key moment"))
-KEPT = 8192  # lines in the cache: all of a match, since strips are read after every edit
+CACHE_SIZE = 8192  # lines in the cache: all of a match, since strips are read after every edit
 _MOST_BLANKS = 24  # blanks added to a strip's name to make it unique
 _NEAR = 1.0 - 1e-3  # frames; after a smaller move the time of the line still holds
 
@@ -38,58 +38,58 @@ class BeyondMocapLine(bpy.types.PropertyGroup):
     shown: StringProperty(name="Shown", description="Its name when it was written; another name means new labels")
 
 
-def frames_of(span: Span, clock: Clock) -> tuple[int, int]:
+def compute_frames(span: Span, clock: Clock) -> tuple[int, int]:
     """Compute the first and last whole frame of a span's strip; at least one frame long, so that it is visible."""
-    first = clock.whole(span.start)
-    return first, max(first + 1, clock.whole(span.end))
+    first = clock.to_whole_frame(span.start)
+    return first, max(first + 1, clock.to_whole_frame(span.end))
 
 
-@lru_cache(maxsize=KEPT)
-def line_of(item: Span | KeyMoment) -> str:
+@lru_cache(maxsize=CACHE_SIZE)
+def format_line(item: Span | KeyMoment) -> str:
     """Format a span or key moment as a line of the text form, exactly."""
     timeline = Timeline((item,)) if isinstance(item, Span) else Timeline((), (item,))
     return format_timeline(timeline).strip()
 
 
-def words_of(item: Span | KeyMoment) -> str:
+def format_labels(item: Span | KeyMoment) -> str:
     """Format the labels of a span or key moment: the name of its strip or marker."""
-    return " ".join(line_of(item).split()[2 if isinstance(item, Span) else 1 :]) or NO_WORDS
+    return " ".join(format_line(item).split()[2 if isinstance(item, Span) else 1 :]) or NO_LABELS
 
 
-def span_of(strip: bpy.types.NlaStrip, clock: Clock, where: str) -> Span:
+def read_span(strip: bpy.types.NlaStrip, clock: Clock, where: str) -> Span:
     """Read the span of a strip in its present state. Raises InputError if its name cannot be parsed."""
     record = strip.action.beyond_mocap
-    first = nearest_frame(strip.frame_start)
-    last = max(nearest_frame(strip.frame_end), first + 1)
-    start, end = clock.seconds(first), clock.seconds(last)
-    kept = recorded_span(strip.action)
-    if kept is not None:
-        was = frames_of(kept, clock)
-        start = kept.start if abs(strip.frame_start - was[0]) < _NEAR else start
-        end = kept.end if abs(strip.frame_end - was[1]) < _NEAR else end
-    if kept is None or base_name(strip.name) != base_name(record.shown):
-        kept = _parsed("0 1", strip.name, f"{where}, strip on frame {first}").spans[0]
-    elif (start, end) == (kept.start, kept.end):
-        return kept
-    return replace(kept, start=start, end=end, line=None)
+    first = round_frame(strip.frame_start)
+    last = max(round_frame(strip.frame_end), first + 1)
+    start, end = clock.to_seconds(first), clock.to_seconds(last)
+    recorded = read_recorded_span(strip.action)
+    if recorded is not None:
+        recorded_frames = compute_frames(recorded, clock)
+        start = recorded.start if abs(strip.frame_start - recorded_frames[0]) < _NEAR else start
+        end = recorded.end if abs(strip.frame_end - recorded_frames[1]) < _NEAR else end
+    if recorded is None or remove_name_suffix(strip.name) != remove_name_suffix(record.shown):
+        recorded = _parse_name("0 1", strip.name, f"{where}, strip on frame {first}").spans[0]
+    elif (start, end) == (recorded.start, recorded.end):
+        return recorded
+    return replace(recorded, start=start, end=end, line=None)
 
 
-def key_of(marker: bpy.types.TimelineMarker, frame: int, clock: Clock, where: str) -> KeyMoment:
+def read_key_moment(marker: bpy.types.TimelineMarker, frame: int, clock: Clock, where: str) -> KeyMoment:
     """Read the key moment of a marker on scene frame `frame`. Raises InputError if its name cannot be parsed."""
-    record, kept = marker.beyond_mocap, None
+    record, recorded = marker.beyond_mocap, None
     if record.line:
-        kept = _kept(record.line)
-    on_time = kept is not None and clock.whole(kept.time) == frame
-    time = kept.time if on_time else clock.seconds(frame)
-    if kept is None or marker.name != record.shown:
+        recorded = _parse_line(record.line)
+    is_unmoved = recorded is not None and clock.to_whole_frame(recorded.time) == frame
+    time = recorded.time if is_unmoved else clock.to_seconds(frame)
+    if recorded is None or marker.name != record.shown:
         place = f"{where}, key moment on frame {frame}"
-        kept = _parsed("0", marker.name, place).keys[0]
-    elif on_time:
-        return kept
-    return replace(kept, time=time, line=None)
+        recorded = _parse_name("0", marker.name, place).keys[0]
+    elif is_unmoved:
+        return recorded
+    return replace(recorded, time=time, line=None)
 
 
-def said(text: str, start: float, end: float | None = None, where: str = "labels") -> Span | KeyMoment:
+def parse_labels(text: str, start: float, end: float | None = None, where: str = "labels") -> Span | KeyMoment:
     """Parse typed labels to a span, or without an end to a key moment.
 
     Args:
@@ -103,51 +103,51 @@ def said(text: str, start: float, end: float | None = None, where: str = "labels
         InputError: if the labels cannot be parsed.
     """
     if end is None:
-        return replace(_parsed("0", text, where).keys[0], time=start, line=None)
-    return replace(_parsed("0 1", text, where).spans[0], start=start, end=end, line=None)
+        return replace(_parse_name("0", text, where).keys[0], time=start, line=None)
+    return replace(_parse_name("0 1", text, where).spans[0], start=start, end=end, line=None)
 
 
-def recorded_span(action: bpy.types.Action) -> Span | None:
+def read_recorded_span(action: bpy.types.Action) -> Span | None:
     """Read the span for which an action was written; None if the extension did not write it."""
     line = action.beyond_mocap.line
-    return _kept(line) if line else None
+    return _parse_line(line) if line else None
 
 
-def remember(strip: bpy.types.NlaStrip, span: Span, kind: str) -> None:
+def store_span(strip: bpy.types.NlaStrip, span: Span, kind: str) -> None:
     """Name a strip by its labels and store the exact line with its action."""
-    words = words_of(span)
+    labels = format_labels(span)
     for blanks in range(_MOST_BLANKS):  # invisible, and keeps Blender from adding a number to the name
-        strip.name = words + " " * blanks
-        if strip.name == words + " " * blanks:
+        strip.name = labels + " " * blanks
+        if strip.name == labels + " " * blanks:
             break
     record = strip.action.beyond_mocap
-    record.kind, record.line, record.shown = kind, line_of(span), strip.name
+    record.kind, record.line, record.shown = kind, format_line(span), strip.name
 
 
-def tell(marker: bpy.types.TimelineMarker, key: KeyMoment, frame: int) -> None:
+def store_key_moment(marker: bpy.types.TimelineMarker, key: KeyMoment, frame: int) -> None:
     """Write a key moment to a marker; frame: on its own action."""
-    marker.name, marker.frame = words_of(key), frame
+    marker.name, marker.frame = format_labels(key), frame
     record = marker.beyond_mocap
-    record.kind, record.line, record.shown = "moment", line_of(key), marker.name
+    record.kind, record.line, record.shown = "moment", format_line(key), marker.name
 
 
-def base_name(name: str) -> str:
+def remove_name_suffix(name: str) -> str:
     """Remove what makes a strip's name unique: "running" of "running  " and "running.001"."""
     return re.sub(r"\.\d{3,}$", "", name).rstrip()
 
 
-@lru_cache(maxsize=KEPT)
-def _kept(line: str) -> Span | KeyMoment:
+@lru_cache(maxsize=CACHE_SIZE)
+def _parse_line(line: str) -> Span | KeyMoment:
     """Parse a stored line."""
     found = parse_timeline(line)
     return replace((*found.spans, *found.keys)[0], line=None)
 
 
-def _parsed(times: str, name: str, place: str) -> Timeline:
+def _parse_name(times: str, name: str, place: str) -> Timeline:
     """Parse a name at one time or two. Raises InputError if the text form would read it as something else."""
-    words = base_name(name)
+    labels = remove_name_suffix(name)
     try:
-        found = parse_timeline(f"{times} {'' if words == NO_WORDS else words}")
+        found = parse_timeline(f"{times} {'' if labels == NO_LABELS else labels}")
     except InputError:
         found = None
     if found is None or "#" in name or len(found.keys if times == "0" else found.spans) != 1:

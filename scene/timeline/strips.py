@@ -11,34 +11,34 @@ import bpy
 from ...beyond_mocap.annotation import Timeline, parse_timeline, read_timeline
 from ...beyond_mocap.base.errors import InputError
 from ...beyond_mocap.motion.track import Track
-from ..core.measure import Clock, scene_clock
-from ..core.settings import BeyondMocapPlayer, absolute, active_player
+from ..core.measure import Clock, build_scene_clock
+from ..core.settings import BeyondMocapPlayer, to_absolute_path, find_active_player
 from ..player import dots
 from ..player.tracks import read_track
 from . import lanes, lay_strips
 from .lanes import PlacedMoment, PlacedSpan
-from .strip_lines import said
+from .strip_lines import parse_labels
 
 
-def read(player: BeyondMocapPlayer, scene: bpy.types.Scene) -> Timeline | None:
+def read_player_timeline(player: BeyondMocapPlayer, scene: bpy.types.Scene) -> Timeline | None:
     """Read the timeline of a player's strips, in seconds on the track's clock; None without strips in this scene."""
-    dot = dot_of(player, scene)
-    return None if dot is None else lanes.read(dot, where(player))
+    dot = find_dot(player, scene)
+    return None if dot is None else lanes.read_timeline(dot, describe_strips(player))
 
 
-def write(context: bpy.types.Context, player: BeyondMocapPlayer, timeline: Timeline) -> None:
+def write_player_timeline(context: bpy.types.Context, player: BeyondMocapPlayer, timeline: Timeline) -> None:
     """Replace a player's strips by `timeline`; creates the player's dot if needed."""
-    dot, clock = dots.ensure(context, player), scene_clock(context.scene)
-    lay_strips.write(dot, timeline, clock, _extent(dot, clock))
+    dot, clock = dots.ensure_dot(context, player), build_scene_clock(context.scene)
+    lay_strips.write_timeline(dot, timeline, clock, _compute_extent(dot, clock))
 
 
-def set_automatic(context: bpy.types.Context, player: BeyondMocapPlayer, timeline: Timeline) -> None:
+def show_automatic_spans(context: bpy.types.Context, player: BeyondMocapPlayer, timeline: Timeline) -> None:
     """Show the automatic spans of a take's filled timeline as dimmed strips, in place of the previous ones."""
-    lay_strips.set_automatic(dots.ensure(context, player), timeline, scene_clock(context.scene))
+    lay_strips.show_automatic_spans(dots.ensure_dot(context, player), timeline, build_scene_clock(context.scene))
 
 
 def add_span(context: bpy.types.Context, player: BeyondMocapPlayer, start_s: float, end_s: float,
-             words: tuple[str, ...]) -> PlacedSpan:
+             labels: tuple[str, ...]) -> PlacedSpan:
     """Add one span.
 
     Args:
@@ -53,75 +53,75 @@ def add_span(context: bpy.types.Context, player: BeyondMocapPlayer, start_s: flo
     """
     if end_s <= start_s:
         raise InputError("span", f"the end {end_s:g} s is not after the start {start_s:g} s", "an end after the start")
-    span = said(" ".join(words), start_s, end_s)
-    return lay_strips.add_span(with_lanes(context, player), span, scene_clock(context.scene))
+    span = parse_labels(" ".join(labels), start_s, end_s)
+    return lay_strips.add_span(ensure_label_tracks(context, player), span, build_scene_clock(context.scene))
 
 
 def add_moment(context: bpy.types.Context, player: BeyondMocapPlayer, time_s: float,
-               words: tuple[str, ...]) -> PlacedMoment:
+               labels: tuple[str, ...]) -> PlacedMoment:
     """Add one key moment and select it. Raises InputError if its labels cannot be parsed."""
-    key = said(" ".join(words), time_s)
-    return lay_strips.add_moment(with_lanes(context, player), key, scene_clock(context.scene))
+    key = parse_labels(" ".join(labels), time_s)
+    return lay_strips.add_moment(ensure_label_tracks(context, player), key, build_scene_clock(context.scene))
 
 
-def dot_of(player: BeyondMocapPlayer, scene: bpy.types.Scene) -> bpy.types.Object | None:
+def find_dot(player: BeyondMocapPlayer, scene: bpy.types.Scene) -> bpy.types.Object | None:
     """Find the player's dot if it is in this scene and has label tracks."""
     dot = player.dot
-    return dot if dot is not None and dot.name in scene.objects and lanes.has(dot) else None
+    return dot if dot is not None and dot.name in scene.objects and lanes.has_label_tracks(dot) else None
 
 
-def where(player: BeyondMocapPlayer) -> str:
+def describe_strips(player: BeyondMocapPlayer) -> str:
     """Describe where these labels are, for messages."""
     return f"strips of {player.name}"
 
 
-def with_lanes(context: bpy.types.Context, player: BeyondMocapPlayer) -> bpy.types.Object:
+def ensure_label_tracks(context: bpy.types.Context, player: BeyondMocapPlayer) -> bpy.types.Object:
     """Find or create the player's dot and its label tracks.
 
     New tracks get the labels of the player's text or file, so that none is lost. Raises InputError if track or labels
     cannot be read.
     """
-    if player.dot is not None and lanes.has(player.dot):
-        return dots.ensure(context, player)
+    if player.dot is not None and lanes.has_label_tracks(player.dot):
+        return dots.ensure_dot(context, player)
     settings = context.scene.beyond_mocap
-    write(context, player, written_words(player, settings.rate, read_track(settings, player)))
+    write_player_timeline(context, player, read_written_labels(player, settings.rate, read_track(settings, player)))
     return player.dot
 
 
-def timeline_subject(context: bpy.types.Context) -> bpy.types.Object | None:
+def find_target(context: bpy.types.Context) -> bpy.types.Object | None:
     """Find the object whose strips are the target: the active object if it has label tracks and is no player's dot,
     else the active player's dot, else None.
     """
-    chosen = active_clip(context)
+    chosen = find_active_clip(context)
     if chosen is not None:
         return chosen
-    player = active_player(context.scene.beyond_mocap)
-    return None if player is None else dot_of(player, context.scene)
+    player = find_active_player(context.scene.beyond_mocap)
+    return None if player is None else find_dot(player, context.scene)
 
 
-def active_clip(context: bpy.types.Context) -> bpy.types.Object | None:
+def find_active_clip(context: bpy.types.Context) -> bpy.types.Object | None:
     """Find the active object if it has label tracks and is no player's dot."""
     active = context.view_layer.objects.active
-    return active if active is not None and lanes.has(active) and not active.beyond_mocap_dot.player else None
+    return active if active is not None and lanes.has_label_tracks(active) and not active.beyond_mocap_dot.player else None
 
 
 def can_have_timeline(context: bpy.types.Context) -> bool:
     """Return whether there is a target whose timeline can be written."""
-    return active_clip(context) is not None or active_player(context.scene.beyond_mocap) is not None
+    return find_active_clip(context) is not None or find_active_player(context.scene.beyond_mocap) is not None
 
 
-def subject_with_lanes(context: bpy.types.Context) -> bpy.types.Object:
+def ensure_target(context: bpy.types.Context) -> bpy.types.Object:
     """Find the target, or create the player's dot and tracks. Raises InputError if track or labels cannot be read."""
-    found = timeline_subject(context)
-    return with_lanes(context, active_player(context.scene.beyond_mocap)) if found is None else found
+    found = find_target(context)
+    return ensure_label_tracks(context, find_active_player(context.scene.beyond_mocap)) if found is None else found
 
 
-def subject_clock(context: bpy.types.Context, target: bpy.types.Object) -> Clock:
+def find_target_clock(context: bpy.types.Context, target: bpy.types.Object) -> Clock:
     """Find the clock of the target's seconds: the scene's for a player's dot, its own for a clip."""
-    return scene_clock(context.scene) if target.beyond_mocap_dot.player else lanes.written_for(target)
+    return build_scene_clock(context.scene) if target.beyond_mocap_dot.player else lanes.read_clock(target)
 
 
-def subject_name(target: bpy.types.Object) -> str:
+def describe_target(target: bpy.types.Object) -> str:
     """Describe the target for messages."""
     return target.beyond_mocap_dot.player or target.name
 
@@ -130,32 +130,32 @@ def show_player(context: bpy.types.Context, player) -> None:
     """Make a player active and select only their dot, so that the NLA editor shows their strips."""
     settings = context.scene.beyond_mocap
     settings.active_player = next(n for n, other in enumerate(settings.players) if other == player)
-    dot = with_lanes(context, player) if player.dot is None else dots.ensure(context, player)
-    for other in context.view_layer.objects.selected:
+    dot = ensure_label_tracks(context, player) if player.dot is None else dots.ensure_dot(context, player)
+    for other in context.view_layer.objects.is_selected:
         other.select_set(False)
     if dot.name in context.view_layer.objects:
         dot.select_set(True)
         context.view_layer.objects.active = dot
 
 
-def written_words(player: BeyondMocapPlayer, fps: float, track: Track) -> Timeline:
+def read_written_labels(player: BeyondMocapPlayer, fps: float, track: Track) -> Timeline:
     """Read the labels of the player's text or file, as they are before they become strips; fps: of times in frames."""
     start = float(track.times[0])
     if player.annotation_text is not None:
-        return parse_timeline(player.annotation_text.as_string(), written_in(player), fps, start)
+        return parse_timeline(player.annotation_text.as_string(), describe_label_source(player), fps, start)
     if player.annotation_file:
-        return read_timeline(written_in(player), fps, start)
+        return read_timeline(describe_label_source(player), fps, start)
     return Timeline()
 
 
-def written_in(player: BeyondMocapPlayer) -> str:
+def describe_label_source(player: BeyondMocapPlayer) -> str:
     """Describe the text or file with the player's labels, for messages."""
     if player.annotation_text is not None:
         return f"text {player.annotation_text.name}"
-    return absolute(player.annotation_file) or f"player {player.name}"
+    return to_absolute_path(player.annotation_file) or f"player {player.name}"
 
 
-def _extent(dot: bpy.types.Object, clock: Clock) -> tuple[float, float] | None:
+def _compute_extent(dot: bpy.types.Object, clock: Clock) -> tuple[float, float] | None:
     """Compute the first and last second of the dot's keys."""
-    frames = dots.keyed_frames(dot)
-    return None if frames is None else (clock.seconds(frames[0]), clock.seconds(frames[1]))
+    frames = dots.find_key_range(dot)
+    return None if frames is None else (clock.to_seconds(frames[0]), clock.to_seconds(frames[1]))

@@ -14,19 +14,19 @@ import bpy
 from bpy.props import FloatProperty, PointerProperty
 
 from ...beyond_mocap.base.errors import InputError
-from ..core.live import Watcher, soon
+from ..core.live import Watcher, call_soon
 from ..core.measure import frames_per_second
 
-_EARLY = 1e-3  # of a video frame: tolerance for a frame that starts exactly here
+_FRAME_TOLERANCE = 1e-3  # of a video frame: tolerance for a frame that starts exactly here
 _CLOCK = {  # the driver's variables and their data paths in a scene
     "fps": "render.fps", "base": "render.fps_base", "first": "beyond_mocap.start_frame",
     "clock": "beyond_mocap.start_time", "begins": "beyond_mocap.video.begins", "rate": "beyond_mocap.video.rate",
 }
 _mappings: dict[int, tuple] = {}  # the frame mapping for which each scene's clip was last read
-_SHOWN = f"floor((clock + (frame - first) * base / fps - begins) * rate + {_EARLY})"
+_SHOWN = f"floor((clock + (frame - first) * base / fps - begins) * rate + {_FRAME_TOLERANCE})"
 
 
-def renew(group: bpy.types.PropertyGroup, _context=None) -> None:
+def tag_update(group: bpy.types.PropertyGroup, _context=None) -> None:
     """Tag the scene after a changed setting: Blender does not re-evaluate drivers for registered properties."""
     group.id_data.update_tag()
 
@@ -36,14 +36,14 @@ class BeyondMocapVideo(bpy.types.PropertyGroup):
 
     clip: PointerProperty(name="Video", type=bpy.types.MovieClip, description="Reference video or image sequence")
     begins: FloatProperty(
-        name="Begins At", default=0.0, unit="TIME_ABSOLUTE", precision=3, step=4, update=renew,
+        name="Begins At", default=0.0, unit="TIME_ABSOLUTE", precision=3, step=4, update=tag_update,
         description="Time on the track's clock at which the video starts; adjust until both show the same moment",
     )
-    rate: FloatProperty(name="Frames per Second", default=25.0, min=0.1, max=1000.0, precision=3, update=renew,
+    rate: FloatProperty(name="Frames per Second", default=25.0, min=0.1, max=1000.0, precision=3, update=tag_update,
                         description="Frame rate of the video; known for movie files, not for image sequences")
 
 
-def load(path: str) -> bpy.types.MovieClip:
+def load_clip(path: str) -> bpy.types.MovieClip:
     """Load a movie, or the image sequence of a picture.
 
     Args:
@@ -67,7 +67,7 @@ def load(path: str) -> bpy.types.MovieClip:
     return clip
 
 
-def show(scene: bpy.types.Scene, clip: bpy.types.MovieClip, rate: float | None = None) -> None:
+def show_clip(scene: bpy.types.Scene, clip: bpy.types.MovieClip, rate: float | None = None) -> None:
     """Make a clip the scene's reference video at its own rate; its start stays.
 
     Args:
@@ -76,14 +76,14 @@ def show(scene: bpy.types.Scene, clip: bpy.types.MovieClip, rate: float | None =
         rate: frames per second; None: as the movie says, or the scene's rate for an image sequence.
     """
     video = scene.beyond_mocap.video
-    release(scene)
+    remove_video(scene)
     video.clip = clip
     video.rate = rate or clip.fps or frames_per_second(scene)
     scene.active_clip = clip  # Blender evaluates only clips that a scene uses
-    drive(scene)
+    add_driver(scene)
 
 
-def drive(scene: bpy.types.Scene) -> None:
+def add_driver(scene: bpy.types.Scene) -> None:
     """Create the driver on the scene's clip, in place of an existing one."""
     clip = scene.beyond_mocap.video.clip
     clip.driver_remove("frame_start")
@@ -96,10 +96,10 @@ def drive(scene: bpy.types.Scene) -> None:
         variable.targets[0].id = scene
         variable.targets[0].data_path = path
     driver.expression = f"floor(frame) - {_SHOWN}"
-    _mappings[scene.session_uid] = _mapping(scene)
+    _mappings[scene.session_uid] = _build_mapping(scene)
 
 
-def release(scene: bpy.types.Scene) -> None:
+def remove_video(scene: bpy.types.Scene) -> None:
     """Remove the reference video; the clip stays in the file without driver."""
     clip = scene.beyond_mocap.video.clip
     if clip is None:
@@ -111,18 +111,18 @@ def release(scene: bpy.types.Scene) -> None:
         scene.active_clip = None
 
 
-def watch(scene: bpy.types.Scene, _depsgraph=None) -> None:
+def check_mapping(scene: bpy.types.Scene, _depsgraph=None) -> None:
     """Re-read the clip if other frames now belong to the scene frames, since Blender caches images by scene frame.
 
     A changed frame rate of the scene is detected here too.
     """
-    known, mapping = _mappings.get(scene.session_uid), _mapping(scene)
+    known, mapping = _mappings.get(scene.session_uid), _build_mapping(scene)
     _mappings[scene.session_uid] = mapping
     if known != mapping and None not in (known, mapping):
-        soon(_reread, 0.0)  # tags set by a handler are lost
+        call_soon(_reload_clips, 0.0)  # tags set by a handler are lost
 
 
-def _mapping(scene: bpy.types.Scene) -> tuple | None:
+def _build_mapping(scene: bpy.types.Scene) -> tuple | None:
     """Collect everything that determines which image belongs to which frame; None without a video."""
     settings = scene.beyond_mocap
     video, fps = settings.video, frames_per_second(scene)
@@ -131,11 +131,11 @@ def _mapping(scene: bpy.types.Scene) -> tuple | None:
     return video.clip.session_uid, settings.start_frame, settings.start_time, fps, video.begins, video.rate
 
 
-def _reread() -> None:
+def _reload_clips() -> None:
     """Re-read the clips of all scenes; any write to a clip's path causes that."""
     for scene in bpy.data.scenes:
         if clip := scene.beyond_mocap.video.clip:
             clip.filepath = clip.filepath
 
 
-WATCHER = Watcher(name="Reference video", changed=watch, ends=_mappings.clear)
+WATCHER = Watcher(name="Reference video", changed=check_mapping, ends=_mappings.clear)

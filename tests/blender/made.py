@@ -15,12 +15,12 @@ END_PARENTS = (4, 8, 10, 12, 14)
 END_OFFSETS = np.array([[0.18, 0, -0.05], [0.18, 0, -0.05], [0, 0, 0.18], [0, 0.26, 0], [0, -0.26, 0]])
 
 
-def skeleton(core):
+def build_skeleton(core):
     """Fifteen joints, one of zero length on either side."""
     return core("motion.skeleton").Skeleton(NAMES, PARENTS, OFFSETS, END_PARENTS, END_OFFSETS)
 
 
-def motion(core, frames=61, fps=30.0, seed=4):
+def build_motion(core, frames=61, fps=30.0, seed=4):
     """Smooth turns of every joint, more than once around for the root; the root on a curve."""
     quaternion = core("motion.quaternion")
     dice = np.random.default_rng(seed)
@@ -28,6 +28,6 @@ def motion(core, frames=61, fps=30.0, seed=4):
     axis = dice.normal(size=(1, len(NAMES), 3))
     angle = 1.2 * np.sin(2.0 * time + dice.uniform(0, 6, (1, len(NAMES), 1)))
     rotations = quaternion.from_rotation_vector(axis / np.linalg.norm(axis, axis=-1, keepdims=True) * angle)
-    rotations[:, 0] = quaternion.multiply(quaternion.about_up(5.0 * time[:, 0, 0]), rotations[:, 0])
+    rotations[:, 0] = quaternion.multiply(quaternion.from_up_angle(5.0 * time[:, 0, 0]), rotations[:, 0])
     root = np.stack([3 * time, np.sin(3 * time), 0.9 + 0.05 * np.cos(9 * time)], axis=-1)[:, 0, 0]
-    return core("motion.motion").Motion(skeleton(core), root, rotations, fps)
+    return core("motion.motion").Motion(build_skeleton(core), root, rotations, fps)

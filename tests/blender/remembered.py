@@ -11,13 +11,13 @@ from types import MappingProxyType
 
 import bpy
 
-PURE = (
+CACHED_OPERATORS = (
     "clean_markers", "kick_at_target", "learn_words", "passes_make", "reconstruct_markers", "stream_play",
     "throw_at_target",
 )  # fmt: skip
 
 
-def _view(values: dict) -> MappingProxyType:
+def _build_view(values: dict) -> MappingProxyType:
     return MappingProxyType(values)
 
 
@@ -36,19 +36,19 @@ class _Packer(pickle.Pickler):
 
     def reducer_override(self, value):
         """Read-only views of dictionaries have no form of their own."""
-        return (_view, (dict(value),)) if isinstance(value, MappingProxyType) else NotImplemented
+        return (_build_view, (dict(value),)) if isinstance(value, MappingProxyType) else NotImplemented
 
 
-def remember(monkeypatch, library: type) -> None:
+def cache_work(monkeypatch, library: type) -> None:
     """Lets PURE operators work once for the same order, until monkeypatch takes it back. library: the core's class."""
     done, known = {}, {}
-    for name in PURE:
+    for name in CACHED_OPERATORS:
         operator = getattr(bpy.types, f"BEYOND_MOCAP_OT_{name}")
-        monkeypatch.setattr(operator, "work", staticmethod(_once(name, operator.work, library, done, known)))
+        monkeypatch.setattr(operator, "work", staticmethod(_build_cached(name, operator.work, library, done, known)))
 
 
-def _once(name: str, work, library: type, done: dict, known: dict):
-    def worked(order, *asking):
+def _build_cached(name: str, work, library: type, done: dict, known: dict):
+    def run_cached(order, *asking):
         out = io.BytesIO()
         _Packer(out, library, known).dump(order)
         key = name, out.getvalue()
@@ -56,4 +56,4 @@ def _once(name: str, work, library: type, done: dict, known: dict):
             done[key] = work(order, *asking)
         return done[key]
 
-    return worked
+    return run_cached

@@ -38,7 +38,7 @@ UNREAL = {
 NAMELESS = {part: f"Bone.{number:03d}" for number, part in enumerate(UNREAL)}
 
 
-def places(arms=0.0, legs=0.0):
+def compute_part_positions(arms=0.0, legs=0.0):
     """Heads and ends of all parts, metres: arms lowered by `arms` radians from a T, legs spread by `legs`."""
     found = {part: (parent, Vector(head)) for part, (parent, head) in CENTRE.items()}
     ends = {"head": Vector(ENDS["head"])}
@@ -46,13 +46,13 @@ def places(arms=0.0, legs=0.0):
         for part, (parent, head) in SIDE.items():
             point = Vector(head)
             if part in ("lower_arm", "hand", "fingers"):
-                point = _about(point, Vector(SIDE["upper_arm"][1]), arms)
+                point = _rotate_about(point, Vector(SIDE["upper_arm"][1]), arms)
             if part in ("lower_leg", "foot", "toe"):
-                point = _about(point, Vector(SIDE["upper_leg"][1]), -legs)
+                point = _rotate_about(point, Vector(SIDE["upper_leg"][1]), -legs)
             parent = parent if parent in CENTRE else f"{side} {parent}"
             found[f"{side} {part}"] = (parent, Vector((sign * point.x, point.y, point.z)))
         for part, pivot, angle in (("fingers", "upper_arm", arms), ("toe", "upper_leg", -legs)):
-            point = _about(Vector(ENDS[part]), Vector(SIDE[pivot][1]), angle)
+            point = _rotate_about(Vector(ENDS[part]), Vector(SIDE[pivot][1]), angle)
             ends[f"{side} {part}"] = Vector((sign * point.x, point.y, point.z))
     drop = Vector((0, 0, found["left toe"][1].z - SIDE["toe"][1][2]))  # it stands on the ground, legs spread or not
     return {part: (parent, head - drop) for part, (parent, head) in found.items()}, {
@@ -60,11 +60,11 @@ def places(arms=0.0, legs=0.0):
     }
 
 
-def _about(point, pivot, angle):
+def _rotate_about(point, pivot, angle):
     return pivot + Matrix.Rotation(angle, 3, "Y") @ (point - pivot)
 
 
-def build(names, name="Rig", arms=0.0, legs=0.0, tails="along", rolls=0.0, units=1.0, y_up=False, root=None, extra=(),
+def create_rig(names, name="Rig", arms=0.0, legs=0.0, tails="along", rolls=0.0, units=1.0, y_up=False, root=None, extra=(),
           size=1.0):
     """An armature object with the body's bones under `names` (part -> name).
 
@@ -77,7 +77,7 @@ def build(names, name="Rig", arms=0.0, legs=0.0, tails="along", rolls=0.0, units
     rig = bpy.data.objects.new(name, data)
     bpy.context.scene.collection.objects.link(rig)
     inward = (Matrix.Rotation(-np.pi / 2, 3, "X") if y_up else Matrix.Identity(3)) * units * size
-    found, ends = places(arms, legs)
+    found, ends = compute_part_positions(arms, legs)
     bpy.context.view_layer.objects.active = rig
     bpy.ops.object.mode_set(mode="EDIT")
     if root:
@@ -110,12 +110,12 @@ def build(names, name="Rig", arms=0.0, legs=0.0, tails="along", rolls=0.0, units
     return rig
 
 
-def mixamo(**options):
+def create_mixamo(**options):
     """As Mixamo's FBX comes in: T pose, centimetres, object at 0.01 and turned, no root bone."""
-    return build(MIXAMO, "Mixamo", **{"units": 100.0, "y_up": True, **options})
+    return create_rig(MIXAMO, "Mixamo", **{"units": 100.0, "y_up": True, **options})
 
 
-def unreal(**options):
+def create_unreal(**options):
     """The mannequin: A pose, root bone, twist bones and IK bones, stray tails as the FBX importer leaves them."""
     extra = [(f"{limb}_twist_01_{s}", f"{limb}_{s}", f"{side} {part}") for side, s in (("left", "l"), ("right", "r"))
              for limb, part in (("upperarm", "lower_arm"), ("lowerarm", "hand"), ("thigh", "lower_leg"),
@@ -124,13 +124,13 @@ def unreal(**options):
               ("ik_foot_r", "ik_foot_root", "right foot"), ("ik_hand_root", "root", None),
               ("ik_hand_gun", "ik_hand_root", "right hand"), ("ik_hand_l", "ik_hand_gun", "left hand"),
               ("ik_hand_r", "ik_hand_gun", "right hand")]
-    return build(UNREAL, "Mannequin", **{"arms": 0.9, "legs": 0.12, "tails": "stray", "units": 100.0, "root": "root",
+    return create_rig(UNREAL, "Mannequin", **{"arms": 0.9, "legs": 0.12, "tails": "stray", "units": 100.0, "root": "root",
                                          "extra": extra, **options})
 
 
-def metahuman(**options):
+def create_metahuman(**options):
     """MetaHuman's body: five spine bones, two neck bones, twist and corrective bones."""
-    rig = unreal(**{"root": "root", **options})
+    rig = create_unreal(**{"root": "root", **options})
     rig.name = "MetaHuman"
     bones = rig.data.edit_bones
     bpy.context.view_layer.objects.active = rig
@@ -157,7 +157,7 @@ def metahuman(**options):
     return rig
 
 
-def rigify(file):
+def append_rigify(file):
     """The control rig that rigify_rig.py saved, appended."""
     with bpy.data.libraries.load(str(file)) as (theirs, mine):
         mine.objects = [name for name in theirs.objects if not name.startswith("WGT")]
@@ -167,7 +167,7 @@ def rigify(file):
     return rig
 
 
-def heads(rig, bones, frames):
+def read_heads(rig, bones, frames):
     """Where Blender shows the heads of bones in the world: (F, B, 3) units."""
     scene, found = bpy.context.scene, []
     for frame in frames:

@@ -22,8 +22,8 @@ import remembered
 import sample_rigs as rigs
 import worlds
 from conftest import EXTENSION
-from throw_models import model_file
-from undo import press, state
+from throw_models import write_model_file
+from undo import press_operator, collect_state
 
 SMALL = pathlib.Path(__file__).resolve().parents[2] / "sample_blend" / "match" / "small"
 SAYS_NOTHING = re.compile(
@@ -83,7 +83,7 @@ def two_spans():
 def lose_a_player():
     """A dot is left, as where one was appended from another file."""
     player = bpy.context.scene.beyond_mocap.players[0]
-    worlds.choose(player.dot)
+    worlds.select_objects(player.dot)
     player.dot = None
 
 
@@ -103,7 +103,7 @@ def draw():
 def edit_points():
     """A drawn curve in edit mode, all of its points selected."""
     draw()
-    worlds.choose(bpy.context.scene.beyond_mocap.players[bpy.context.scene.beyond_mocap.active_player].drawn_track)
+    worlds.select_objects(bpy.context.scene.beyond_mocap.players[bpy.context.scene.beyond_mocap.active_player].drawn_track)
     bpy.ops.object.mode_set(mode="EDIT")
     bpy.ops.curve.select_all(action="SELECT")
 
@@ -112,7 +112,7 @@ def lay_cameras():
     """Cameras round a path of three metres."""
     cameras = importlib.import_module(f"{EXTENSION}.scene.stage.path_cameras")
     places = np.linspace((0.0, 0.0, 0.0), (3.0, 0.0, 0.0), 20)
-    cameras.set_up(bpy.context.scene, cameras.Route(places, np.arange(1.0, 21.0), places, np.zeros(20)))
+    cameras.place_cameras(bpy.context.scene, cameras.CameraTargets(places, np.arange(1.0, 21.0), places, np.zeros(20)))
 
 
 def ride():
@@ -172,7 +172,7 @@ def a_ball(carried=False):
     body = bpy.context.object
     ball = bpy.data.objects.new("Ball of mine", bpy.data.meshes.new("Ball of mine"))
     bpy.context.scene.collection.objects.link(ball)
-    worlds.choose(ball, body)
+    worlds.select_objects(ball, body)
     if carried:
         bpy.ops.beyond_mocap.take_ball(first=5, last=9)
 
@@ -184,7 +184,7 @@ def carry():
 def aim_a_ball():
     """The active body kicks a ball, which is active now."""
     bpy.ops.beyond_mocap.aim_ball(found=False, first=5, last=6)
-    worlds.choose(next(thing for thing in bpy.data.objects if thing.beyond_mocap_aim.on))
+    worlds.select_objects(next(thing for thing in bpy.data.objects if thing.beyond_mocap_aim.on))
 
 
 def hand_the_ball_over():
@@ -226,8 +226,8 @@ def listen():
             out.sendto(piece.encode(), ("127.0.0.1", listener.port))
             time.sleep(0.01)
     end = time.monotonic() + 20.0
-    while listener.status().frames < 20:
-        assert time.monotonic() < end, f"{listener.status()}"
+    while listener.measure_status().frames < 20:
+        assert time.monotonic() < end, f"{listener.measure_status()}"
         time.sleep(0.01)
 
 
@@ -238,7 +238,7 @@ def bake_it():
 def a_target(act="throw"):
     """Something far away to aim at: the 3D cursor; and a model that is quickly read."""
     bpy.context.scene.cursor.location = (20.0, 1.0, 1.0)
-    setattr(bpy.context.object.beyond_mocap_throw, f"{act}_model", model_file(act))
+    setattr(bpy.context.object.beyond_mocap_throw, f"{act}_model", write_model_file(act))
 
 
 def throw():
@@ -254,7 +254,7 @@ def unmapped():
 
 def another_rig():
     """A second rig is active; the panel still has the first."""
-    worlds.choose(rigs.unreal())
+    worlds.select_objects(rigs.create_unreal())
 
 
 def a_cloud(name="walk.trc"):
@@ -292,7 +292,7 @@ def marker_model_file(places):
 def saved_map(places):
     """A map in a file: of the rig before its map was taken away."""
     bpy.ops.beyond_mocap.map_bones()
-    bpy.ops.beyond_mocap.save_bone_map(filepath=f"{places.out}/map.json")
+    bpy.ops.beyond_mocap.write_bone_map(filepath=f"{places.out}/map.json")
     unmapped()
     return places.out / "map.json"
 
@@ -314,7 +314,7 @@ def a_made_match():
     a_match()
     match = bpy.context.scene.beyond_mocap_match
     if not pathlib.Path(match.folder, "match.json").exists():
-        bpy.ops.beyond_mocap.make_match()
+        bpy.ops.beyond_mocap.synthesize_match()
     match.end = 4.0
 
 
@@ -492,7 +492,7 @@ def operators():
 def session(extension):
     module = importlib.import_module(f"{extension.__name__}.scene.core.session")
     yield module
-    module.clear()
+    module.clear_session()
 
 
 @pytest.fixture(scope="module")
@@ -500,7 +500,7 @@ def work_once(extension):
     """The same order is worked out once."""
     core = importlib.import_module(f"{extension.__name__}.beyond_mocap.library.library")
     with pytest.MonkeyPatch.context() as monkeypatch:
-        remembered.remember(monkeypatch, core.Library)
+        remembered.cache_work(monkeypatch, core.Library)
         yield
 
 
@@ -535,7 +535,7 @@ def begin(stages):
 def call(name, arguments):
     """Call it as its button would; returns "" where it worked, else what it said."""
     try:
-        result = press(getattr(bpy.ops.beyond_mocap, name), **arguments)
+        result = press_operator(getattr(bpy.ops.beyond_mocap, name), **arguments)
     except RuntimeError as error:
         return str(error)
     return "" if result == {"FINISHED"} else f"{result} without a word"
@@ -555,22 +555,22 @@ def test_every_operator_has_a_row():
 def test_where_all_is_well_it_works_and_is_one_step_of_undo(name, begin, capfd):
     _, arguments = begin(name)
     bpy.ops.ed.undo_push(message="before")
-    before = state()
+    before = collect_state()
     said = call(name, arguments)
     if ROWS[name].window:
         assert said and not SAYS_NOTHING.search(said), said
-        assert state() == before
+        assert collect_state() == before
         return
     assert said == ""
-    after = state()
+    after = collect_state()
     if not ROWS[name].changes:
         assert after == before
         return
     assert after != before
     bpy.ops.ed.undo()
-    assert state() == before
+    assert collect_state() == before
     bpy.ops.ed.redo()
-    assert state() == after
+    assert collect_state() == after
     assert "Traceback" not in capfd.readouterr().err
 
 
@@ -580,24 +580,24 @@ def mine(wrong) -> list[str]:
     names = sorted(ROWS)
     if not os.environ.get("BLENDERS_IN_TURN"):
         return names
-    return names[(worlds.WRONG.index(wrong) + (bpy.app.version < (5, 0))) % 2 :: 2]
+    return names[(worlds.FAULTS.index(wrong) + (bpy.app.version < (5, 0))) % 2 :: 2]
 
 
-@pytest.mark.parametrize("wrong", worlds.WRONG, ids=lambda wrong: wrong.__name__)
+@pytest.mark.parametrize("wrong", worlds.FAULTS, ids=lambda wrong: wrong.__name__)
 def test_in_an_awkward_situation_it_works_or_says_what_to_do(wrong, begin, capfd):
     complaints = []
     for name in mine(wrong):
         places, arguments = begin(name)
         arguments = wrong(places, arguments)
         bpy.ops.ed.undo_push(message="before")
-        before, linked = state(), linked_motions()
+        before, linked = collect_state(), linked_motions()
         capfd.readouterr()
         said = call(name, arguments)
         printed = "".join(capfd.readouterr())
         if said and SAYS_NOTHING.search(said):
             complaints.append(f"{name}: says {said!r}")
-        if said and state() != before:
-            now = state()
+        if said and collect_state() != before:
+            now = collect_state()
             complaints.append(
                 f"{name}: failed and changed {[key for key in now if now[key] != before[key]]}; said {said!r}"
             )

@@ -27,8 +27,8 @@ def test_three_buttons(extension, tmp_path):
     }
     for player in settings.players:
         track = rooms["player.tracks"].read_track(settings, player)
-        on_disk = rooms["timeline.strips"].written_words(player, settings.rate, track)
-        asked = rooms["timeline.strips"].read(player, bpy.context.scene)
+        on_disk = rooms["timeline.strips"].read_written_labels(player, settings.rate, track)
+        asked = rooms["timeline.strips"].read_player_timeline(player, bpy.context.scene)
         assert (asked.spans, asked.keys) == (on_disk.spans, on_disk.keys), "run sample_blend/make_quickstart.py again"
     assert bpy.ops.beyond_mocap.build_library() == {"FINISHED"}
     assert bpy.ops.beyond_mocap.synthesize() == {"FINISHED"}

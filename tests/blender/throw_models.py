@@ -18,7 +18,7 @@ write_model(linear_model(planted_{act}(), {action!r}), {out!r})
 
 
 @functools.cache
-def model_file(action="throw"):
+def write_model_file(action="throw"):
     """Path of a model of "throw" or "kick"."""
     out = str(pathlib.Path(_folder.name) / f"{action}.npz")
     act = {"throw": "examples", "kick": "kicks"}[action]

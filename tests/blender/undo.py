@@ -8,42 +8,42 @@ import numpy as np
 
 KINDS = ("objects", "armatures", "actions", "meshes", "curves", "materials", "cameras", "lights", "collections",
          "worlds", "texts")
-OURS = "beyond_mocap"  # every group of properties that the extension hangs on Blender's data has a name that begins so
+PROPERTY_PREFIX = "beyond_mocap"  # every group of properties that the extension hangs on Blender's data has a name that begins so
 
 
-def state():
+def collect_state():
     """All names of data, our properties everywhere, animation and what is chosen, as plain values."""
     scene, layer = bpy.context.scene, bpy.context.view_layer
     return {
         **{kind: sorted(item.name for item in getattr(bpy.data, kind)) for kind in KINDS},
         "animated": sorted((o.name, o.animation_data.action.name) for o in bpy.data.objects
                            if o.animation_data and o.animation_data.action),
-        "strips": sorted(strip for thing in bpy.data.objects for strip in strips(thing)),
-        "markers": sorted((action.name, marker.name, marker.frame, str(ours(marker)))
+        "strips": sorted(strip for thing in bpy.data.objects for strip in iter_strips(thing)),
+        "markers": sorted((action.name, marker.name, marker.frame, str(collect_own_properties(marker)))
                           for action in bpy.data.actions for marker in action.pose_markers),
         "drawn": {curve.name: [(*point.co, point.radius) for spline in curve.splines
                                for point in (spline.bezier_points or spline.points)] for curve in bpy.data.curves},
-        "keys": {action.name: keys(action) for action in bpy.data.actions},
+        "keys": {action.name: summarize_keys(action) for action in bpy.data.actions},
         "owned": {
-            f"{kind} {item.name}": found for kind in KINDS for item in getattr(bpy.data, kind) if (found := ours(item))
+            f"{kind} {item.name}": found for kind in KINDS for item in getattr(bpy.data, kind) if (found := collect_own_properties(item))
         },
         "camera": scene.camera and scene.camera.name,
         "frames": (scene.frame_start, scene.frame_end, scene.render.fps, scene.frame_current),
         "chosen": (layer.objects.active and layer.objects.active.name,
                    sorted(o.name for o in layer.objects if o.select_get()),
                    bpy.context.mode),
-        "settings": plain(scene.beyond_mocap),
-        "markers of": plain(scene.beyond_mocap_markers),
-        "passes": plain(scene.beyond_mocap_passes),
-        "match": plain(scene.beyond_mocap_match),
-        "stream": plain(scene.beyond_mocap_stream),
+        "settings": to_plain(scene.beyond_mocap),
+        "markers of": to_plain(scene.beyond_mocap_markers),
+        "passes": to_plain(scene.beyond_mocap_passes),
+        "match": to_plain(scene.beyond_mocap_match),
+        "stream": to_plain(scene.beyond_mocap_stream),
         "constraints": sorted((o.name, c.name, round(c.influence, 6)) for o in bpy.data.objects for c in o.constraints),
         "players": [(p.name, p.tracking_file, p.annotation_file, p.take, p.quality, p.body.name if p.body else None)
                     for p in scene.beyond_mocap.players],
     }
 
 
-def strips(thing):
+def iter_strips(thing):
     """Every strip of an object's NLA: whose, on which track, name, extent, whether it is muted."""
     for track in thing.animation_data.nla_tracks if thing.animation_data else ():
         for strip in track.strips:
@@ -51,7 +51,7 @@ def strips(thing):
             yield thing.name, track.name, strip.name, extent, strip.mute, strip.action.name if strip.action else ""
 
 
-def keys(action):
+def summarize_keys(action):
     """Number of an action's curves and keys, and a sum over the values of all keys."""
     count, points, check = 0, 0, 0
     for layer in action.layers:
@@ -64,43 +64,43 @@ def keys(action):
     return count, points, check
 
 
-def ours(item):
+def collect_own_properties(item):
     """Our groups of properties on one piece of data, as plain values; empty where nothing is set."""
-    groups = ((name, getattr(item, name)) for name in ours_on(type(item)))
-    found = {name: plain(group) for name, group in groups if isinstance(group, bpy.types.PropertyGroup)}
+    groups = ((name, getattr(item, name)) for name in list_own_properties(type(item)))
+    found = {name: to_plain(group) for name, group in groups if isinstance(group, bpy.types.PropertyGroup)}
     return {name: value for name, value in found.items() if value}
 
 
 @functools.cache
-def ours_on(kind):
+def list_own_properties(kind):
     """Names of what the extension hangs on a type of Blender's data."""
-    return [known.identifier for known in kind.bl_rna.properties if known.identifier.startswith(OURS)]
+    return [known.identifier for known in kind.bl_rna.properties if known.identifier.startswith(PROPERTY_PREFIX)]
 
 
-def plain(group):
+def to_plain(group):
     """A group of properties as plain values, groups within it too; data as its name."""
-    return {name: as_plain(getattr(group, name)) for name, as_plain in fields(type(group))}
+    return {name: as_plain(getattr(group, name)) for name, as_plain in list_fields(type(group))}
 
 
 @functools.cache
-def fields(kind):
+def list_fields(kind):
     """(name, what makes a plain value of it) of every property of a group's type."""
-    return [(known.identifier, plainly(known)) for known in kind.bl_rna.properties
+    return [(known.identifier, choose_converter(known)) for known in kind.bl_rna.properties
             if known.identifier not in {"rna_type", "bl_rna"}]
 
 
-def plainly(known):
+def choose_converter(known):
     """What makes a plain value of a property's value."""
     if known.type == "COLLECTION":
-        return lambda value: [plain(item) for item in value]
+        return lambda value: [to_plain(item) for item in value]
     if known.type == "POINTER":
-        return lambda value: value and (plain(value) if isinstance(value, bpy.types.PropertyGroup) else value.name)
+        return lambda value: value and (to_plain(value) if isinstance(value, bpy.types.PropertyGroup) else value.name)
     if getattr(known, "is_array", False):
         return tuple
     return sorted if known.type == "ENUM" and known.is_enum_flag else lambda value: value
 
 
-def press(operator, **arguments):
+def press_operator(operator, **arguments):
     """Run an operator as its button does, with a step for undo."""
     return operator("EXEC_DEFAULT", True, **arguments)
 
@@ -108,11 +108,11 @@ def press(operator, **arguments):
 def assert_one_step(operator, **arguments):
     """Pressing the button changes the file, one undo brings it back, one redo does it again."""
     bpy.ops.ed.undo_push(message="before")
-    before = state()
-    assert press(operator, **arguments) == {"FINISHED"}
-    after = state()
+    before = collect_state()
+    assert press_operator(operator, **arguments) == {"FINISHED"}
+    after = collect_state()
     assert after != before
     bpy.ops.ed.undo()
-    assert state() == before
+    assert collect_state() == before
     bpy.ops.ed.redo()
-    assert state() == after
+    assert collect_state() == after

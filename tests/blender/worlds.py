@@ -45,7 +45,7 @@ def make_places(top):
         lines += [f"{t:.1f},{a:.3f},{b:.3f},{a + 0.6:.3f},{b:.3f},0.11" for t, a, b in zip(time, x, y)]
         (places.match / f"player{number}.csv").write_text("\n".join(lines) + "\n")
     (places.match / "player1.txt").write_text("0.5 1.5 walking\n2.4 kick right running low inside\n")
-    plant_markers()
+    write_synthetic_markers()
     for name in ("walk", "static"):
         shutil.copy(MARKERS / f"{name}.trc", places.match)
     picture = bpy.data.images.new("Picture", 16, 9)
@@ -54,69 +54,69 @@ def make_places(top):
     return places
 
 
-def plant_markers():
+def write_synthetic_markers():
     """walk.trc and static.trc below MARKERS: markers on a made walk of half a second, and on the same body standing."""
     if (MARKERS / "static.trc").exists():
         return
     core = f"{EXTENSION}.beyond_mocap"
-    gait = importlib.import_module(f"{core}.synthetic.gait").gait(1.4, 0.6, fps=100.0)
-    known = importlib.import_module(f"{core}.synthetic.ground_truth.planted_markers").planted(
+    gait = importlib.import_module(f"{core}.synthetic.gait").build_gait(1.4, 0.6, fps=100.0)
+    known = importlib.import_module(f"{core}.synthetic.ground_truth.planted_markers").build_trial(
         gait, "plug_in_gait", seed=3, occlusion=0.02, swaps=0, jumps=0, unlabeled=1
     )
     write = importlib.import_module(f"{core}.markers.files.trc").write_trc
     write(known.trial, MARKERS / "walk.trc")
-    write(known.static.frames(0, 40), MARKERS / "static.trc")
+    write(known.static.select_frames(0, 40), MARKERS / "static.trc")
 
 
 # How far a user has come; each begins where the one before it ends.
 
 
-def imported(places):
+def import_tracking(places):
     """A library's folder is chosen and two players are in the list."""
     bpy.context.scene.beyond_mocap.library_folder = str(places.clips)
     files = [{"name": "player1.csv"}, {"name": "player2.csv"}]
     bpy.ops.beyond_mocap.import_tracking(directory=str(places.match), files=files)
 
 
-def synthesized(places):
+def synthesize_players(places):
     """Both have a take, shown as a preview."""
     bpy.ops.beyond_mocap.build_library()
     bpy.ops.beyond_mocap.synthesize()
 
 
-def accepted(places):
+def accept_results(places):
     """Both have a body that moves; the first one's is the active object, and another file has it too."""
     bpy.ops.beyond_mocap.accept()
     body = bpy.context.scene.beyond_mocap.players[0].body
     bpy.data.libraries.write(str(places.out / FOREIGN), {body})
-    choose(body)
+    select_objects(body)
 
 
-def rig(places):
+def add_rig(places):
     """Somebody's own rig stands beside, chosen and mapped."""
     settings = bpy.context.scene.beyond_mocap
     body = settings.players[0].body
-    settings.rig.target = rigs.mixamo()
+    settings.rig.target = rigs.create_mixamo()
     bpy.ops.beyond_mocap.map_bones()
-    choose(body)
+    select_objects(body)
 
 
-def video(places):
+def add_video(places):
     """A reference video runs beside."""
     bpy.ops.beyond_mocap.load_video(filepath=str(places.match / PICTURE))
 
 
-def clip(places):
+def open_clip(places):
     """A clip of the library is open for annotation."""
     bpy.ops.beyond_mocap.list_clips()
     bpy.ops.beyond_mocap.annotate_clip()
 
 
-STAGES = {"imported": imported, "synthesized": synthesized, "accepted": accepted, "rig": rig, "video": video,
-          "clip": clip}
+STAGES = {"imported": import_tracking, "synthesized": synthesize_players, "accepted": accept_results, "rig": add_rig, "video": add_video,
+          "clip": open_clip}
 
 
-def choose(*things):
+def select_objects(*things):
     """Select these and nothing else; the last one is active."""
     for thing in bpy.context.view_layer.objects:
         thing.select_set(False)
@@ -129,18 +129,18 @@ def choose(*things):
 
 
 def nothing_selected(places, arguments):
-    choose()
+    select_objects()
     return arguments
 
 
 def a_camera_selected(places, arguments):
     camera = bpy.data.objects.new("Wrong", bpy.data.cameras.new("Wrong"))
     bpy.context.scene.collection.objects.link(camera)
-    choose(camera)
+    select_objects(camera)
     return arguments
 
 
-def _foreign(places):
+def _link_foreign(places):
     """A player's body, linked from another file."""
     with bpy.data.libraries.load(str(places.out / FOREIGN), link=True) as (there, wanted):
         wanted.objects = [name for name in there.objects if name == "player1"]
@@ -151,7 +151,7 @@ def _foreign(places):
 
 def add_bones(body, bones):
     """Bones with these names and parents, one above the other, and a key so that the armature moves."""
-    choose(body)
+    select_objects(body)
     bpy.ops.object.mode_set(mode="EDIT")
     for height, (name, parent) in enumerate(bones.items()):
         bone = body.data.edit_bones.new(name)
@@ -161,21 +161,21 @@ def add_bones(body, bones):
     body.pose.bones[0].keyframe_insert("location", frame=1)
 
 
-def _as_body(body):
+def _set_player_body(body):
     """Make it the active object and the active player's body."""
-    choose(body)
+    select_objects(body)
     settings = bpy.context.scene.beyond_mocap
     if len(settings.players):
         settings.players[settings.active_player].body = body
 
 
 def a_linked_armature(places, arguments):
-    _as_body(_foreign(places))
+    _set_player_body(_link_foreign(places))
     return arguments
 
 
 def a_library_override(places, arguments):
-    _as_body(_foreign(places).override_create(remap_local_usages=True))
+    _set_player_body(_link_foreign(places).override_create(remap_local_usages=True))
     return arguments
 
 
@@ -183,7 +183,7 @@ def a_rig_without_legs(places, arguments):
     body = bpy.data.objects.new("Legless", bpy.data.armatures.new("Legless"))
     bpy.context.scene.collection.objects.link(body)
     add_bones(body, {"Hips": None, "Spine": "Hips", "Head": "Spine"})
-    _as_body(body)
+    _set_player_body(body)
     return arguments
 
 
@@ -193,7 +193,7 @@ def missing_files(places, arguments):
     settings.library_folder = str(places.out / "no such folder")
     for player in settings.players:
         player.tracking_file = str(places.out / "no such file.csv")
-    return {name: _moved(value, places.out / "no such folder") for name, value in arguments.items()}
+    return {name: _move_path(value, places.out / "no such folder") for name, value in arguments.items()}
 
 
 def nothing_can_be_written(places, arguments):
@@ -201,10 +201,10 @@ def nothing_can_be_written(places, arguments):
     cache = places.clips / ".beyond_mocap"
     shutil.rmtree(cache, ignore_errors=True)
     cache.write_text("not a folder")
-    return {name: _moved(value, places.nowhere) for name, value in arguments.items()}
+    return {name: _move_path(value, places.nowhere) for name, value in arguments.items()}
 
 
-def _moved(value, folder):
+def _move_path(value, folder):
     """A path moved to a folder; anything else as it is."""
     return str(folder / pathlib.Path(value).name) if isinstance(value, str) and "/" in value else value
 
@@ -220,14 +220,14 @@ def centimetres(places, arguments):
 
 
 def edit_mode(places, arguments):
-    return _in_mode("EDIT", arguments)
+    return _enter_mode("EDIT", arguments)
 
 
 def pose_mode(places, arguments):
-    return _in_mode("POSE", arguments)
+    return _enter_mode("POSE", arguments)
 
 
-def _in_mode(mode, arguments):
+def _enter_mode(mode, arguments):
     if bpy.context.object is None or bpy.context.object.type != "ARMATURE":
         body = bpy.data.objects.new("Spare", bpy.data.armatures.new("Spare"))
         bpy.context.scene.collection.objects.link(body)
@@ -261,6 +261,6 @@ def bodies_deleted(places, arguments):
     return arguments
 
 
-WRONG = (nothing_selected, a_camera_selected, a_linked_armature, a_library_override, a_rig_without_legs, missing_files,
+FAULTS = (nothing_selected, a_camera_selected, a_linked_armature, a_library_override, a_rig_without_legs, missing_files,
          nothing_can_be_written, a_film_s_frame_rate, centimetres, edit_mode, pose_mode, everything_hidden,
          an_excluded_collection, bodies_deleted)

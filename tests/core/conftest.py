@@ -9,21 +9,21 @@ import pytest
 
 from beyond_mocap.annotation import Timeline, parse_timeline
 from beyond_mocap.files.bvh import bvh
-from beyond_mocap.library.build import build
+from beyond_mocap.library.build import build_library
 from beyond_mocap.library.library import Library
 from beyond_mocap.motion import quaternion
-from beyond_mocap.motion.humanoid import identify
-from beyond_mocap.motion.motion import Motion, pose_kinematics
-from beyond_mocap.motion.retargeting.adult import adult_skeleton
-from beyond_mocap.motion.retargeting.neutral import neutral_stance
+from beyond_mocap.motion.humanoid import identify_joints
+from beyond_mocap.motion.motion import Motion, compute_pose
+from beyond_mocap.motion.retargeting.adult import build_adult_skeleton
+from beyond_mocap.motion.retargeting.neutral import build_neutral_stance
 from beyond_mocap.motion.track import Track
 from beyond_mocap.synthesis.plan import Plan
 from beyond_mocap.synthesis.synthesize import synthesize
 from beyond_mocap.synthesis.take import Take
-from beyond_mocap.synthetic.gait import gait
-from beyond_mocap.synthetic.gestures import strike
-from beyond_mocap.synthetic.moves import getting_up
-from beyond_mocap.synthetic.resting import on_the_side
+from beyond_mocap.synthetic.gait import build_gait
+from beyond_mocap.synthetic.gestures import build_strike
+from beyond_mocap.synthetic.moves import build_get_up
+from beyond_mocap.synthetic.resting import build_lying_pose
 
 # clip -> metres per second, words
 
@@ -45,14 +45,14 @@ def sample_cache(tmp_path_factory) -> Path:
     """The cache of the sample library, with its synthetic clips in it; processes side by side share it."""
     base = tmp_path_factory.getbasetemp()
     place = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "sample_cache"
-    assert build(SAMPLE_LIBRARY, cache_dir=place).extended.clips
+    assert build_library(SAMPLE_LIBRARY, cache_dir=place).with_synthetic_clips.clips
     return place
 
 
 def write_clip(path: Path, motion: Motion, text: str) -> Path:
     """One recording and its words, which stand in a file beside it."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    bvh.write(path, motion)
+    bvh.write_bvh(path, motion)
     path.with_suffix(".txt").write_text(text)
     return path
 
@@ -61,11 +61,11 @@ def write_clip(path: Path, motion: Motion, text: str) -> Path:
 def clip_file():
     """clip_file(path, speed=1.4, seconds=3.0, words="walking", fps=30, **gait): a made gait and its words."""
 
-    def make(path, speed=1.4, seconds=3.0, words="walking", fps=30.0, **more) -> Path:
+    def write_gait(path, speed=1.4, seconds=3.0, words="walking", fps=30.0, **more) -> Path:
         text = f"0 {seconds:g} {words}\n" if words else "# nothing\n"
-        return write_clip(Path(path), gait(speed, seconds, fps, **more), text)
+        return write_clip(Path(path), build_gait(speed, seconds, fps, **more), text)
 
-    return make
+    return write_gait
 
 
 @pytest.fixture(scope="session")
@@ -73,9 +73,9 @@ def clips_folder(tmp_path_factory) -> Path:
     """stand, walk, jog and run at SPEEDS, a walk that turns left, and a right kick (60 fps)."""
     folder = tmp_path_factory.mktemp("clips")
     for seed, (name, (speed, words)) in enumerate(SPEEDS.items()):
-        write_clip(folder / f"{name}.bvh", gait(speed, 5.0, 30.0, seed=seed), f"0 5 {words}\n")
-    write_clip(folder / "bows" / "turn.bvh", gait(1.4, 4.0, 60.0, turn_rate=0.9, seed=7), "0 4 walking left\n")
-    kick = strike("kick low inside", fps=60.0)
+        write_clip(folder / f"{name}.bvh", build_gait(speed, 5.0, 30.0, seed=seed), f"0 5 {words}\n")
+    write_clip(folder / "bows" / "turn.bvh", build_gait(1.4, 4.0, 60.0, turn_rate=0.9, seed=7), "0 4 walking left\n")
+    kick = build_strike("kick low inside", fps=60.0)
     text = f"0 2 jogging front\n{kick.start:.3f} {kick.end:.3f} {KICK}\n{kick.key:.3f} {KICK}\n"
     write_clip(folder / "kick.bvh", kick.motion, text)
     return folder
@@ -83,20 +83,20 @@ def clips_folder(tmp_path_factory) -> Path:
 
 @pytest.fixture(scope="session")
 def library(clips_folder) -> Library:
-    return build(clips_folder)
+    return build_library(clips_folder)
 
 
 @pytest.fixture(scope="session")
 def strikes_library(tmp_path_factory) -> Library:
     """The library of the passing samples."""
     samples = Path(__file__).resolve().parents[2] / "sample_blend" / "passes" / "library"
-    return build(samples, cache_dir=tmp_path_factory.mktemp("strikes"))
+    return build_library(samples, cache_dir=tmp_path_factory.mktemp("strikes"))
 
 
 @pytest.fixture(scope="session")
 def kick_seconds() -> float:
     """When the ball is kicked in the made clip."""
-    return strike("kick low inside", fps=60.0).key
+    return build_strike("kick low inside", fps=60.0).key
 
 
 class Flight(NamedTuple):
@@ -106,7 +106,7 @@ class Flight(NamedTuple):
     place: np.ndarray
     speed: np.ndarray
 
-    def middle(self, seconds: np.ndarray) -> np.ndarray:
+    def compute_middle(self, seconds: np.ndarray) -> np.ndarray:
         """(T, 3) m, seconds (T,) from the end."""
         return self.place + seconds[:, None] * self.speed + [0.0, 0.0, -0.5 * 9.81] * seconds[:, None] ** 2
 
@@ -114,17 +114,17 @@ class Flight(NamedTuple):
 @pytest.fixture(scope="session")
 def flight() -> Flight:
     """0.3 s at 100 fps of a dive to the left, arms stretched, leaning 50 degrees at its end and more by 1.5 rad/s."""
-    skeleton = adult_skeleton()
-    body = identify(skeleton)
+    skeleton = build_adult_skeleton()
+    body = identify_joints(skeleton)
     seconds = np.arange(-30, 1) / 100.0
-    local = np.tile(on_the_side(neutral_stance(skeleton), True, settled=False), (len(seconds), 1, 1))
-    upright = getting_up(skeleton, 100.0).motion.rotations[-1, 0]
+    local = np.tile(build_lying_pose(build_neutral_stance(skeleton), True, settled=False), (len(seconds), 1, 1))
+    upright = build_get_up(skeleton, 100.0).motion.rotations[-1, 0]
     lean = quaternion.from_rotation_vector((-np.radians(50.0) - 1.5 * seconds)[:, None] * [1.0, 0.0, 0.0])
     local[:, 0] = quaternion.multiply(lean, upright)
-    places, _ = pose_kinematics(skeleton, np.zeros((len(seconds), 3)), local)
+    places, _ = compute_pose(skeleton, np.zeros((len(seconds), 3)), local)
     away = places[:, body.hips] + 0.25 * (places[:, body.neck] - places[:, body.hips])
     found = Flight(None, np.array([0.0, 0.0, 1.1]), np.array([0.6, 2.5, -0.8]))
-    return found._replace(motion=Motion(skeleton, found.middle(seconds) - away, local, 100.0))
+    return found._replace(motion=Motion(skeleton, found.compute_middle(seconds) - away, local, 100.0))
 
 
 @pytest.fixture(scope="session")
@@ -132,8 +132,8 @@ def dive_file(flight):
     """dive_file(path): half a second of standing, a take-off to the left, and the planted flight; its words name the
     dive, its key is where the flight begins."""
 
-    def make(path) -> Path:
-        standing = getting_up(flight.motion.skeleton, 100.0).motion
+    def write_dive(path) -> Path:
+        standing = build_get_up(flight.motion.skeleton, 100.0).motion
         away = flight.motion.root_positions[0] - [0.0, 0.4, 0.0]
         count, take_off = 50, np.linspace(0.0, 1.0, 22)[1:-1, None]
         root = np.tile([*away[:2], standing.root_positions[-1, 2]], (count, 1))
@@ -149,7 +149,7 @@ def dive_file(flight):
         text = f"20f {len(whole) - 1}f dive left high\n{count + 20}f dive left high\n0 0.4 standing\n"
         return write_clip(Path(path), whole, text)
 
-    return make
+    return write_dive
 
 
 @pytest.fixture(scope="session")
@@ -159,35 +159,35 @@ def track_of():
     speed: m/s, one or a function of the time since the first sample; turn: radians per second, or a function that gives
     the direction in radians. The ball rolls 1 m ahead."""
 
-    def make(speed=1.4, seconds=8.0, turn=0.0, hz=25.0, start=0.0, ball=False) -> Track:
+    def build_track(speed=1.4, seconds=8.0, turn=0.0, hz=25.0, start=0.0, ball=False) -> Track:
         fine = np.arange(0.0, seconds + 0.5 / hz, 0.001)
         fast = np.broadcast_to(speed(fine) if callable(speed) else speed, fine.shape)
-        way = np.broadcast_to(turn(fine) if callable(turn) else turn * fine, fine.shape)
-        velocity = fast[:, None] * np.stack([np.cos(way), np.sin(way)], axis=1)
+        direction = np.broadcast_to(turn(fine) if callable(turn) else turn * fine, fine.shape)
+        velocity = fast[:, None] * np.stack([np.cos(direction), np.sin(direction)], axis=1)
         path = np.concatenate([np.zeros((1, 2)), np.cumsum(velocity[:-1] * 0.001, axis=0)])
         times = np.arange(int(round(seconds * hz)) + 1) / hz
         places = np.stack([np.interp(times, fine, path[:, axis]) for axis in (0, 1)], axis=1)
         rolling = np.column_stack([places + [1.0, 0.0], np.full(len(times), 0.11)]) if ball else None
         return Track(times + start, places, rolling)
 
-    return make
+    return build_track
 
 
 @pytest.fixture(scope="session")
 def timeline_of():
     """timeline_of((start, end, words) or (time, words), ...) -> Timeline, words as in the text form."""
 
-    def make(*lines) -> Timeline:
+    def build_timeline(*lines) -> Timeline:
         return parse_timeline("".join(" ".join(map(str, line)) + "\n" for line in lines))
 
-    return make
+    return build_timeline
 
 
 @pytest.fixture(scope="session")
 def track(track_of) -> Track:
     """Twenty seconds: a walk that becomes a jog, in a wide bow, with the ball ahead."""
-    speed, way = (lambda t: 1.4 + 0.7 * (1 + np.tanh(t - 6.0))), (lambda t: 0.6 * np.sin(0.3 * t))
-    return track_of(speed, seconds=20.0, turn=way, ball=True)
+    speed, direction = (lambda t: 1.4 + 0.7 * (1 + np.tanh(t - 6.0))), (lambda t: 0.6 * np.sin(0.3 * t))
+    return track_of(speed, seconds=20.0, turn=direction, ball=True)
 
 
 @pytest.fixture(scope="session")

@@ -132,7 +132,7 @@ def test_no_folder_is_crowded():
 
 
 def test_the_picture_of_the_house_is_up_to_date():
-    assert draw_house.PICTURE.read_text("utf-8") == draw_house.draw_house()
+    assert draw_house.PICTURE.read_text("utf-8") == draw_house.draw_architecture()
 
 
 @pytest.mark.parametrize("path, text", [

@@ -13,21 +13,21 @@ from tab import (
     EXTENSION,
     PICTURES,
     TAB,
-    assert_no_trouble_since,
-    moves,
+    assert_no_errors_since,
+    is_moving,
     output,
-    press_all,
+    press_all_buttons,
     press_button,
-    printed_since,
-    sample,
-    settings,
-    trouble,
-    until,
+    read_printed_since,
+    copy_sample,
+    get_settings,
+    find_errors,
+    wait_until,
     wait_for_work,
     window,
-    within,
+    report_time,
 )
-from window import unfold
+from window import draw_unfolded
 
 HEAVY = {"scipy", "sklearn", "kloppy", "c3d", "lxml", "joblib", "matplotlib"}
 
@@ -48,7 +48,7 @@ def check_enabling_is_light():
         assert addon_utils.enable(EXTENSION) is not None
         seconds.append(time.process_time() - start)
         yield 0.1
-    within("enabling, s", min(seconds), 0.3)
+    report_time("enabling, s", min(seconds), 0.3)
 
 
 def check_packages_come_from_our_wheels():
@@ -56,7 +56,7 @@ def check_packages_come_from_our_wheels():
     extension = pathlib.Path(sys.modules[EXTENSION].__file__).parent
     unpacked = (extension.parents[1] / ".local").resolve()
     if "user_default" not in str(extension.resolve()):
-        output.say("     run from the source folder, which carries no wheels: not looked at")
+        output.write_line("     run from the source folder, which carries no wheels: not looked at")
         return
     manifest = tomllib.loads((extension / "blender_manifest.toml").read_text("utf-8"))
     names = sorted({pathlib.PurePath(wheel).name.split("-")[0] for wheel in manifest["wheels"]})
@@ -64,7 +64,7 @@ def check_packages_come_from_our_wheels():
     modules = set()
     for name in names:
         distribution = importlib.metadata.distribution(name)
-        assert below(distribution.locate_file(""), unpacked), f"{name} is found in {distribution.locate_file('')}"
+        assert is_below(distribution.locate_file(""), unpacked), f"{name} is found in {distribution.locate_file('')}"
         modules |= {file.parts[0].removesuffix(".py") for file in distribution.files
                     if file.name == "__init__.py" and len(file.parts) == 2 or file.suffix == ".py"
                     and len(file.parts) == 1}
@@ -73,13 +73,13 @@ def check_packages_come_from_our_wheels():
     use_compiled_code()
     strangers = {name: module.__file__ for name, module in list(sys.modules.items())
                  if name.split(".")[0] in modules and getattr(module, "__file__", None)
-                 and not below(module.__file__, unpacked)}
+                 and not is_below(module.__file__, unpacked)}
     assert not strangers, strangers
-    output.say(f"     from the wheels: {', '.join(sorted(modules))}")
+    output.write_line(f"     from the wheels: {', '.join(sorted(modules))}")
     yield 0
 
 
-def below(path, folder):
+def is_below(path, folder):
     """Whether a path lies in a folder."""
     return folder in pathlib.Path(path).resolve().joinpath("x").parents
 
@@ -97,7 +97,7 @@ def use_compiled_code():
     assert lxml.etree.fromstring("<a><b/></a>")[0].tag == "b"
 
 
-def check_the_eye_and_the_hand():
+def check_the_test_finds_buttons_and_errors():
     """A planted button is found and pressed, planted errors are seen: else the next checks would prove nothing."""
     pressed = []
 
@@ -120,60 +120,60 @@ def check_the_eye_and_the_hand():
     planted = (BEYOND_MOCAP_OT_planted, BEYOND_MOCAP_PT_planted)
     for cls in planted:
         bpy.utils.register_class(cls)
-    yield from press_all(["planted"])
-    yield from until(lambda: pressed and len(set(trouble(printed_since(mark)))) >= 2, 30.0)
+    yield from press_all_buttons(["planted"])
+    yield from wait_until(lambda: pressed and len(set(find_errors(read_printed_since(mark)))) >= 2, 30.0)
     for cls in planted:
         bpy.utils.unregister_class(cls)
-    seen = printed_since(mark)
+    seen = read_printed_since(mark)
     assert pressed == ["VIEW_3D"], f"pressed in {pressed}"
     assert "ValueError: planted" in seen, seen
-    assert len(set(trouble(seen))) >= 2, seen
+    assert len(set(find_errors(seen))) >= 2, seen
 
 
-check_the_eye_and_the_hand.plants_trouble = True
+check_the_test_finds_buttons_and_errors.plants_trouble = True
 
 
 def check_the_tab_draws():
     mark = len(output.text())
-    area = window.area("VIEW_3D")
+    area = window.find_area("VIEW_3D")
     yield from window.open_tab(area, TAB)
-    assert window.sidebar(area).active_panel_category == TAB
-    window.picture(PICTURES / "panel.png")
-    assert_no_trouble_since(mark)
+    assert window.find_sidebar(area).active_panel_category == TAB
+    window.save_picture(PICTURES / "panel.png")
+    assert_no_errors_since(mark)
 
 
 def check_every_button():
     """Press each operator's button of the tab once; whatever it opens is closed, whatever it starts is cancelled."""
     mark = len(output.text())
-    fold_again = [unfold(panel) for panel in bpy.types.Panel.__subclasses__() if panel.__module__.startswith(EXTENSION)]
-    pressed = yield from press_all()
-    window.picture(PICTURES / "unfolded.png")
+    fold_again = [draw_unfolded(panel) for panel in bpy.types.Panel.__subclasses__() if panel.__module__.startswith(EXTENSION)]
+    pressed = yield from press_all_buttons()
+    window.save_picture(PICTURES / "unfolded.png")
     for fold in fold_again:
         fold()
     assert pressed, "the tab has no button"
-    assert_no_trouble_since(mark)
+    assert_no_errors_since(mark)
 
 
-def states():
+def list_states():
     """How far the players' results are."""
-    return {player.result.state for player in settings().players}
+    return {player.result.state for player in get_settings().players}
 
 
 def check_the_quickstart():
     """Open the sample as an animator does and press its three buttons: bodies move at the end."""
     mark = len(output.text())
-    bpy.ops.wm.open_mainfile(filepath=str(sample() / "quickstart.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(copy_sample() / "quickstart.blend"))
     yield 0.5
-    for step, reached in (("build_library", lambda: "43 clips" in settings().library_holds),
-                          ("synthesize", lambda: states() == {"PREVIEW"}),
-                          ("accept", lambda: states() == {"ACCEPTED"})):
+    for step, reached in (("build_library", lambda: "43 clips" in get_settings().library_holds),
+                          ("synthesize", lambda: list_states() == {"PREVIEW"}),
+                          ("accept", lambda: list_states() == {"ACCEPTED"})):
         yield from press_button(step)
         told = yield from wait_for_work()
-        yield from until(reached, what=states)
-        output.say(f"     pressed {step}: {told}")
-    moving = [body.name for body in bpy.data.objects if body.type == "ARMATURE" and moves(body)]
-    output.say(f"     moving: {', '.join(moving)}")
+        yield from wait_until(reached, what=list_states)
+        output.write_line(f"     pressed {step}: {told}")
+    moving = [body.name for body in bpy.data.objects if body.type == "ARMATURE" and is_moving(body)]
+    output.write_line(f"     moving: {', '.join(moving)}")
     assert moving, "no armature moves"
     yield 2
-    window.picture(PICTURES / "quickstart.png")
-    assert_no_trouble_since(mark)
+    window.save_picture(PICTURES / "quickstart.png")
+    assert_no_errors_since(mark)

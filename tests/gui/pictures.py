@@ -5,16 +5,16 @@ import pathlib
 
 import bpy
 from mathutils import Euler
-from tab import EXTENSION, TAB, output, room, run, sample, window
-from window import unfold
+from tab import EXTENSION, TAB, output, import_module, run_operator, copy_sample, window
+from window import draw_unfolded
 
-KEPT = pathlib.Path("docs/pictures")
+KEPT_PICTURES = pathlib.Path("docs/pictures")
 NAMES = {"players": "track", "synthesis": "synthesize"}  # panels whose page has another name
 TABS = 22  # pixels of a sidebar's right edge that are its tabs
 FRAME = 190
 
 
-def panels(kind, parent=""):
+def list_panels(kind, parent=""):
     """Our panels in this kind of editor, in their order; parent: those within that one."""
     found = [cls for cls in bpy.types.Panel.__subclasses__() if cls.__module__.startswith(EXTENSION)
              and cls.is_registered
@@ -23,9 +23,9 @@ def panels(kind, parent=""):
     return sorted(found, key=lambda cls: getattr(cls, "bl_order", 0))
 
 
-def a_match_that_moves():
+def open_moving_match():
     """The quickstart, its library built and both players synthesized, seen from the side."""
-    bpy.ops.wm.open_mainfile(filepath=str(sample() / "quickstart.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(copy_sample() / "quickstart.blend"))
     yield 1
     bpy.ops.beyond_mocap.build_library()
     if bpy.ops.beyond_mocap.place_players.poll():
@@ -39,67 +39,67 @@ def a_match_that_moves():
 def look_at(body):
     """The body from the side, near."""
     hips = body.matrix_world @ body.pose.bones[0].head
-    view = window.area("VIEW_3D").spaces.active.region_3d
+    view = window.find_area("VIEW_3D").spaces.active.region_3d
     view.view_perspective, view.view_distance = "PERSP", 7.0
     view.view_location = (hips.x, hips.y, 0.8)
     view.view_rotation = Euler((1.35, 0.0, 0.6)).to_quaternion()
 
 
-def solo(shown, kind):
+def show_only(panel, kind):
     """Only this panel is in the tab, it and what is within it open."""
     own = [cls for cls in bpy.types.Panel.__subclasses__() if cls.__module__.startswith(EXTENSION) and cls.is_registered
            and cls.bl_space_type == kind and getattr(cls, "bl_category", "") == TAB]
     for cls in sorted(own, key=lambda cls: not getattr(cls, "bl_parent_id", "")):  # those within others first
         bpy.utils.unregister_class(cls)
-    for cls in shown:  # a name that Blender has not seen, since it remembers which ones were closed
+    for cls in panel:  # a name that Blender has not seen, since it remembers which ones were closed
         cls.bl_options, cls.bl_idname = set(), f"{cls.__name__}_open"
         if getattr(cls, "bl_parent_id", ""):
             cls.bl_parent_id += "_open"
         bpy.utils.register_class(cls)
 
 
-def picture_of_tab(name, area):
+def save_tab_picture(name, area):
     """The sidebar without its tabs, down to the last thing in it."""
-    region = window.sidebar(area)
+    region = window.find_sidebar(area)
     region.tag_redraw()
     yield 0.7
-    yield from window.move(region.x - 200, region.y + 100)
+    yield from window.move_pointer(region.x - 200, region.y + 100)
     yield 0.5
-    window.part(KEPT / f"{name}.png", region.x + 3, region.y + 4, region.width - TABS - 3, region.height - 8,
+    window.save_part(KEPT_PICTURES / f"{name}.png", region.x + 3, region.y + 4, region.width - TABS - 3, region.height - 8,
                 "-fuzz", "2%", "-trim", "+repage", "-bordercolor", "#303030", "-border", "4")
-    output.say(f"     {name}.png")
+    output.write_line(f"     {name}.png")
 
 
 def check_the_whole_window():
-    yield from a_match_that_moves()
-    area = window.area("VIEW_3D")
+    yield from open_moving_match()
+    area = window.find_area("VIEW_3D")
     yield from window.open_tab(area, TAB)
     yield 1
-    window.part(KEPT / "panel.png", area.x, area.y, area.width, area.height, "-resize", "1000x")
+    window.save_part(KEPT_PICTURES / "panel.png", area.x, area.y, area.width, area.height, "-resize", "1000x")
 
 
 def check_each_panel_of_the_3d_view():
-    area = window.area("VIEW_3D")
-    tops = [(cls, panels("VIEW_3D", cls.__name__)) for cls in panels("VIEW_3D")]
+    area = window.find_area("VIEW_3D")
+    tops = [(cls, list_panels("VIEW_3D", cls.__name__)) for cls in list_panels("VIEW_3D")]
     for top, within in tops:
-        solo([top, *within], "VIEW_3D")
-        fold_again = [unfold(cls) for cls in (top, *within)]
+        show_only([top, *within], "VIEW_3D")
+        fold_again = [draw_unfolded(cls) for cls in (top, *within)]
         name = top.__name__.partition("_PT_")[2]
         yield from window.open_tab(area, TAB)
-        yield from picture_of_tab(f"panel-{NAMES.get(name, name)}", area)
+        yield from save_tab_picture(f"panel-{NAMES.get(name, name)}", area)
         for fold in fold_again:
             fold()
 
 
-def a_walk_on_a_bend():
+def create_walk_on_bend():
     """A walk of the sample with a low-poly body, on a curve with two bends; the curve's middle point is selected."""
     bpy.ops.wm.read_homefile(use_empty=True, load_ui=False)
     yield 1
     scene = bpy.context.scene
-    bpy.ops.beyond_mocap.import_clips(filepath=str(sample() / "library" / "walk_jog_walk.bvh"))
+    bpy.ops.beyond_mocap.import_clips(filepath=str(copy_sample() / "library" / "walk_jog_walk.bvh"))
     walker = bpy.context.object
-    motion = room("scene.core.action").read(walker, scene)
-    person = room("scene.stage.body").create(walker, "person", (0.75, 0.05, 0.06), scene.collection, scene, motion)
+    motion = import_module("scene.core.action").read_motion(walker, scene)
+    person = import_module("scene.stage.body").create_character(walker, "person", (0.75, 0.05, 0.06), scene.collection, scene, motion)
     for collection in person.users_collection:
         collection.color_tag = "NONE"
     walker.hide_set(False)
@@ -114,50 +114,50 @@ def a_walk_on_a_bend():
     yield 2.5  # figures
 
 
-def picture_of_view(name):
+def save_view_picture(name):
     """The 3D view without its sidebar."""
-    area = window.area("VIEW_3D")
+    area = window.find_area("VIEW_3D")
     area.spaces.active.show_region_ui = False
     area.spaces.active.region_3d.view_camera_zoom = 27.0
     yield 1.5
-    window.part(KEPT / f"{name}.png", area.x, area.y, area.width, area.height, "-resize", "900x")
-    output.say(f"     {name}.png")
+    window.save_part(KEPT_PICTURES / f"{name}.png", area.x, area.y, area.width, area.height, "-resize", "900x")
+    output.write_line(f"     {name}.png")
 
 
 def check_path_editing():
-    yield from a_walk_on_a_bend()
-    for shown in window.area("VIEW_3D").spaces:
+    yield from create_walk_on_bend()
+    for shown in window.find_area("VIEW_3D").spaces:
         shown.overlay.show_extras = False  # cameras are no part of it
     for kind in ("quarter", "behind"):
-        run("beyond_mocap.path_camera", "EXEC_DEFAULT", which=kind.upper())
-        yield from picture_of_view(f"path-editing-{kind}")
-    run("beyond_mocap.path_camera", "EXEC_DEFAULT", which="FREE")
+        run_operator("beyond_mocap.path_camera", "EXEC_DEFAULT", which=kind.upper())
+        yield from save_view_picture(f"path-editing-{kind}")
+    run_operator("beyond_mocap.path_camera", "EXEC_DEFAULT", which="FREE")
     curve = bpy.context.object
-    seen = window.area("VIEW_3D").spaces.active.region_3d
+    seen = window.find_area("VIEW_3D").spaces.active.region_3d
     seen.view_perspective, seen.view_distance = "PERSP", 8.5
     rider = next(thing for thing in bpy.context.scene.objects if thing.type == "ARMATURE")
     hips = rider.matrix_world @ rider.pose.bones[0].head
     seen.view_location, seen.view_rotation = (hips.x + 0.4, 0.5 * hips.y, 0.5), Euler((1.12, 0.0, 0.35)).to_quaternion()
     view = bpy.context.scene.beyond_mocap.view
     view.path_ghost = view.path_residuals = True
-    yield from picture_of_view("path-editing-residuals")
+    yield from save_view_picture("path-editing-residuals")
     view.path_ghost = view.path_residuals = False
     with bpy.context.temp_override(window=window.window):
         bpy.ops.object.mode_set(mode="EDIT")
         bpy.ops.curve.select_all(action="DESELECT")
     curve.data.splines[0].points[3].select = True
-    yield from picture_of_view("path-editing")
+    yield from save_view_picture("path-editing")
     with bpy.context.temp_override(window=window.window):
         bpy.ops.object.mode_set(mode="OBJECT")
-    panel, = (cls for cls in panels("VIEW_3D") if "PT_path" in cls.__name__)
-    area = window.area("VIEW_3D")
-    solo([panel], "VIEW_3D")
+    panel, = (cls for cls in list_panels("VIEW_3D") if "PT_path" in cls.__name__)
+    area = window.find_area("VIEW_3D")
+    show_only([panel], "VIEW_3D")
     yield from window.open_tab(area, TAB)
-    yield from picture_of_tab("panel-path", area)
-    fold, view = unfold(panel), bpy.context.preferences.view
+    yield from save_tab_picture("panel-path", area)
+    fold, view = draw_unfolded(panel), bpy.context.preferences.view
     view.ui_scale = 0.75  # it is longer than the window
     yield 1
-    yield from picture_of_tab("panel-path-open", area)
+    yield from save_tab_picture("panel-path-open", area)
     view.ui_scale = 1.0
     fold()
 
@@ -166,21 +166,21 @@ def check_optical_markers():
     bpy.ops.wm.read_homefile(use_empty=True, load_ui=False)
     yield 1
     scene = bpy.context.scene
-    bpy.ops.beyond_mocap.import_markers(filepath=str(sample() / "markers" / "throw.c3d"))
+    bpy.ops.beyond_mocap.import_markers(filepath=str(copy_sample() / "markers" / "throw.c3d"))
     cloud = bpy.context.object
     assert bpy.ops.beyond_mocap.reconstruct_markers() == bpy.ops.beyond_mocap.find_release() == {"FINISHED"}
     scene.frame_set(24)
-    view = window.area("VIEW_3D").spaces.active.region_3d
+    view = window.find_area("VIEW_3D").spaces.active.region_3d
     view.view_perspective, view.view_distance = "PERSP", 2.6
     view.view_location, view.view_rotation = (0.85, 0.0, 0.95), Euler((1.45, 0.0, 0.3)).to_quaternion()
-    panel, = (cls for cls in panels("VIEW_3D") if "PT_markers" in cls.__name__)
-    area = window.area("VIEW_3D")
-    solo([panel], "VIEW_3D")
+    panel, = (cls for cls in list_panels("VIEW_3D") if "PT_markers" in cls.__name__)
+    area = window.find_area("VIEW_3D")
+    show_only([panel], "VIEW_3D")
     yield from window.open_tab(area, TAB)
-    fold, look = unfold(panel), bpy.context.preferences.view
+    fold, look = draw_unfolded(panel), bpy.context.preferences.view
     look.ui_scale = 0.7  # it is longer than the window
     yield 1
-    yield from picture_of_tab("panel-markers", area)
+    yield from save_tab_picture("panel-markers", area)
     look.ui_scale = 1.0
     fold()
     kept = cloud.beyond_mocap_cloud
@@ -190,25 +190,25 @@ def check_optical_markers():
     kept.body.hide_set(False)
     kept.body.data.display_type, kept.body.show_in_front = "OCTAHEDRAL", False
     cloud.select_set(False)
-    yield from picture_of_view("markers")
+    yield from save_view_picture("markers")
 
 
 def check_a_match():
     """From a saved file, so that paths are shown as they are kept."""
-    bpy.ops.wm.open_mainfile(filepath=str(sample() / "quickstart.blend"), load_ui=False)
+    bpy.ops.wm.open_mainfile(filepath=str(copy_sample() / "quickstart.blend"), load_ui=False)
     yield 1
     scene = bpy.context.scene
-    bpy.ops.beyond_mocap.read_match(filepath=str(sample() / "match" / "small" / "small.dat"))
+    bpy.ops.beyond_mocap.read_match(filepath=str(copy_sample() / "match" / "small" / "small.dat"))
     match = scene.beyond_mocap_match
     match.start, match.end, match.active = 6.0, 11.0, 3
-    assert bpy.ops.beyond_mocap.make_match() == {"FINISHED"}
-    panel, = (cls for cls in panels("VIEW_3D") if "PT_match" in cls.__name__)
-    area = window.area("VIEW_3D")
-    solo([panel], "VIEW_3D")
+    assert bpy.ops.beyond_mocap.synthesize_match() == {"FINISHED"}
+    panel, = (cls for cls in list_panels("VIEW_3D") if "PT_match" in cls.__name__)
+    area = window.find_area("VIEW_3D")
+    show_only([panel], "VIEW_3D")
     yield from window.open_tab(area, TAB)
-    fold = unfold(panel)
+    fold = draw_unfolded(panel)
     yield 1
-    yield from picture_of_tab("panel-match", area)
+    yield from save_tab_picture("panel-match", area)
     fold()
 
 
@@ -221,4 +221,4 @@ def check_the_preferences():
     bpy.context.window_manager.addon_search = "Beyond Mocap"
     bpy.ops.preferences.addon_expand(module=EXTENSION)
     yield 1.5
-    window.part(KEPT / "preferences.png", shown.x + 170, shown.y + 4, shown.width - 180, shown.height * 6 // 10)
+    window.save_part(KEPT_PICTURES / "preferences.png", shown.x + 170, shown.y + 4, shown.width - 180, shown.height * 6 // 10)

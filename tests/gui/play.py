@@ -17,12 +17,12 @@ import bpy
 
 sys.path.insert(0, "tests/gui")  # Blender does not put a script's folder there; the current one is the clone's top
 import tab  # noqa: E402
-from window import talk  # noqa: E402
+from window import run_script  # noqa: E402
 
 LIMIT = 1500  # seconds for a whole file; only what hangs takes so long, on any machine
 
 
-def checks_of(path):
+def load_checks(path):
     """The file at `path` as a module that knows tab.py's names."""
     spec = importlib.util.spec_from_file_location(path.stem, path)
     module = importlib.util.module_from_spec(spec)
@@ -31,10 +31,10 @@ def checks_of(path):
     return module
 
 
-def play_all(module):
+def run_checks(module):
     """Run the module's checks one after the other; the status is 1 where one failed."""
     checks = [value for name, value in vars(module).items() if name.startswith("check_")]
-    failed, begun = 0, time.monotonic()
+    failed, start_time = 0, time.monotonic()
     for check in checks:
         name, start, mark = check.__name__.removeprefix("check_").replace("_",
                                                                           " "), time.monotonic(), len(tab.output.text())
@@ -42,20 +42,20 @@ def play_all(module):
             yield from check()
             yield 0.2  # what the last step changed is drawn
             if not getattr(check, "plants_trouble", False):
-                tab.assert_no_trouble_since(mark)
-            tab.output.say(f"ok   {name} ({time.monotonic() - start:.0f} s)")
+                tab.assert_no_errors_since(mark)
+            tab.output.write_line(f"ok   {name} ({time.monotonic() - start:.0f} s)")
         except Exception:
             failed += 1
-            tab.window.picture(tab.PICTURES / f"failed-{check.__name__}.png")
-            tab.output.say(f"FAIL {name}\n{traceback.format_exc()}")
+            tab.window.save_picture(tab.PICTURES / f"failed-{check.__name__}.png")
+            tab.output.write_line(f"FAIL {name}\n{traceback.format_exc()}")
     (tab.PICTURES / f"{module.__name__}.txt").write_text(tab.output.text(), "utf-8")
-    told = f"{len(checks) - failed} passed, {failed} failed in {time.monotonic() - begun:.0f} s"
-    tab.output.say(f"{module.__name__}: {told}, Blender {bpy.app.version_string}")
+    summary = f"{len(checks) - failed} passed, {failed} failed in {time.monotonic() - start_time:.0f} s"
+    tab.output.write_line(f"{module.__name__}: {summary}, Blender {bpy.app.version_string}")
     return min(failed, 1) if checks else 1
 
 
 tab.PICTURES.mkdir(parents=True, exist_ok=True)
 bpy.context.preferences.view.show_splash = False
 bpy.context.preferences.system.use_region_overlap = False  # else each move over the sidebar draws the whole view anew
-played = checks_of(pathlib.Path(sys.argv[sys.argv.index("--") + 1]))
-talk(lambda: play_all(played), tab.output, LIMIT)
+check_module = load_checks(pathlib.Path(sys.argv[sys.argv.index("--") + 1]))
+run_script(lambda: run_checks(check_module), tab.output, LIMIT)

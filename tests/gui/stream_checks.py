@@ -7,117 +7,117 @@ import time
 
 import bpy
 import mathutils
-from ball_checks import choose, own_tab, thing
-from tab import PICTURES, assert_no_trouble_since, output, press, room, sample, until, window, within
+from ball_checks import select_objects, isolate_panel, find_object
+from tab import PICTURES, assert_no_errors_since, output, click_operator, import_module, copy_sample, wait_until, window, report_time
 
 PORT = 7361 + os.getpid() % 997  # another session's stream may be on this machine
 SENT = {}
 
 
-def told():
+def get_stream_status():
     """How the stream does."""
     return bpy.context.window_manager.beyond_mocap_streaming
 
 
-def scene():
+def get_scene():
     """The window's scene, looked up each time, since undo replaces it."""
     return window.window.scene
 
 
-def send(clip, loop=True):
+def start_sending(clip, loop=True):
     """Begin to send a clip; returns what ends it."""
-    sender = room("beyond_mocap.passes.stream.sender").Sender(sample() / clip, PORT, loop=loop)
+    sender = import_module("beyond_mocap.passes.stream.sender").Sender(copy_sample() / clip, PORT, loop=loop)
     stop = threading.Event()
-    thread = threading.Thread(target=sender.run, args=(stop.is_set,))
+    thread = threading.Thread(target=sender.send_file, args=(stop.is_set,))
     thread.start()
 
-    def end():
+    def stop_sending():
         stop.set()
         thread.join(5.0)
 
-    return end
+    return stop_sending
 
 
-def look_from(place, distance):
+def set_view(place, distance):
     """Turn the view."""
-    view = window.area("VIEW_3D").spaces.active.region_3d
+    view = window.find_area("VIEW_3D").spaces.active.region_3d
     view.view_location, view.view_distance = place, distance
     view.view_rotation = mathutils.Euler((math.radians(70), 0.0, math.radians(25))).to_quaternion()
 
 
 def check_a_body_does_what_arrives():
     mark = len(output.text())
-    bpy.data.objects.remove(thing("Cube"))
-    scene().beyond_mocap_stream.port = PORT
-    back = yield from own_tab("stream")
-    yield from press("stream_start")
-    yield from until(lambda: told().on and told().state == "waiting", what=lambda: told().state)
-    SENT["end"] = send("passes/library/volley_pass.bvh")
-    yield from until(lambda: scene().beyond_mocap_stream.body is not None)
-    look_from((0.0, 0.0, 0.9), 5.0)
-    yield from until(lambda: "Latency" in told().figures and told().hit)
+    bpy.data.objects.remove(find_object("Cube"))
+    get_scene().beyond_mocap_stream.port = PORT
+    back = yield from isolate_panel("stream")
+    yield from click_operator("stream_start")
+    yield from wait_until(lambda: get_stream_status().on and get_stream_status().state == "waiting", what=lambda: get_stream_status().state)
+    SENT["end"] = start_sending("passes/library/volley_pass.bvh")
+    yield from wait_until(lambda: get_scene().beyond_mocap_stream.body is not None)
+    set_view((0.0, 0.0, 0.9), 5.0)
+    yield from wait_until(lambda: "Latency" in get_stream_status().figures and get_stream_status().hit)
     places = set()
 
-    def place_after_place():
-        places.add(tuple(round(value, 3) for value in scene().beyond_mocap_stream.body.pose.bones[0].location))
+    def iter_positions():
+        places.add(tuple(round(value, 3) for value in get_scene().beyond_mocap_stream.body.pose.bones[0].location))
         return len(places) > 2
 
-    yield from until(place_after_place, what="it stands still")
-    output.say(f"     {' ; '.join(told().figures.splitlines())} ; {told().hit}")
-    yield from window.move(300, 300)
+    yield from wait_until(iter_positions, what="it stands still")
+    output.write_line(f"     {' ; '.join(get_stream_status().figures.splitlines())} ; {get_stream_status().hit}")
+    yield from window.move_pointer(300, 300)
     yield 1.0
-    window.picture(PICTURES / "stream.png")
+    window.save_picture(PICTURES / "stream.png")
     back()
-    assert_no_trouble_since(mark)
+    assert_no_errors_since(mark)
 
 
-def check_a_stream_that_stops_is_told():
+def check_a_stopped_stream_is_reported():
     mark = len(output.text())
     SENT.pop("end")()
-    yield from until(lambda: told().state == "stalled" and "no frame for" in told().line, what=lambda: told().line)
-    assert_no_trouble_since(mark)
+    yield from wait_until(lambda: get_stream_status().state == "stalled" and "no frame for" in get_stream_status().line, what=lambda: get_stream_status().line)
+    assert_no_errors_since(mark)
 
 
 def check_strikes_are_answered_while_the_scene_plays():
     mark = len(output.text())
-    scene().sync_mode = "FRAME_DROP"
-    bpy.ops.beyond_mocap.passes_sample(sample="three")
-    scene().beyond_mocap_passes.library_folder = str(sample() / "passes" / "library")
-    scene().beyond_mocap_stream.body.location = (2.5, 3.5, 0.0)
-    look_from((0.0, 0.5, 0.6), 11.0)
-    back = yield from own_tab("live")
-    yield from press("stream_play")
-    yield from until(lambda: told().playing)
+    get_scene().sync_mode = "FRAME_DROP"
+    bpy.ops.beyond_mocap.passes_sample(copy_sample="three")
+    get_scene().beyond_mocap_passes.library_folder = str(copy_sample() / "passes" / "library")
+    get_scene().beyond_mocap_stream.body.location = (2.5, 3.5, 0.0)
+    set_view((0.0, 0.5, 0.6), 11.0)
+    back = yield from isolate_panel("live")
+    yield from click_operator("stream_play")
+    yield from wait_until(lambda: get_stream_status().playing)
     bpy.ops.screen.animation_play()
-    end = send("passes/library/volley_pass.bvh")
+    end = start_sending("passes/library/volley_pass.bvh")
     try:
-        rally = room("scene.stream.play").rally
-        yield from until(lambda: rally() is None or rally().passes >= 1)
-        assert rally() is not None, told().played
-        frame, passes, holder = scene().frame_current, rally().passes, rally().holder
-        output.say(f"     {' / '.join(told().played.splitlines())} ; frame {frame}")
-        yield from window.move(300, 300)
+        rally = import_module("scene.stream.play").current_rally
+        yield from wait_until(lambda: rally() is None or rally().passes >= 1)
+        assert rally() is not None, get_stream_status().played
+        frame, passes, holder = get_scene().frame_current, rally().passes, rally().holder
+        output.write_line(f"     {' / '.join(get_stream_status().played.splitlines())} ; frame {frame}")
+        yield from window.move_pointer(300, 300)
         yield 1.5
-        window.picture(PICTURES / "play_live.png")
-        yield from until(lambda: scene().frame_current != frame, 60.0, "the scene goes on")
-        assert (holder == "Ben" or passes > 1) and thing("Passing Ball").animation_data
+        window.save_picture(PICTURES / "play_live.png")
+        yield from wait_until(lambda: get_scene().frame_current != frame, 60.0, "the scene goes on")
+        assert (holder == "Ben" or passes > 1) and find_object("Passing Ball").animation_data
     finally:
         end()
         bpy.ops.screen.animation_cancel(restore_frame=False)
-    choose(scene().beyond_mocap_passes.players["Cho"].body.name)
-    yield from until(lambda: room("scene.stream.play").target(scene()) == "Cho" or rally().holder == "Cho")
-    yield from press("stream_end")
-    yield from until(lambda: rally() is None and not told().playing)
+    select_objects(get_scene().beyond_mocap_passes.players["Cho"].body.name)
+    yield from wait_until(lambda: import_module("scene.stream.play").find_target(get_scene()) == "Cho" or rally().holder == "Cho")
+    yield from click_operator("stream_end")
+    yield from wait_until(lambda: rally() is None and not get_stream_status().playing)
     back()
-    assert_no_trouble_since(mark)
+    assert_no_errors_since(mark)
 
 
 def check_it_is_stopped():
     mark = len(output.text())
-    back = yield from own_tab("stream")
+    back = yield from isolate_panel("stream")
     start = time.monotonic()
-    yield from press("stream_stop")
-    yield from until(lambda: not told().on)
-    within("stopped, s", time.monotonic() - start, 20.0)
+    yield from click_operator("stream_stop")
+    yield from wait_until(lambda: not get_stream_status().on)
+    report_time("stopped, s", time.monotonic() - start, 20.0)
     back()
-    assert_no_trouble_since(mark)
+    assert_no_errors_since(mark)

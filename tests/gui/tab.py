@@ -24,155 +24,155 @@ output = Output()
 window = Window()
 
 
-def within(told, value, most):
+def report_time(label, value, most):
     """Say a measured time beside the most it is meant to take. Only `make window-bench` fails where it is above: a test
     must not fail because somebody else uses the machine."""
-    output.say(f"     {told}: {value:.3g} (target {most:g}{', ABOVE IT' if value > most else ''})")
-    assert value <= most or not SPEED_COUNTS, f"{told}: {value:.3g}, target {most:g}"
+    output.write_line(f"     {label}: {value:.3g} (target {most:g}{', ABOVE IT' if value > most else ''})")
+    assert value <= most or not SPEED_COUNTS, f"{label}: {value:.3g}, target {most:g}"
 
 
-def room(name):
+def import_module(name):
     """One of the extension's modules, by its dotted name below the extension."""
     return importlib.import_module(f"{EXTENSION}.{name}")
 
 
-def settings():
+def get_settings():
     """The settings of the window's scene; looked up each time, since undo replaces them."""
     return window.window.scene.beyond_mocap
 
 
-def run(name, how="INVOKE_DEFAULT", **arguments):
+def run_operator(name, how="INVOKE_DEFAULT", **arguments):
     """An operator as its button in the 3D view runs it."""
-    area = window.area("VIEW_3D")
+    area = window.find_area("VIEW_3D")
     region = next(region for region in area.regions if region.type == "WINDOW")
     with bpy.context.temp_override(window=window.window, area=area, region=region):
         group, verb = name.split(".")
         return getattr(getattr(bpy.ops, group), verb)(how, True, **arguments)
 
 
-def sample():
+def copy_sample():
     """The folder with our own sample, which a check may write to."""
     if not SAMPLE.exists():
         shutil.copytree("sample_blend", SAMPLE, ignore=shutil.ignore_patterns("__pycache__", ".beyond_mocap"))
     return SAMPLE.resolve()
 
 
-def trouble(text):
+def find_errors(text):
     """The lines of printed text that only an error prints."""
     return re.findall(
         r"^(?:Traceback \(most recent call last\):.*|/.*\.py:\d+|.*rna_uiItem\w*:.*|UILayout\..*)$", text, re.M
     )
 
 
-def printed_since(mark):
+def read_printed_since(mark):
     """What was printed after the first `mark` characters."""
     return output.text()[mark:]
 
 
-def assert_no_trouble_since(mark):
+def assert_no_errors_since(mark):
     """Fail with what was printed, each line once, where an error is in it."""
-    printed = printed_since(mark)
-    assert not trouble(printed), "printed:\n" + "\n".join(list(dict.fromkeys(printed.splitlines()))[:40])
+    printed = read_printed_since(mark)
+    assert not find_errors(printed), "printed:\n" + "\n".join(list(dict.fromkeys(printed.splitlines()))[:40])
 
 
-def until(true, limit=300.0, what=""):
+def wait_until(is_true, limit=300.0, what=""):
     """Wait until something is true, and return the seconds that it took. `what` is told where it never is: a text, or a
     function that says what there is instead. The limit is for what hangs; the slowest machine gets there long
     before."""
     start = time.monotonic()
-    while not true():
-        told = (what() if callable(what) else what) if time.monotonic() - start > limit else ""
-        assert time.monotonic() - start < limit, f"not so after {limit:g} s: {told!r}; at work: {unrest()}"
+    while not is_true():
+        description = (what() if callable(what) else what) if time.monotonic() - start > limit else ""
+        assert time.monotonic() - start < limit, f"not so after {limit:g} s: {description!r}; at work: {list_running()}"
         yield 0.05
     return time.monotonic() - start
 
 
-def unrest():
+def list_running():
     """What is still at work, or begins by itself in a moment, and so may still change the file; empty where nothing
 is."""
     manager = bpy.context.window_manager
     busy = [operator.bl_idname for operator in window.window.modal_operators]
     busy += [work for work in (manager.beyond_mocap_work.kind, manager.beyond_mocap_work.waiting) if work]
     live = [f"scene.{name}.live" for name in ("path_editing", "ball", "passes")]
-    busy += [name for name in live if room(name).WATCHER.dirty]
-    busy += ["scene.result.freshness"] if settings().live and room("scene.result.freshness").LIVE.dirty else []
-    thrown = any(one.type == "ARMATURE" and one.beyond_mocap_throw.made for one in window.window.scene.objects)
-    busy += ["scene.throws.shown"] if thrown and room("scene.throws.shown").WATCHER.dirty else []
-    waits = room("scene.timeline.strip_events")._later in room("scene.core.live")._timers
+    busy += [name for name in live if import_module(name).WATCHER.dirty]
+    busy += ["scene.result.freshness"] if get_settings().live and import_module("scene.result.freshness").LIVE.dirty else []
+    has_throw = any(one.type == "ARMATURE" and one.beyond_mocap_throw.made for one in window.window.scene.objects)
+    busy += ["scene.throws.shown"] if has_throw and import_module("scene.throws.shown").WATCHER.dirty else []
+    waits = import_module("scene.timeline.strip_events")._run_scheduled in import_module("scene.core.live")._timers
     return busy + ["scene.timeline.strip_events"] * waits
 
 
-def settled(limit=300.0):
+def wait_until_settled(limit=300.0):
     """Wait until nothing is at work any more, nor about to begin: what was done just now has had all its
     consequences."""
     quiet = 0
 
-    def still():
+    def is_settled():
         nonlocal quiet
-        quiet = 0 if unrest() else quiet + 1
+        quiet = 0 if list_running() else quiet + 1
         return quiet > 3  # between the end of one thing and the beginning of the next there may be a look
 
     yield 0.05
-    yield from until(still, limit)
+    yield from wait_until(is_settled, limit)
 
 
-def press_all(wanted=None):
+def press_all_buttons(operators=None):
     """Press each button of the tab (or only the wanted operators'), page by page; return the calls that were pressed.
     Whatever began is ended by Escape."""
-    area = window.area("VIEW_3D")
+    area = window.find_area("VIEW_3D")
     yield from window.open_tab(area, TAB)
-    region = window.sidebar(area)
-    yield from window.to_the_top(area, region)
+    region = window.find_sidebar(area)
+    yield from window.scroll_to_top(area, region)
     pressed, usable, more = [], {}, True
 
-    def new(call):
+    def is_new(call):
         usable[call] = can_run(call)
-        return call not in pressed and (wanted is None or operator_of(call) in wanted)
+        return call not in pressed and (operators is None or parse_operator(call) in operators)
 
     while more:
-        _, call = yield from window.scan(area, region, window.command_under_pointer, new)
+        _, call = yield from window.scan_region(area, region, window.command_under_pointer, is_new)
         if call:
             pressed.append(call)
-            reaction = yield from end_what_began()
-            output.say(f"     pressed {call}: {reaction if usable[call] else 'greyed out'}")
-        more = call or (yield from window.scroll(area, region))
+            reaction = yield from close_opened()
+            output.write_line(f"     pressed {call}: {reaction if usable[call] else 'greyed out'}")
+        more = call or (yield from window.scroll_region(area, region))
     return pressed
 
 
-def press(operator, *words, editor="VIEW_3D", limit=120.0):
+def click_operator(operator, *words, editor="VIEW_3D", limit=120.0):
     """Click the operator's button in the tab that is in front, once it is there and may be pressed. `operator` may go
     on with its first arguments; `words` are others of its call."""
-    area = window.area(editor)
+    area = window.find_area(editor)
     begins = f"bpy.ops.beyond_mocap.{operator}" + "(" * ("(" not in operator)
 
-    def meant(call):
+    def is_meant(call):
         return call.startswith(begins) and all(word in call for word in words)
 
-    yield from until(lambda: can_run(begins, editor), limit, f"{operator} may be pressed")
-    yield from window.click_first(area, window.sidebar(area), meant, window.command_under_pointer, limit)
+    yield from wait_until(lambda: can_run(begins, editor), limit, f"{operator} may be pressed")
+    yield from window.click_first(area, window.find_sidebar(area), is_meant, window.command_under_pointer, limit)
 
 
 def press_button(operator, editor="VIEW_3D"):
     """Find the operator's button in our tab and click it; `operator` may go on with its first arguments."""
-    yield from window.open_tab(window.area(editor), TAB)
-    yield from press(operator, editor=editor)
+    yield from window.open_tab(window.find_area(editor), TAB)
+    yield from click_operator(operator, editor=editor)
 
 
 def fill_in(path, text, editor="VIEW_3D"):
     """Find the field of a property in our tab by the end of its data path, and type into it."""
-    area = window.area(editor)
+    area = window.find_area(editor)
     yield from window.open_tab(area, TAB)
     yield from window.click_first(
-        area, window.sidebar(area), lambda found: found.endswith(path), window.field_under_pointer
+        area, window.find_sidebar(area), lambda found: found.endswith(path), window.field_under_pointer
     )
     yield 0.3
-    yield from window.press("LEFTMOUSE")
+    yield from window.press_key("LEFTMOUSE")
     yield 0.3
-    yield from window.write(text)
+    yield from window.type_text(text)
     yield 0.3
 
 
-def browser():
+def find_file_browser():
     """The file browser that is open: its window and its area; None and None where there is none."""
     for other in bpy.context.window_manager.windows:
         for area in other.screen.areas:
@@ -183,14 +183,14 @@ def browser():
 
 def choose_file(path):
     """Choose a file in the file browser that is open, as one who types its folder and name and presses Enter."""
-    yield from until(lambda: browser()[0] is not None, 60.0, "no file browser has opened")
-    parameters = browser()[1].spaces.active.params
+    yield from wait_until(lambda: find_file_browser()[0] is not None, 60.0, "no file browser has opened")
+    parameters = find_file_browser()[1].spaces.active.params
     parameters.directory, parameters.filename = str(path.parent).encode(), path.name
     yield 1.0
     start = time.monotonic()
-    while browser()[0] is not None:  # while it still reads the folder it hears nothing
+    while find_file_browser()[0] is not None:  # while it still reads the folder it hears nothing
         assert time.monotonic() - start < 60.0, "the file browser does not close"
-        other, area = browser()
+        other, area = find_file_browser()
         middle = {"x": area.x + area.width // 2, "y": area.y + area.height // 2}
         other.event_simulate(type="MOUSEMOVE", value="NOTHING", **middle)
         yield 0.2
@@ -198,7 +198,7 @@ def choose_file(path):
         yield 1.0
 
 
-def operator_of(call):
+def parse_operator(call):
     """The operator's name in a call as Blender writes it.
 
     >>> operator_of("bpy.ops.beyond_mocap.build_library(rebuild=True)")
@@ -210,12 +210,12 @@ def operator_of(call):
 def can_run(call, editor="VIEW_3D"):
     """Whether a button's operator says that it can be used just now."""
     group, name = call.split("(")[0].split(".")[-2:]
-    area = window.area(editor)
-    with bpy.context.temp_override(window=window.window, area=area, region=window.sidebar(area)):
+    area = window.find_area(editor)
+    with bpy.context.temp_override(window=window.window, area=area, region=window.find_sidebar(area)):
         return getattr(getattr(bpy.ops, group), name).poll()
 
 
-def end_what_began(limit=300.0):
+def close_opened(limit=300.0):
     """Leave the file browser, dialog or running operator that a button brought up; say which it was."""
     manager, start = bpy.context.window_manager, time.monotonic()
     reaction = "done"
@@ -233,11 +233,11 @@ def end_what_began(limit=300.0):
 def wait_for_work():
     """Wait until no operator is running any more, nor anything that it started; say how long it took."""
     start = time.monotonic()
-    yield from settled()
+    yield from wait_until_settled()
     return f"took {time.monotonic() - start:.1f} s"
 
 
-def moves(body):
+def is_moving(body):
     """Whether an armature's bones stand differently at two frames of the scene."""
     scene = bpy.context.scene
     poses = []

@@ -6,105 +6,105 @@ import sys
 
 import addon_utils
 import bpy
-from tab import PICTURES, choose_file, fill_in, moves, output, press_button, sample, settings, settled, until, window
+from tab import PICTURES, choose_file, fill_in, is_moving, output, press_button, copy_sample, get_settings, wait_until_settled, wait_until, window
 
 sys.path.insert(0, str(pathlib.Path("tests/blender").resolve()))
-from undo import state  # noqa: E402
+from undo import collect_state  # noqa: E402
 
 
-def the_file():
+def collect_file_state():
     """All that the file holds, without what undo leaves alone: the frame shown and what is selected."""
-    found = state()
+    found = collect_state()
     found["frames"] = found["frames"][:3]
     del found["chosen"]
     return found
 
 
-def into_the_view():
+def move_into_view():
     """The pointer over the middle of the 3D view."""
-    area = window.area("VIEW_3D")
+    area = window.find_area("VIEW_3D")
     region = next(region for region in area.regions if region.type == "WINDOW")
-    yield from window.move(region.x + region.width // 2, region.y + region.height // 3)
+    yield from window.move_pointer(region.x + region.width // 2, region.y + region.height // 3)
     yield 0.2
 
 
-def states():
-    return [player.result.state for player in settings().players]
+def list_states():
+    return [player.result.state for player in get_settings().players]
 
 
-def importing():
+def import_data():
     """Tracking by the file browser: a dot, and its words as strips."""
     yield from press_button("import_tracking")
-    yield from choose_file(sample() / "match" / "player1.csv")
-    yield from until(lambda: len(settings().players) == 1)
-    yield from settled()
-    player, = settings().players
+    yield from choose_file(copy_sample() / "match" / "player1.csv")
+    yield from wait_until(lambda: len(get_settings().players) == 1)
+    yield from wait_until_settled()
+    player, = get_settings().players
     assert player.dot is not None and player.dot.animation_data.nla_tracks
 
 
-def building():
+def build_library():
     """The folder is typed, the library built."""
-    yield from fill_in("library_folder", str(sample() / "library"))
-    yield from until(
-        lambda: settings().library_folder == str(sample() / "library"), what=lambda: settings().library_folder
+    yield from fill_in("library_folder", str(copy_sample() / "library"))
+    yield from wait_until(
+        lambda: get_settings().library_folder == str(copy_sample() / "library"), what=lambda: get_settings().library_folder
     )
     yield from press_button("build_library")
-    yield from settled()
-    yield from until(lambda: "clips" in settings().library_holds)
+    yield from wait_until_settled()
+    yield from wait_until(lambda: "clips" in get_settings().library_holds)
 
 
-def annotating():
+def annotate_kick():
     """A kick at the playhead by keys: J, then digits."""
-    before = strips()
+    before = list_strips()
     bpy.context.scene.frame_set(100)
-    yield from into_the_view()
-    yield from window.press("J")
-    yield from until(window.window.modal_operators.keys, what="J begins to annotate")
-    window.picture(PICTURES / "tour-annotate.png")
+    yield from move_into_view()
+    yield from window.press_key("J")
+    yield from wait_until(window.window.modal_operators.keys, what="J begins to annotate")
+    window.save_picture(PICTURES / "tour-annotate.png")
     for key in ("TWO", "ONE", "RET"):
-        yield from window.press(key)
-    yield from window.press("ESC")
+        yield from window.press_key(key)
+    yield from window.press_key("ESC")
     if window.window.modal_operators:
-        yield from window.press("ESC")
-    yield from settled()
-    assert strips() != before
+        yield from window.press_key("ESC")
+    yield from wait_until_settled()
+    assert list_strips() != before
 
 
-def strips():
+def list_strips():
     """Words on the timeline: strips and key moments."""
-    found = the_file()
+    found = collect_file_state()
     return found["strips"], found["markers"]
 
 
-def cancelling():
+def cancel_synthesis():
     """Synthesize is begun and cancelled: the file is as before."""
-    before = the_file()
+    before = collect_file_state()
     yield from press_button("synthesize")
-    yield from into_the_view()
-    yield from window.press("ESC")
-    yield from settled()
-    assert the_file() == before or states() == ["PREVIEW"], "neither cancelled nor done"
+    yield from move_into_view()
+    yield from window.press_key("ESC")
+    yield from wait_until_settled()
+    assert collect_file_state() == before or list_states() == ["PREVIEW"], "neither cancelled nor done"
 
 
-def synthesizing():
+def synthesize_preview():
     """The preview is on a body."""
     yield from press_button("synthesize")
-    yield from settled()
-    yield from until(lambda: states() == ["PREVIEW"], what=states)
-    window.picture(PICTURES / "tour-preview.png")
+    yield from wait_until_settled()
+    yield from wait_until(lambda: list_states() == ["PREVIEW"], what=list_states)
+    window.save_picture(PICTURES / "tour-preview.png")
 
 
-def accepting():
+def accept_preview():
     """The body keeps it."""
     yield from press_button("accept")
-    yield from until(lambda: states() == ["ACCEPTED"], what=states)
-    yield from settled()
-    assert moves(settings().players[0].body)
+    yield from wait_until(lambda: list_states() == ["ACCEPTED"], what=list_states)
+    yield from wait_until_settled()
+    assert is_moving(get_settings().players[0].body)
 
 
-def a_rig():
+def create_rig():
     """Rigify makes a control rig, in steps of its own; it is the active object."""
-    area = window.area("VIEW_3D")
+    area = window.find_area("VIEW_3D")
     region = next(region for region in area.regions if region.type == "WINDOW")
     with bpy.context.temp_override(window=window.window, area=area, region=region):
         bpy.ops.object.armature_basic_human_metarig_add("EXEC_DEFAULT", True)
@@ -113,47 +113,47 @@ def a_rig():
     assert bpy.context.view_layer.objects.active.name.lower().startswith("rig")
 
 
-def baking():
+def bake_to_rig():
     """The rig is chosen by its button, and moves as the body does."""
     yield from press_button("use_selected_rig")
-    yield from until(lambda: settings().rig.target is not None)
+    yield from wait_until(lambda: get_settings().rig.target is not None)
     yield from press_button("bake_to_rig")
-    yield from settled()
-    assert moves(settings().rig.target), "the rig stands still"
-    window.picture(PICTURES / "tour-rig.png")
+    yield from wait_until_settled()
+    assert is_moving(get_settings().rig.target), "the rig stands still"
+    window.save_picture(PICTURES / "tour-rig.png")
 
 
-STEPS = (importing, building, annotating, cancelling, synthesizing, accepting, a_rig, baking)
+STEPS = (import_data, build_library, annotate_kick, cancel_synthesis, synthesize_preview, accept_preview, create_rig, bake_to_rig)
 
 
 def check_the_tour():
     addon_utils.enable("rigify", default_set=True)
     bpy.ops.wm.read_homefile(use_empty=True, load_ui=True)
     yield 1.5
-    reached = [the_file()]
+    reached = [collect_file_state()]
     for step in STEPS:
         yield from step()
-        yield from settled()
-        if the_file() != reached[-1]:
-            reached.append(the_file())
-        output.say(f"     {step.__name__}: done")
-    window.picture(PICTURES / "tour-end.png")
-    back = yield from walk("Z", reached[::-1], ctrl=True)
-    window.picture(PICTURES / "tour-undone.png")
-    forth = yield from walk("Z", reached, ctrl=True, shift=True)
-    output.say(f"     undone in {back} steps, redone in {forth}")
+        yield from wait_until_settled()
+        if collect_file_state() != reached[-1]:
+            reached.append(collect_file_state())
+        output.write_line(f"     {step.__name__}: done")
+    window.save_picture(PICTURES / "tour-end.png")
+    back = yield from step_through_states("Z", reached[::-1], ctrl=True)
+    window.save_picture(PICTURES / "tour-undone.png")
+    forth = yield from step_through_states("Z", reached, ctrl=True, shift=True)
+    output.write_line(f"     undone in {back} steps, redone in {forth}")
 
 
-def walk(key, wanted, **held):
+def step_through_states(key, expected, **held):
     """Press the key until all these states of the file have come, in their order; return how often."""
-    yield from into_the_view()
-    assert the_file() == wanted[0]
-    count, left = 0, list(wanted[1:])
+    yield from move_into_view()
+    assert collect_file_state() == expected[0]
+    count, left = 0, list(expected[1:])
     while left:
-        assert count < 60, f"{len(left)} of {len(wanted)} states have not come back"
-        yield from window.press(key, **held)
-        yield from settled()
+        assert count < 60, f"{len(left)} of {len(expected)} states have not come back"
+        yield from window.press_key(key, **held)
+        yield from wait_until_settled()
         count += 1
-        if the_file() == left[0]:
+        if collect_file_state() == left[0]:
             left.pop(0)
     return count

@@ -13,7 +13,7 @@ import lint
 import pytest
 from wheels import slim
 
-LINUX = bundle.platforms()["linux-x64"]
+LINUX = bundle.read_platforms()["linux-x64"]
 PACKAGES = [bundle.Package("scipy", "1.17.1", "2001 SciPy Developers", "BSD-3-Clause"),
             bundle.Package("joblib", "1.6.0", "2008 joblib developers", "BSD-3-Clause")]
 WHEELS = [f"scipy-1.17.1-cp{python}-cp{python}-manylinux_2_28_x86_64.whl" for python in LINUX.pythons] + [
@@ -40,7 +40,7 @@ def staged(folder, wheels=WHEELS, platform="linux-x64", packages=PACKAGES, prese
     ("some-1.0-cp313-abi3-manylinux2014_x86_64.whl", "linux-x64", "311", False),
 ])
 def test_whom_a_wheel_serves(name, platform, python, serves):
-    assert bundle.wheel(name).serves(bundle.platforms()[platform], python) is serves
+    assert bundle.parse_wheel_name(name).is_compatible(bundle.read_platforms()[platform], python) is serves
 
 
 def test_the_completed_manifest_is_toml_and_names_everything():

@@ -5,14 +5,14 @@ import json
 import pytest
 
 from beyond_mocap.cli.main import main
-from beyond_mocap.throws.planted_examples import write_planted
+from beyond_mocap.throws.planted_examples import write_examples
 from tests.core.throws.test_throw import STICK
 
 
 @pytest.fixture(scope="module")
 def place(tmp_path_factory):
     folder = tmp_path_factory.mktemp("train")
-    write_planted(folder / "throws", "throw", 1, 2, 5)
+    write_examples(folder / "throws", "throw", 1, 2, 5)
     (folder / "stick.bvh").write_text(STICK)
     (folder / "bad.json").write_text(json.dumps({"units": 0}))
     return folder

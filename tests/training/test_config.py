@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from beyond_mocap.base.errors import InputError
-from training.config import TrainingConfig, config_of, read_config
+from training.config import TrainingConfig, build_config, read_config
 
 
 def test_defaults_and_what_a_file_says(tmp_path):
@@ -18,7 +18,7 @@ def test_defaults_and_what_a_file_says(tmp_path):
     config = read_config(path, epochs=9, seed=None)
     assert (config.settings.units, config.settings.conditioned, config.epochs, config.seed) == (32, False, 9, 0)
     assert read_config(None) == TrainingConfig()
-    assert config_of(config.flat()) == config
+    assert build_config(config.to_dict()) == config
 
 
 @pytest.mark.parametrize("text, said", [
@@ -57,7 +57,7 @@ ANY = st.recursive(
 
 
 @settings(max_examples=300, deadline=None)
-@given(st.one_of(ANY, st.dictionaries(st.sampled_from(sorted(TrainingConfig().flat())), VALUES, max_size=4)))
+@given(st.one_of(ANY, st.dictionaries(st.sampled_from(sorted(TrainingConfig().to_dict())), VALUES, max_size=4)))
 def test_any_json_is_a_config_or_refused_in_one_line(told):
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "c.json")
@@ -67,4 +67,4 @@ def test_any_json_is_a_config_or_refused_in_one_line(told):
         except InputError as error:
             assert len(str(error).splitlines()) == 1 and str(error).startswith(str(path))
         else:
-            assert config_of(config.flat()) == config
+            assert build_config(config.to_dict()) == config

@@ -5,13 +5,13 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from beyond_mocap.synthetic.throws import throw
-from beyond_mocap.throws.networks.answers import answered, ends, network_output
-from beyond_mocap.throws.networks.chains import chains_of
-from beyond_mocap.throws.networks.example import example_of
-from beyond_mocap.throws.networks.features import network_input, phase_of
+from beyond_mocap.synthetic.throws import build_throw
+from beyond_mocap.throws.networks.answers import apply_output, compute_end_positions, build_output
+from beyond_mocap.throws.networks.chains import find_chains
+from beyond_mocap.throws.networks.example import build_example
+from beyond_mocap.throws.networks.features import build_input, compute_phase
 from beyond_mocap.throws.networks.model import ModelSettings
-from beyond_mocap.throws.networks.training_set import leg_reach, steps
+from beyond_mocap.throws.networks.training_set import measure_leg_reach, build_steps
 
 TARGET = (12.0, 3.0, 1.2)
 CASES = [ModelSettings(guided=True, carried=True), ModelSettings(kind="single", wrist="inferred", frame="static")]
@@ -19,8 +19,8 @@ CASES = [ModelSettings(guided=True, carried=True), ModelSettings(kind="single", 
 
 @pytest.fixture(scope="module")
 def example():
-    made = throw(TARGET, 22.0, fps=60.0)
-    return example_of("t", "s", made.motion, "right_hand", made.release, TARGET)
+    made = build_throw(TARGET, 22.0, fps=60.0)
+    return build_example("t", "s", made.motion, "right_hand", made.release, TARGET)
 
 
 def told(settings, chains, reach, pose, truth, window, xp):
@@ -28,16 +28,16 @@ def told(settings, chains, reach, pose, truth, window, xp):
     arms and legs one each, because jax compiles for seconds."""
     found, after = {}, pose
     for name in [name for name in settings.networks if name not in ("left_arm", "right_leg")]:
-        y = network_output(name, chains, settings, pose, truth, xp)
-        x = network_input(name, chains, settings, pose, after, window, xp)
-        after = answered(name, chains, settings, y, pose, after, window, xp)
-        found[name] = (x, y, ends(name, chains, settings, y, xp), phase_of(name, chains, truth, window, reach, xp))
+        y = build_output(name, chains, settings, pose, truth, xp)
+        x = build_input(name, chains, settings, pose, after, window, xp)
+        after = apply_output(name, chains, settings, y, pose, after, window, xp)
+        found[name] = (x, y, compute_end_positions(name, chains, settings, y, xp), compute_phase(name, chains, truth, window, reach, xp))
     return found, after
 
 
 @pytest.mark.parametrize("settings", CASES, ids=str)
 def test_the_same_in_numpy_and_jax(example, settings):
-    chains, reach, parts = chains_of(example.motion.skeleton), leg_reach([example]), steps(example)
+    chains, reach, parts = find_chains(example.motion.skeleton), measure_leg_reach([example]), build_steps(example)
     mine = told(settings, chains, reach, *parts, np)
     theirs = told(settings, chains, reach, *jax.tree.map(jnp.asarray, parts), jnp)
     for here, there in zip(jax.tree.leaves(mine), jax.tree.leaves(theirs)):
@@ -45,15 +45,15 @@ def test_the_same_in_numpy_and_jax(example, settings):
 
 
 def test_gradients_go_from_wrist_to_hips(example):
-    chains, settings = chains_of(example.motion.skeleton), ModelSettings()
-    pose, truth, window = jax.tree.map(lambda array: jnp.asarray(array[:5]), steps(example))
+    chains, settings = find_chains(example.motion.skeleton), ModelSettings()
+    pose, truth, window = jax.tree.map(lambda array: jnp.asarray(array[:5]), build_steps(example))
     names = ("hip", "right_arm")
-    answers = {name: network_output(name, chains, settings, pose, truth, jnp) for name in names}
+    answers = {name: build_output(name, chains, settings, pose, truth, jnp) for name in names}
 
     def off(answers):
         after = pose
         for name in names:
-            after = answered(name, chains, settings, answers[name], pose, after, window, jnp)
+            after = apply_output(name, chains, settings, answers[name], pose, after, window, jnp)
         return jnp.sum((after.positions - truth.positions + 0.01) ** 2)
 
     slopes = jax.grad(off)(answers)

@@ -5,14 +5,14 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from beyond_mocap.synthetic.throws import throw
+from beyond_mocap.synthetic.throws import build_throw
 from beyond_mocap.throws.networks.chains import HIERARCHY, LIMB_OF
-from beyond_mocap.throws.networks.example import example_of
-from beyond_mocap.throws.networks.limits import JointLimits, learn
-from beyond_mocap.throws.networks.training_set import leg_reach, shared_chains
-from training.config import config_of
-from training.hierarchy import IK_SHARE, Networks
-from training.recordings import recordings
+from beyond_mocap.throws.networks.example import build_example
+from beyond_mocap.throws.networks.limits import JointLimits, estimate_joint_limits
+from beyond_mocap.throws.networks.training_set import measure_leg_reach, find_shared_chains
+from training.config import build_config
+from training.hierarchy import IK_SHARE, TrainingProblem
+from training.recordings import build_recordings
 
 SMALL = {"units": 8, "layers": 1, "points": 1, "fps": 15.0, "noise": 0.0, "rollout": 2, "linear_start": False,
          "guided": False, "carried": False}  # fmt: skip
@@ -21,14 +21,14 @@ ROWS = jnp.array([[0, 6]])
 
 @pytest.fixture(scope="module")
 def example():
-    thrown = throw((12.0, 2.0, 1.0), 22.0, fps=60.0)
-    return example_of("t", "s", thrown.motion, "right_hand", thrown.release, (12.0, 2.0, 1.0), fps=15.0)
+    thrown = build_throw((12.0, 2.0, 1.0), 22.0, fps=60.0)
+    return build_example("t", "s", thrown.motion, "right_hand", thrown.release, (12.0, 2.0, 1.0), fps=15.0)
 
 
 def problem(example, **told):
-    limits = JointLimits(example.motion.skeleton, learn(example.motion.rotations))
-    return Networks(
-        recordings([example]), shared_chains([example]), config_of({**SMALL, **told}), leg_reach([example]), limits
+    limits = JointLimits(example.motion.skeleton, estimate_joint_limits(example.motion.rotations))
+    return TrainingProblem(
+        build_recordings([example]), find_shared_chains([example]), build_config({**SMALL, **told}), measure_leg_reach([example]), limits
     )
 
 
@@ -36,8 +36,8 @@ def one_frame(trained, params):
     """What networks make of the first frame of ROWS."""
     recorded, _, _ = trained.data
     example, at = ROWS[:, 0], ROWS[:, 1]
-    (pose, window), (truth, _) = recorded.at(example, at), recorded.at(example, at + 1)
-    return trained._frame(params, pose, truth, window, jax.random.key(0))
+    (pose, window), (truth, _) = recorded.select_frames(example, at), recorded.select_frames(example, at + 1)
+    return trained._predict_frame(params, pose, truth, window, jax.random.key(0))
 
 
 def test_each_frame_is_predicted_from_the_one_predicted_before(example, monkeypatch):
@@ -49,8 +49,8 @@ def test_each_frame_is_predicted_from_the_one_predicted_before(example, monkeypa
         after = pose._replace(root=pose.root + 1.0)
         return after, {"hip": jnp.mean(after.root[:, 2] - truth.root[:, 2]), "seen": jnp.mean(window.next[..., 0])}
 
-    monkeypatch.setattr(trained, "_frame", frame)
-    _, parts = trained.loss(trained.first(jax.random.key(3)), trained.data, ROWS, jax.random.key(1), 3)
+    monkeypatch.setattr(trained, "_predict_frame", frame)
+    _, parts = trained.compute_loss(trained.build_parameters(jax.random.key(3)), trained.data, ROWS, jax.random.key(1), 3)
     first = int(ROWS[0, 1])
     off = [root[first] + step - root[first + step] for step in (1, 2, 3)]
     assert float(parts["hip"]) == pytest.approx(np.mean(off), abs=1e-5) and set(parts) == {"hip", "seen", "sizes"}
@@ -61,7 +61,7 @@ def test_each_frame_is_predicted_from_the_one_predicted_before(example, monkeypa
 def test_children_see_what_their_parents_predict(example):
     """Each network's loss counts, and a worse hip moves what all others reach."""
     trained = problem(example)
-    params = trained.first(jax.random.key(3))
+    params = trained.build_parameters(jax.random.key(3))
     worse = {**params, "hip": jax.tree.map(lambda one: one + 0.3, params["hip"])}
     with jax.disable_jit():
         (_, parts), (_, other) = one_frame(trained, params), one_frame(trained, worse)
@@ -74,7 +74,7 @@ def test_children_see_what_their_parents_predict(example):
 def test_inverse_kinematics_as_a_layer_brings_limbs_its_share_of_the_way(example):
     """Of hands and feet within reach what is left to go is less by IK_SHARE, and bones keep their lengths."""
     plain, bent = problem(example), problem(example, ik_layer=True)
-    params = plain.first(jax.random.key(3))
+    params = plain.build_parameters(jax.random.key(3))
     wanted = np.asarray(plain.data[0].at(ROWS[:, 0], ROWS[:, 1])[1].next[0])
     effectors, left = list(plain.chains.effectors), []
     with jax.disable_jit():

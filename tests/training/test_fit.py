@@ -12,12 +12,12 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from beyond_mocap.base.errors import Cancelled, InputError
-from training.config import config_of
-from training.fit import batches, checkpoint_path, fit, rate_at, stretches
+from beyond_mocap.base.errors import UserCancelledError, InputError
+from training.config import build_config
+from training.fit import split_batches, build_checkpoint_path, fit, compute_rate, list_stretches
 
 TOP = Path(__file__).resolve().parents[2]
-CONFIG = config_of({"epochs": 12, "macro": 3, "batch": 16, "learning_rate": 0.05, "final_rate": 0.01, "seed": 3})
+CONFIG = build_config({"epochs": 12, "macro": 3, "batch": 16, "learning_rate": 0.05, "final_rate": 0.01, "seed": 3})
 
 
 class Line:
@@ -83,7 +83,7 @@ def test_cancelled_keeps_what_stands(tmp_path):
         asked.append(1)
         return len(asked) > 4
 
-    with pytest.raises(Cancelled, match="4 epochs"):
+    with pytest.raises(UserCancelledError, match="4 epochs"):
         fit(Line(), CONFIG, checkpoint=path, cancelled=cancelled)
     assert bits(fit(Line(), CONFIG, checkpoint=path, resume=True)) == bits(fit(Line(), CONFIG))
 
@@ -111,18 +111,18 @@ def test_a_limit_of_time_ends_it():
 
 
 def test_the_rate_falls():
-    rates = [rate_at(share, CONFIG) for share in (0.02, 0.3, 0.7, 1.0)]
+    rates = [compute_rate(share, CONFIG) for share in (0.02, 0.3, 0.7, 1.0)]
     assert rates == sorted(rates, reverse=True) and rates[-1] == pytest.approx(0.05 * 0.01)
 
 
 def test_stretches_take_every_frame_once_and_the_seed_decides():
-    rows = stretches((10, 4, 2), 3, 0, 0)
-    assert set(map(tuple, stretches((10, 4, 2), 1, 0, 5))) == {(0, i) for i in range(9)} | {
+    rows = list_stretches((10, 4, 2), 3, 0, 0)
+    assert set(map(tuple, list_stretches((10, 4, 2), 1, 0, 5))) == {(0, i) for i in range(9)} | {
         (1, i) for i in range(3)
     } | {(2, 0)}
     assert all(start + 3 <= (10, 4, 2)[who] - 1 for who, start in rows)
-    assert np.array_equal(rows, stretches((10, 4, 2), 3, 0, 0))
-    assert batches(np.arange(5), 2).tolist() == [[0, 1], [2, 3], [4, 0]]
+    assert np.array_equal(rows, list_stretches((10, 4, 2), 3, 0, 0))
+    assert split_batches(np.arange(5), 2).tolist() == [[0, 1], [2, 3], [4, 0]]
 
 
 def test_no_example_long_enough_is_told():
@@ -133,4 +133,4 @@ def test_no_example_long_enough_is_told():
 
 
 def test_the_checkpoint_stands_beside_the_weights(tmp_path):
-    assert checkpoint_path(tmp_path / "w.npz") == tmp_path / "w.checkpoint.npz"
+    assert build_checkpoint_path(tmp_path / "w.npz") == tmp_path / "w.checkpoint.npz"

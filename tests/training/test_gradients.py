@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from beyond_mocap.throws.networks import phases
-from beyond_mocap.throws.networks.limb_reach import bend_to
+from beyond_mocap.throws.networks.limb_reach import solve_two_bones
 from beyond_mocap.throws.networks.network import forward
 from beyond_mocap.throws.networks.phases import weigh_points
 
@@ -68,8 +68,8 @@ def test_float32_training_says_what_float64_numpy_says():
 
 def test_the_distance_phase_is_the_same_function():
     distance = np.linspace(0.2, 1.2, 21)
-    there = phases.distance_phase(jnp.asarray(distance), (0.4, 1.0), jnp)
-    np.testing.assert_allclose(there, phases.distance_phase(distance, (0.4, 1.0)), atol=1e-6)
+    there = phases.compute_distance_phase(jnp.asarray(distance), (0.4, 1.0), jnp)
+    np.testing.assert_allclose(there, phases.compute_distance_phase(distance, (0.4, 1.0)), atol=1e-6)
 
 
 def test_a_straight_limb_has_slopes():
@@ -78,7 +78,7 @@ def test_a_straight_limb_has_slopes():
     across = jnp.array([0.0, 1.0, 0.0], jnp.float32)
 
     def bent(middle, target):
-        first, second, place = bend_to(top, middle, end, target, across, jnp)
+        first, second, place = solve_two_bones(top, middle, end, target, across, jnp)
         return (first**2).sum() + second[0].sum() + place.sum()
 
     slopes = jax.grad(bent, (0, 1))(middle, end)

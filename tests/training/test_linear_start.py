@@ -6,7 +6,7 @@ import pytest
 
 from beyond_mocap.throws.networks.network import forward
 from beyond_mocap.throws.networks.phases import weigh_points
-from training.networks import RIDGES, first_weights, linear_start, sums
+from training.networks import RIDGES, build_first_weights, fit_linear, compute_sums
 
 ROWS, INPUTS, OUTPUTS = 3000, 6, 3
 
@@ -23,7 +23,7 @@ def planted(points):
 @pytest.mark.parametrize("points", [1, 4])
 def test_regression_finds_the_planted_map_of_each_control_point(points):
     x, theta, y, weights = planted(points)
-    found = linear_start(sums(x, y, theta), RIDGES[0])
+    found = fit_linear(compute_sums(x, y, theta), RIDGES[0])
     assert found.weights.shape == weights.shape and found.weights.dtype == np.float32
     np.testing.assert_allclose(found.weights, weights, atol=0.12)
 
@@ -33,8 +33,8 @@ def test_regression_finds_the_planted_map_of_each_control_point(points):
 def test_a_network_starts_as_its_linear_answer(points, layers):
     x, theta, y, _ = planted(points)
     scale = y.std(0)
-    linear = linear_start(sums(x, y / scale, theta), RIDGES[0])
-    params = first_weights(jax.random.key(0), INPUTS, OUTPUTS, layers, 8, points, linear)
+    linear = fit_linear(compute_sums(x, y / scale, theta), RIDGES[0])
+    params = build_first_weights(jax.random.key(0), INPUTS, OUTPUTS, layers, 8, points, linear)
     said = forward(*(jax.tree.map(np.asarray, params[name]) for name in ("weights", "biases")), x, theta)
     expected = np.einsum("nk,koi,ni->no", theta, linear.weights, x) + theta @ linear.biases
     np.testing.assert_allclose(said, expected, atol=1e-4)
@@ -42,14 +42,14 @@ def test_a_network_starts_as_its_linear_answer(points, layers):
 
 
 def test_without_it_all_control_points_begin_alike():
-    params = first_weights(jax.random.key(0), INPUTS, OUTPUTS, 2, 8, 4)
+    params = build_first_weights(jax.random.key(0), INPUTS, OUTPUTS, 2, 8, 4)
     assert all(np.ptp(np.asarray(weight), axis=0).max() == 0 for weight in params["weights"])
 
 
 def test_sums_of_parts_are_those_of_the_whole():
     x, theta, y, _ = planted(4)
-    parts = sums(x[:1000], y[:1000], theta[:1000]).plus(sums(x[1000:], y[1000:], theta[1000:]))
-    for one, other in zip(linear_start(parts, 0.01), linear_start(sums(x, y, theta), 0.01)):
+    parts = compute_sums(x[:1000], y[:1000], theta[:1000]).add_sums(compute_sums(x[1000:], y[1000:], theta[1000:]))
+    for one, other in zip(fit_linear(parts, 0.01), fit_linear(compute_sums(x, y, theta), 0.01)):
         np.testing.assert_allclose(one, other, atol=1e-5)
 
 
@@ -57,5 +57,5 @@ def test_guides_are_hardly_kept_small():
     """Two inputs that say the same: the guide among them is believed."""
     x, theta, _, _ = planted(4)
     x[:, -1] = x[:, 0]
-    found = linear_start(sums(x, x[:, :OUTPUTS], theta, guides=1), 0.1)
+    found = fit_linear(compute_sums(x, x[:, :OUTPUTS], theta, guides=1), 0.1)
     assert np.abs(found.weights[:, 0, -1] - 1.0).max() < 0.1 and np.abs(found.weights[:, 0, 0]).max() < 0.1

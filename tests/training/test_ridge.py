@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from beyond_mocap.base.errors import Cancelled
+from beyond_mocap.base.errors import UserCancelledError
 from training import train
 from training.networks import RIDGES
 
@@ -17,12 +17,12 @@ def examples(*subjects):
 
 
 def test_the_last_subject_is_left_out_whole():
-    assert train.held_out(examples("a", "b", "a", "c")).tolist() == [False] * 6 + [True] * 2
+    assert train.select_held_out(examples("a", "b", "a", "c")).tolist() == [False] * 6 + [True] * 2
 
 
 def test_of_one_subject_a_fourth_is_left_out_with_its_mirror_images():
-    assert np.flatnonzero(train.held_out(examples(*"aaaaaaaaa"))).tolist() == [6, 7, 14, 15]
-    assert not train.held_out(examples(*"aaa")).any()
+    assert np.flatnonzero(train.select_held_out(examples(*"aaaaaaaaa"))).tolist() == [6, 7, 14, 15]
+    assert not train.select_held_out(examples(*"aaa")).any()
 
 
 class Straying:
@@ -48,10 +48,10 @@ class Straying:
 def test_the_largest_ridge_of_the_best_is_taken(monkeypatch, off, expected):
     monkeypatch.setattr(train, "_off", lambda model, example: model)
     held = examples("a")
-    assert train.least_astray(Straying(off), held, lambda params, line: params) == expected
+    assert train.choose_ridge(Straying(off), held, lambda params, line: params) == expected
 
 
 def test_nothing_left_out_and_cancelled():
-    assert train.least_astray(None, [], None) == RIDGES[-1]
-    with pytest.raises(Cancelled):
-        train.least_astray(Straying([1] * 6), examples("a"), lambda params, line: params, lambda: True)
+    assert train.choose_ridge(None, [], None) == RIDGES[-1]
+    with pytest.raises(UserCancelledError):
+        train.choose_ridge(Straying([1] * 6), examples("a"), lambda params, line: params, lambda: True)

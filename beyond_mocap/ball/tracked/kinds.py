@@ -9,7 +9,7 @@ import numpy as np
 from ...motion.track import BALL_RADIUS
 
 GOAL_HEIGHT = 2.44  # m
-_BACK = 0.5  # s on the pitch before it can go out again
+_MIN_INSIDE_SECONDS = 0.5  # s on the pitch before it can go out again
 
 
 @dataclass(frozen=True)
@@ -31,36 +31,36 @@ class TouchKind:
     details: tuple[str, ...] = ()
 
 
-KICK, RECEIVE, DRIBBLE, HEADER, CHESTED = "kick", "receive", "dribble", "header", "chest"
+KICK, RECEIVE, DRIBBLE, HEADER, CHEST_CONTROL = "kick", "receive", "dribble", "header", "chest"
 THROW_IN, HAND, SAVE, DEFLECTION = "throw-in", "hand", "save", "deflection"
 
 TOUCH_KINDS = (TouchKind(KICK, "sends", ("kick",), "pass"), TouchKind(RECEIVE, "takes", ("receive", "foot"), "receive"),
                TouchKind(DRIBBLE, "carries", ("dribble",), "dribble"), TouchKind(HEADER, "sends", ("header",), "pass"),
-               TouchKind(CHESTED, "takes", ("receive", "body"), "receive"),
+               TouchKind(CHEST_CONTROL, "takes", ("receive", "body"), "receive"),
                TouchKind(THROW_IN, "sends", ("throwb",), "pass", ("throw-in",)),
                TouchKind(HAND, "takes", ("catchb",), "catch"), TouchKind(SAVE, "takes", ("catchb",), "save"),
                TouchKind(DEFLECTION, "", (), "deflection"))
 KINDS = tuple(kind.name for kind in TOUCH_KINDS)
-CHEST, HEAD = 0.95, 1.45  # m of the ball's centre, from which the chest, the head plays it
-_FAST = 7.0  # m/s relative to the player, faster than a dribble's touch
-_STOPPED = 4.0  # m/s, slower than a pass
-_TURN = np.cos(np.radians(50.0))  # a deflection changes direction by less than this angle
-_LINE = 1.2  # m from the touch line, within which a throw-in is taken
-_ON_LINE = 0.35  # m inside the line, where a ball that was out is placed
-_STILL = 0.5  # s between the previous touch and a throw-in
+CHEST_HEIGHT, HEAD_HEIGHT = 0.95, 1.45  # m of the ball's centre, from which the chest, the head plays it
+_MAX_DRIBBLE_SPEED = 7.0  # m/s relative to the player, faster than a dribble's touch
+_MIN_PASS_SPEED = 4.0  # m/s, slower than a pass
+_DEFLECTION_COSINE = np.cos(np.radians(50.0))  # a deflection changes direction by less than this angle
+_THROW_IN_DISTANCE = 1.2  # m from the touch line, within which a throw-in is taken
+_ON_LINE_DISTANCE = 0.35  # m inside the line, where a ball that was out is placed
+_THROW_IN_PAUSE = 0.5  # s between the previous touch and a throw-in
 AREA_DEPTH, AREA_WIDTH, GOAL_WIDTH = 16.5, 40.32, 7.32  # m
-_SHOT, _BESIDE = 10.0, 1.5  # m/s towards the goal line; m beside the goal
-_LOW, _HELD = 0.35, 0.6  # m of the ball's centre: below, the foot; above, a keeper's hands
+_MIN_SHOT_SPEED, _GOAL_MARGIN = 10.0, 1.5  # m/s towards the goal line; m beside the goal
+_FOOT_HEIGHT, _HAND_HEIGHT = 0.35, 0.6  # m of the ball's centre: below, the foot; above, a keeper's hands
 
 
-def part_of(height: float | None) -> str:
+def choose_part(height: float | None) -> str:
     """Choose the body part that plays a ball at `height` m; None or NaN (unknown) gives the foot."""
-    if height is None or not np.isfinite(height) or height < CHEST:
+    if height is None or not np.isfinite(height) or height < CHEST_HEIGHT:
         return "foot"
-    return "chest" if height < HEAD else "head"
+    return "chest" if height < HEAD_HEIGHT else "head"
 
 
-def kind_of(part: str, before: np.ndarray, after: np.ndarray, same_next: bool, same_before: bool) -> str:
+def choose_touch_kind(part: str, before: np.ndarray, after: np.ndarray, same_next: bool, same_before: bool) -> str:
     """Choose the kind of a touch by foot, chest or head.
 
     Args:
@@ -77,17 +77,17 @@ def kind_of(part: str, before: np.ndarray, after: np.ndarray, same_next: bool, s
         return HEADER
     if _is_deflection(before, after, fast_in, fast_out, same_next):
         return DEFLECTION
-    if part == "chest" and fast_out < _FAST:
-        return CHESTED
-    if same_next and fast_out < _FAST:
-        return DRIBBLE if same_before and fast_in < _STOPPED else RECEIVE
+    if part == "chest" and fast_out < _MAX_DRIBBLE_SPEED:
+        return CHEST_CONTROL
+    if same_next and fast_out < _MAX_DRIBBLE_SPEED:
+        return DRIBBLE if same_before and fast_in < _MIN_PASS_SPEED else RECEIVE
     return KICK
 
 
 def _is_deflection(before, after, fast_in, fast_out, same_next) -> bool:
     if same_next or fast_in < 8.0 or fast_out < 0.35 * fast_in or fast_out > 1.1 * fast_in:
         return False
-    return float(before[:2] @ after[:2]) > _TURN * fast_in * fast_out
+    return float(before[:2] @ after[:2]) > _DEFLECTION_COSINE * fast_in * fast_out
 
 
 def is_throw_in(place: np.ndarray, before: np.ndarray, after: np.ndarray, since: float, width: float) -> bool:
@@ -102,19 +102,19 @@ def is_throw_in(place: np.ndarray, before: np.ndarray, after: np.ndarray, since:
     Returns:
         True for a throw-in.
     """
-    on_line = abs(place[1]) > width / 2.0 - _ON_LINE
-    held = place[2] > CHEST
-    slow = np.linalg.norm(before[:2]) < _STOPPED
-    return bool(since > _STILL and slow and (on_line or held) and leaves_line(place, after, width))
+    on_line = abs(place[1]) > width / 2.0 - _ON_LINE_DISTANCE
+    held = place[2] > CHEST_HEIGHT
+    slow = np.linalg.norm(before[:2]) < _MIN_PASS_SPEED
+    return bool(since > _THROW_IN_PAUSE and slow and (on_line or held) and is_from_touch_line(place, after, width))
 
 
-def leaves_line(place: np.ndarray, after: np.ndarray, width: float) -> bool:
+def is_from_touch_line(place: np.ndarray, after: np.ndarray, width: float) -> bool:
     """Say whether a ball at `place` (3,) m with velocity `after` (3,) m/s enters the pitch from its touch line."""
     inward = -np.sign(place[1]) * after[1] > 0.0
-    return bool(abs(place[1]) > width / 2.0 - _LINE and inward and np.linalg.norm(after[:2]) > 3.0)
+    return bool(abs(place[1]) > width / 2.0 - _THROW_IN_DISTANCE and inward and np.linalg.norm(after[:2]) > 3.0)
 
 
-def keeper_kind(place: np.ndarray, before: np.ndarray, goal: float, known_height: bool) -> tuple[str, str] | None:
+def choose_keeper_kind(place: np.ndarray, before: np.ndarray, goal: float, known_height: bool) -> tuple[str, str] | None:
     """Choose part and kind of a goalkeeper's touch in their penalty area: a save, or a ball taken with the hands.
 
     Args:
@@ -129,14 +129,14 @@ def keeper_kind(place: np.ndarray, before: np.ndarray, goal: float, known_height
     if away > AREA_DEPTH or abs(place[1]) > AREA_WIDTH / 2.0:
         return None
     toward = float(np.sign(goal) * before[0])
-    if toward > _SHOT:
+    if toward > _MIN_SHOT_SPEED:
         across = place[1] + before[1] * away / toward
-        if abs(across) < GOAL_WIDTH / 2.0 + _BESIDE:
-            return ("foot" if known_height and place[2] < _LOW else "hand"), SAVE
-    return ("hand", HAND) if known_height and place[2] > _HELD else None
+        if abs(across) < GOAL_WIDTH / 2.0 + _GOAL_MARGIN:
+            return ("foot" if known_height and place[2] < _FOOT_HEIGHT else "hand"), SAVE
+    return ("hand", HAND) if known_height and place[2] > _HAND_HEIGHT else None
 
 
-def keepers(positions: np.ndarray, teams: list[str]) -> dict[str, int]:
+def find_keepers(positions: np.ndarray, teams: list[str]) -> dict[str, int]:
     """Find each team's goalkeeper: the player farthest from the team's middle on average.
 
     Args:
@@ -146,7 +146,7 @@ def keepers(positions: np.ndarray, teams: list[str]) -> dict[str, int]:
         Player index by team; teams of fewer than four players have none.
     """
     found = {}
-    middle = np.array([_middle(path) for path in positions])
+    middle = np.array([_find_median_x(path) for path in positions])
     for team in dict.fromkeys(teams):
         own = [index for index, name in enumerate(teams) if name == team and np.isfinite(middle[index])]
         if len(own) > 3:
@@ -154,12 +154,12 @@ def keepers(positions: np.ndarray, teams: list[str]) -> dict[str, int]:
     return found
 
 
-def _middle(path: np.ndarray) -> float:
+def _find_median_x(path: np.ndarray) -> float:
     there = path[np.isfinite(path[:, 0]), 0]
     return float(np.median(there)) if len(there) else np.nan
 
 
-def ground_height(height: float) -> float:
+def limit_to_ground(height: float) -> float:
     """Limit a height of the ball's centre to its radius: some feeds give 0 for a ball on the ground."""
     return max(float(height), BALL_RADIUS) if np.isfinite(height) else BALL_RADIUS
 
@@ -183,7 +183,7 @@ class BallEnd:
     player: str = ""
 
 
-def ball_ends(times: np.ndarray, ball: np.ndarray, length: float, width: float) -> list[BallEnd]:
+def find_ball_ends(times: np.ndarray, ball: np.ndarray, length: float, width: float) -> list[BallEnd]:
     """Find the moments the ball leaves the pitch, interpolated between samples.
 
     Args:
@@ -202,16 +202,16 @@ def ball_ends(times: np.ndarray, ball: np.ndarray, length: float, width: float) 
     for index in leaves:
         share = -beyond[index - 1] / (beyond[index] - beyond[index - 1])
         time = float(times[index - 1] + share * (times[index] - times[index - 1]))
-        since = (times > time - _BACK) & (times < time)
+        since = (times > time - _MIN_INSIDE_SECONDS) & (times < time)
         if found and not (beyond[since] <= 0.0).all():
             continue
         place = ball[index - 1] + share * (ball[index] - ball[index - 1])
-        kind = "touch line" if over_side[index] >= over_end[index] else _by_goal(place)
+        kind = "touch line" if over_side[index] >= over_end[index] else _choose_end_kind(place)
         found.append(BallEnd(time=time, kind=kind, x=float(place[0]), y=float(place[1])))
     return found
 
 
-def _by_goal(place: np.ndarray) -> str:
+def _choose_end_kind(place: np.ndarray) -> str:
     within = abs(place[1]) < GOAL_WIDTH / 2.0 - BALL_RADIUS
     under = not np.isfinite(place[2]) or place[2] < GOAL_HEIGHT - BALL_RADIUS
     return "goal" if within and under else "goal line"

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from ...base.easing import hermite
-from ...motion.skeleton import frozen_array
+from ...motion.skeleton import freeze_array
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -35,7 +35,7 @@ class BallPiece:
 
     def __post_init__(self):
         for name in ("times", "positions", "velocities", "spin", "bounces"):
-            object.__setattr__(self, name, frozen_array(getattr(self, name)))
+            object.__setattr__(self, name, freeze_array(getattr(self, name)))
 
     @property
     def start(self) -> float:
@@ -49,7 +49,7 @@ class BallPiece:
 
 
 @dataclass(frozen=True, eq=False)
-class SolvedPath:
+class SolvedTrajectory:
     """Pieces in order of time.
 
     Before the first and after the last piece the ball rests; in a gap between two pieces it moves straight at constant
@@ -67,19 +67,19 @@ class SolvedPath:
         return tuple(np.concatenate([getattr(piece, name) for piece in self.pieces]) for name in names)
 
     @cached_property
-    def _begins(self) -> np.ndarray:
+    def _piece_starts(self) -> np.ndarray:
         """Indices of the knots at which pieces start."""
         return np.cumsum([0, *(len(piece.times) for piece in self.pieces[:-1])])
 
     def at(self, times: np.ndarray) -> np.ndarray:
         """Give the positions (N, 3) m of the ball's centre at `times` (N,) s."""
-        return self._hermite(np.asarray(times, float), False)
+        return self._interpolate_hermite(np.asarray(times, float), False)
 
     def velocity(self, times: np.ndarray) -> np.ndarray:
         """Give the velocities (N, 3) m/s at `times` (N,) s; at a touch, the velocity after it."""
-        return self._hermite(np.asarray(times, float), True)
+        return self._interpolate_hermite(np.asarray(times, float), True)
 
-    def _hermite(self, at: np.ndarray, slope: bool) -> np.ndarray:
+    def _interpolate_hermite(self, at: np.ndarray, slope: bool) -> np.ndarray:
         """Interpolate positions, or with `slope` velocities, between the knots by cubic Hermite polynomials."""
         times, places, speeds = self._knots
         after = np.clip(np.searchsorted(times, at, "right"), 1, len(times) - 1)
@@ -88,8 +88,8 @@ class SolvedPath:
         safe = np.maximum(step, 1e-9)
         share = np.clip((at - times[before])[:, None] / safe, 0.0, 1.0)
         p, q = places[before], places[after]
-        nowhere = np.isin(after, self._begins)[:, None]
-        m, n = (np.where(nowhere, q - p, speeds[knot] * step) for knot in (before, after))
+        in_gap = np.isin(after, self._piece_starts)[:, None]
+        m, n = (np.where(in_gap, q - p, speeds[knot] * step) for knot in (before, after))
         if not slope:
             return hermite(share, p, m, q, n)
         rising = 6 * share - 6 * share**2

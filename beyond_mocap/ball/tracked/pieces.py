@@ -22,15 +22,15 @@ BY_SPEED = 0.35  # 1/s, 1/s^2, growth of both with its speed
 IN_AIR, FALLING = 0.5, 9.0  # m, above this the ball falls; m/s^2
 _CHUNK = 400  # starts fitted together, to limit memory
 
-_SIDES = (0.12, 0.28)  # s of the lines on either side
-_WORTH = 0.9  # m/s, least change of velocity of a candidate
+_SIDE_SECONDS = (0.12, 0.28)  # s of the lines on either side
+_MIN_CHANGE = 0.9  # m/s, least change of velocity of a candidate
 _LONGEST = 2.4  # s of a piece while cuts are chosen
 _PAUSE = 0.8  # s without a candidate after which one is added
-PRICE = 5.0  # nats for each cut while cuts are chosen
+CUT_COST = 5.0  # nats for each cut while cuts are chosen
 
 
 @dataclass(frozen=True, eq=False)
-class Fits:
+class PieceFits:
     """K pieces over the samples first[k] .. last[k] (inclusive).
 
     Attributes:
@@ -52,38 +52,38 @@ class Fits:
     def __len__(self) -> int:
         return len(self.first)
 
-    def take(self, which) -> Fits:
+    def take(self, which) -> PieceFits:
         """Select some of the pieces."""
-        return Fits(*(getattr(self, name)[which] for name in self.__dataclass_fields__))
+        return PieceFits(*(getattr(self, name)[which] for name in self.__dataclass_fields__))
 
     def position(self, time: np.ndarray, which=slice(None)) -> np.ndarray:
         """Give the position (n, D) m at `time` (n,) s, each of its own piece."""
-        return np.einsum("ni,nid->nd", powers(time - self.begin[which]), self.coefficients[which])
+        return np.einsum("ni,nid->nd", build_powers(time - self.begin[which]), self.coefficients[which])
 
     def velocity(self, time: np.ndarray, which=slice(None)) -> np.ndarray:
         """Give the velocity (n, D) m/s at `time` (n,) s, each of its own piece."""
-        return np.einsum("ni,nid->nd", slopes(time - self.begin[which]), self.coefficients[which])
+        return np.einsum("ni,nid->nd", build_power_slopes(time - self.begin[which]), self.coefficients[which])
 
     def spread(self, time: np.ndarray, which=slice(None)) -> tuple[np.ndarray, np.ndarray]:
         """Give the variances (n,) of one coordinate's position and velocity at `time` (n,) s."""
         since = time - self.begin[which]
-        place, speed, inverse = powers(since), slopes(since), self.inverse[which]
+        place, speed, inverse = build_powers(since), build_power_slopes(since), self.inverse[which]
         return (np.einsum("ni,nij,nj->n", place, inverse, place), np.einsum("ni,nij,nj->n", speed, inverse, speed))
 
 
-def powers(since: np.ndarray) -> np.ndarray:
+def build_powers(since: np.ndarray) -> np.ndarray:
     """Build (n, 4): 1, t, t^2, t^3."""
     return since[:, None] ** np.arange(4)
 
 
-def slopes(since: np.ndarray) -> np.ndarray:
+def build_power_slopes(since: np.ndarray) -> np.ndarray:
     """Build (n, 4): the derivatives of 1, t, t^2, t^3."""
     one = np.ones_like(since)
     return np.stack([0.0 * one, one, 2.0 * since, 3.0 * since**2], axis=1)
 
 
 def fit_between(times: np.ndarray, points: np.ndarray, weights: np.ndarray, cuts: np.ndarray, longest: float,
-                steps: int | None = None) -> Fits:  # fmt: skip
+                steps: int | None = None) -> PieceFits:  # fmt: skip
     """Fit pieces between all pairs of cuts that are close enough.
 
     Args:
@@ -107,12 +107,12 @@ def fit_between(times: np.ndarray, points: np.ndarray, weights: np.ndarray, cuts
         begin = np.repeat(starts, counts)
         # For start s the ends s + 1 .. end: a running count that restarts with each start.
         upto = begin + 1 + np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
-        parts.append(_solve(times, points, weights, cuts=cuts, begin=begin, upto=upto))
-    names = Fits.__dataclass_fields__
-    return Fits(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
+        parts.append(_fit_group(times, points, weights, cuts=cuts, begin=begin, upto=upto))
+    names = PieceFits.__dataclass_fields__
+    return PieceFits(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
 
 
-def _solve(times, points, weights, cuts, begin, upto) -> Fits:
+def _fit_group(times, points, weights, cuts, begin, upto) -> PieceFits:
     """Fit the pieces between cuts begin[k] and upto[k], whose starts are a few neighbouring cuts.
 
     The sums of all pieces that share a start are prefixes of one cumulative sum over its samples.
@@ -144,11 +144,11 @@ def _solve(times, points, weights, cuts, begin, upto) -> Fits:
     inverse = np.linalg.inv(normal)
     found = inverse @ right
     cost = 0.5 * (square[row, column] - (found * right).sum(axis=(1, 2)))
-    return Fits(cuts[begin], cuts[upto] - 1, times[cuts[begin]], coefficients=found, cost=np.maximum(cost, 0.0),
+    return PieceFits(cuts[begin], cuts[upto] - 1, times[cuts[begin]], coefficients=found, cost=np.maximum(cost, 0.0),
                 inverse=inverse)
 
 
-def find_promising(times: np.ndarray, points: np.ndarray, known: np.ndarray, interval: float) -> np.ndarray:
+def find_candidate_cuts(times: np.ndarray, points: np.ndarray, known: np.ndarray, interval: float) -> np.ndarray:
     """Find candidate cuts where the velocity may change.
 
     Args:
@@ -161,10 +161,10 @@ def find_promising(times: np.ndarray, points: np.ndarray, known: np.ndarray, int
     """
     count = len(times)
     chosen = np.zeros(count + 1, bool)
-    for seconds in _SIDES:
-        change = velocity_change(points, max(2, round(seconds / interval)), interval)
+    for seconds in _SIDE_SECONDS:
+        change = measure_velocity_change(points, max(2, round(seconds / interval)), interval)
         top = np.maximum(np.pad(change[1:], (0, 1)), np.pad(change[:-1], (1, 0))) <= change
-        peaks = np.flatnonzero(top & (change > _WORTH))
+        peaks = np.flatnonzero(top & (change > _MIN_CHANGE))
         for near in (-1, 0, 1):
             chosen[np.clip(peaks + near, 1, count - 1)] = True
     chosen[[0, count]] = True
@@ -176,7 +176,7 @@ def find_promising(times: np.ndarray, points: np.ndarray, known: np.ndarray, int
     return np.flatnonzero(chosen)
 
 
-def velocity_change(points: np.ndarray, side: int, interval: float) -> np.ndarray:
+def measure_velocity_change(points: np.ndarray, side: int, interval: float) -> np.ndarray:
     """Measure how much the slopes of the lines before and after each place differ.
 
     Args:
@@ -198,7 +198,7 @@ def velocity_change(points: np.ndarray, side: int, interval: float) -> np.ndarra
     return change
 
 
-def choose_cuts(times, points, weights, places, price: float = PRICE) -> np.ndarray:
+def choose_cuts(times, points, weights, places, cut_cost: float = CUT_COST) -> np.ndarray:
     """Choose the cuts between pieces that explain the samples best.
 
     Args:
@@ -211,10 +211,10 @@ def choose_cuts(times, points, weights, places, price: float = PRICE) -> np.ndar
         The chosen places.
     """
     pieces = fit_between(times, points, weights, places, _LONGEST)
-    return places[find_cheapest(pieces, places, price)]
+    return places[find_lowest_cost_cuts(pieces, places, cut_cost)]
 
 
-def find_cheapest(pieces: Fits, places: np.ndarray, price: float) -> np.ndarray:
+def find_lowest_cost_cuts(pieces: PieceFits, places: np.ndarray, cut_cost: float) -> np.ndarray:
     """Find the chain of pieces with the lowest cost, by dynamic programming.
 
     Args:
@@ -227,7 +227,7 @@ def find_cheapest(pieces: Fits, places: np.ndarray, price: float) -> np.ndarray:
     begin = np.searchsorted(places, pieces.first)
     upto = np.searchsorted(places, pieces.last + 1)
     order = np.argsort(upto, kind="stable")
-    begin, upto, cost = begin[order], upto[order], pieces.cost[order] + price
+    begin, upto, cost = begin[order], upto[order], pieces.cost[order] + cut_cost
     # Pieces sorted by their end: those that end at place p are edges[p] .. edges[p + 1].
     edges = np.searchsorted(upto, np.arange(len(places) + 1))
     best, back = np.zeros(len(places)), np.zeros(len(places), int)
@@ -236,7 +236,7 @@ def find_cheapest(pieces: Fits, places: np.ndarray, price: float) -> np.ndarray:
         total = best[begin[own]] + cost[own]
         choice = int(total.argmin())
         best[place], back[place] = total[choice], begin[own][choice]
-    way = [len(places) - 1]
-    while way[-1] > 0:
-        way.append(back[way[-1]])
-    return np.array(way[::-1])
+    chain = [len(places) - 1]
+    while chain[-1] > 0:
+        chain.append(back[chain[-1]])
+    return np.array(chain[::-1])

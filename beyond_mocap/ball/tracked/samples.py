@@ -7,18 +7,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...base.errors import InputError
-from ...base.time_series import runs
-from ...motion.skeleton import frozen_array
+from ...base.time_series import find_runs
+from ...motion.skeleton import freeze_array
 from ...motion.track import BALL_RADIUS
 
 FASTEST_BALL = 45.0  # m/s, well above the hardest kicks (38 m/s)
-_STRAIGHT = 0.4  # s: samples on a straight line at constant velocity for so long count as filled in
+_FILLED_SECONDS = 0.4  # s: samples on a straight line at constant velocity for so long count as filled in
 _SCATTER_WINDOW = 1.2  # s over which the scatter is estimated
-_LEAST_SCATTER, _MOST_SCATTER = 0.03, 0.35  # m
-_WRONG = 6.0  # times the scatter: an outlier
+_MIN_SCATTER, _MAX_SCATTER = 0.03, 0.35  # m
+_OUTLIER_RATIO = 6.0  # times the scatter: an outlier
 _FARTHEST = 1e4  # m from the middle; positions beyond are invalid
 _MEDIAN_LENGTH = 1.177  # median length of a vector of two standard normal values
-_LOW = 0.3  # m, heights below this belong to a ball on the ground
+_GROUND_HEIGHT = 0.3  # m, heights below this belong to a ball on the ground
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -54,7 +54,7 @@ class Samples:
         return self.used & ~self.filled
 
 
-def read_samples(times: np.ndarray, ball: np.ndarray, where: str = "ball") -> Samples:
+def build_samples(times: np.ndarray, ball: np.ndarray, where: str = "ball") -> Samples:
     """Build the samples of a feed.
 
     Samples whose time is not finite, or not after the previous one, are left out.
@@ -79,34 +79,34 @@ def read_samples(times: np.ndarray, ball: np.ndarray, where: str = "ball") -> Sa
         raise InputError(where, f"{np.count_nonzero(known)} samples of the ball", "at least five",
                          "choose a feed with a ball and ascending times, or a longer part of it")
     interval = float(np.median(np.diff(times)))
-    filled = _filled(ball[:, :2], known, interval)
-    scatter = _scatter(ball[:, :2], interval)
-    outlier = _outliers(times, ball[:, :2], known, scatter)
-    known, filled, outlier = (frozen_array(flag, bool) for flag in (known, filled & known, outlier))
-    return Samples(times=frozen_array(times), positions=frozen_array(_centred(ball)), known=known, filled=filled,
-                   outlier=outlier, scatter=frozen_array(scatter), interval=interval)
+    filled = _detect_filled(ball[:, :2], known, interval)
+    scatter = _estimate_scatter(ball[:, :2], interval)
+    outlier = _detect_outliers(times, ball[:, :2], known, scatter)
+    known, filled, outlier = (freeze_array(flag, bool) for flag in (known, filled & known, outlier))
+    return Samples(times=freeze_array(times), positions=freeze_array(_shift_to_centre(ball)), known=known, filled=filled,
+                   outlier=outlier, scatter=freeze_array(scatter), interval=interval)
 
 
-def _centred(ball: np.ndarray) -> np.ndarray:
+def _shift_to_centre(ball: np.ndarray) -> np.ndarray:
     """Shift heights to the ball's centre: some feeds give 0 for a ball on the ground."""
-    low = ball[:, 2][ball[:, 2] < _LOW]
+    low = ball[:, 2][ball[:, 2] < _GROUND_HEIGHT]
     lies_at_zero = len(low) > 0 and np.median(low) < BALL_RADIUS / 2.0
     return ball + [0.0, 0.0, BALL_RADIUS] if lies_at_zero else ball
 
 
-def quantum(points: np.ndarray) -> float:
+def estimate_quantum(points: np.ndarray) -> float:
     """Estimate the step m to which a feed rounds: the least difference of neighbouring values (N, k), at most 0.1."""
     steps = np.abs(np.diff(points, axis=0))
     steps = steps[np.isfinite(steps) & (steps > 1e-6)]
     return float(min(steps.min(initial=0.1), 0.1))
 
 
-def _filled(points: np.ndarray, known: np.ndarray, interval: float) -> np.ndarray:
+def _detect_filled(points: np.ndarray, known: np.ndarray, interval: float) -> np.ndarray:
     """Detect samples (N,) bool in stretches no measurement produces: straight and even to within the rounding."""
-    count = max(5, round(_STRAIGHT / interval) + 1)
+    count = max(5, round(_FILLED_SECONDS / interval) + 1)
     if len(points) < count:
         return np.zeros(len(points), bool)
-    tolerance = max(1.01 * quantum(points[known]), 1e-3)
+    tolerance = max(1.01 * estimate_quantum(points[known]), 1e-3)
     windows = np.lib.stride_tricks.sliding_window_view(points, count, axis=0)  # (N - count + 1, 2, count)
     first, last = windows[..., :1], windows[..., -1:]
     chord = first + (last - first) * np.linspace(0.0, 1.0, count)
@@ -120,7 +120,7 @@ def _filled(points: np.ndarray, known: np.ndarray, interval: float) -> np.ndarra
     return np.cumsum(inside[:-1]) > 0
 
 
-def _scatter(points: np.ndarray, interval: float) -> np.ndarray:
+def _estimate_scatter(points: np.ndarray, interval: float) -> np.ndarray:
     """Estimate the standard deviation (N,) m of x and of y of points (N, 2) m.
 
     From second differences: their median over a window around each sample.
@@ -132,34 +132,34 @@ def _scatter(points: np.ndarray, interval: float) -> np.ndarray:
     bends[1:-1] = np.linalg.norm(np.diff(points, 2, axis=0), axis=1)
     there = np.flatnonzero(np.isfinite(bends))
     if len(there) < 3:
-        return np.full(count, _LEAST_SCATTER)
+        return np.full(count, _MIN_SCATTER)
     middle = median_filter(bends[there], max(7, 2 * round(_SCATTER_WINDOW / interval / 2) + 1), mode="nearest")
     found = np.interp(np.arange(count), there, middle) / (_MEDIAN_LENGTH * np.sqrt(6.0))
-    return np.clip(found, _LEAST_SCATTER, _MOST_SCATTER)
+    return np.clip(found, _MIN_SCATTER, _MAX_SCATTER)
 
 
-def _outliers(times: np.ndarray, points: np.ndarray, known: np.ndarray, scatter: np.ndarray) -> np.ndarray:
+def _detect_outliers(times: np.ndarray, points: np.ndarray, known: np.ndarray, scatter: np.ndarray) -> np.ndarray:
     """Detect samples (N,) bool that no ball can reach from either side, or that deviate alone between smooth
     neighbours.
     """
-    wrong = np.zeros(len(points), bool)
+    outlier = np.zeros(len(points), bool)
     there = np.flatnonzero(known)
     at, when = points[there], times[there]
     if len(there) < 5:
-        return wrong
+        return outlier
     step = np.linalg.norm(np.diff(at, axis=0), axis=1) / np.diff(when)
     jump = (step[:-1] > FASTEST_BALL) & (step[1:] > FASTEST_BALL)
     over = np.linalg.norm(at[2:] - at[:-2], axis=1) / (when[2:] - when[:-2])
-    wrong[there[1:-1]] = jump & (over < FASTEST_BALL)
+    outlier[there[1:-1]] = jump & (over < FASTEST_BALL)
     around = np.stack([at[:-4], at[1:-3], at[3:-1], at[4:]])  # the two before and the two after
     share = np.array([-2.0, -1.0, 1.0, 2.0])
     middle = around.mean(axis=0)
     slope = np.tensordot(share, around, 1) / 10.0
-    off = np.linalg.norm(around - middle - share[:, None, None] * slope, axis=2).max(axis=0)
-    out = np.linalg.norm(at[2:-2] - middle, axis=1)
-    limit = np.maximum(_WRONG * scatter[there[2:-2]], 0.4)
-    wrong[there[2:-2]] |= (out > limit) & (out > 4.0 * off)
-    for first, end in runs(wrong):
+    neighbour_residual = np.linalg.norm(around - middle - share[:, None, None] * slope, axis=2).max(axis=0)
+    deviation = np.linalg.norm(at[2:-2] - middle, axis=1)
+    limit = np.maximum(_OUTLIER_RATIO * scatter[there[2:-2]], 0.4)
+    outlier[there[2:-2]] |= (deviation > limit) & (deviation > 4.0 * neighbour_residual)
+    for first, end in find_runs(outlier):
         if end - first > 3:
-            wrong[first:end] = False  # not single samples: the feed follows something else
-    return wrong
+            outlier[first:end] = False  # not single samples: the feed follows something else
+    return outlier

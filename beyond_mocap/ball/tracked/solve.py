@@ -13,29 +13,29 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...base.errors import Cancelled, InputError
-from ...base.time_series import interpolate
-from ...motion.skeleton import frozen_array
+from ...base.errors import UserCancelledError, InputError
+from ...base.time_series import interpolate_columns
+from ...motion.skeleton import freeze_array
 from ...motion.track import BALL_RADIUS, Track
 from ...motion.track.match_data import REFEREE, Match
 from . import kinds, pieces, touches
-from .flights import flown
-from .kinds import BallEnd, ball_ends
-from .path import BallPiece, SolvedPath
-from .samples import Samples, read_samples
+from .flights import replace_by_flights
+from .kinds import BallEnd, find_ball_ends
+from .path import BallPiece, SolvedTrajectory
+from .samples import Samples, build_samples
 
 PITCH = (105.0, 68.0)  # m, the standard pitch
-_GAP = 1.5  # s without a sample: a longer gap is not solved
+_MAX_GAP = 1.5  # s without a sample: a longer gap is not solved
 _SHORTEST, _FEWEST = 0.3, 5  # s, samples: shorter stretches are left out
-_TOGETHER = 0.06  # s in which errors of samples correlate: they count as one sample
+_CORRELATED_SECONDS = 0.06  # s in which errors of samples correlate: they count as one sample
 _STEP = 0.04  # s between the knots of a trajectory
 _BLEND = 0.2  # s over which a trajectory is bent to the position of a touch
 _RESTART = 60.0  # s within which a ball over the touch line is thrown in
-_DOUBT = 4.0  # nats: margins below this mean doubt, since the costs are only typical for feeds
-_SINKS = 4.0  # m/s downward, at most, after a touch that stops the ball; feeds let heights drop at once
-_MANY = 0.05  # share of filled samples from which it is reported
-_EVERYBODY = 14  # tracked players: with so many, a touch by none of them is an error of the feed
-_HEIGHTS = 0.8  # share of samples with a height from which heights are used
+_CONFIDENCE_SCALE = 4.0  # nats: margins below this mean doubt, since the costs are only typical for feeds
+_MAX_SINK_SPEED = 4.0  # m/s downward, at most, after a touch that stops the ball; feeds let heights drop at once
+_REPORTED_FILLED_SHARE = 0.05  # share of filled samples from which it is reported
+_FULL_TRACKING = 14  # tracked players: with so many, a touch by none of them is an error of the feed
+_MIN_HEIGHT_SHARE = 0.8  # share of samples with a height from which heights are used
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -66,7 +66,7 @@ class SolvedTouch:
 
     def __post_init__(self):
         for name in ("position", "before", "after"):
-            object.__setattr__(self, name, frozen_array(getattr(self, name)))
+            object.__setattr__(self, name, freeze_array(getattr(self, name)))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -88,7 +88,7 @@ class SolvedBall:
 
     times: np.ndarray
     touches: tuple[SolvedTouch, ...]
-    ball: SolvedPath
+    ball: SolvedTrajectory
     filled: np.ndarray
     outlier: np.ndarray
     measured: np.ndarray
@@ -102,7 +102,7 @@ class SolvedBall:
         """The pieces of the trajectory."""
         return self.ball.pieces
 
-def solve(times: np.ndarray, ball: np.ndarray, positions: np.ndarray, players: Sequence[str], teams: Sequence[str] = (),
+def solve_samples(times: np.ndarray, ball: np.ndarray, positions: np.ndarray, players: Sequence[str], teams: Sequence[str] = (),
           pitch: tuple[float, float] = PITCH, where: str = "ball", progress: Callable[[float, str], None] | None = None,
           cancelled: Callable[[], bool] | None = None) -> SolvedBall:
     """Solve the ball of a feed.
@@ -123,80 +123,80 @@ def solve(times: np.ndarray, ball: np.ndarray, positions: np.ndarray, players: S
         InputError: if the ball has fewer than five samples, or never so many without a long gap.
         Cancelled: if `cancelled` returns True.
     """
-    samples = read_samples(times, ball, where)
-    every, first = np.unique(np.asarray(times, float), return_index=True)
-    positions = np.asarray(positions, float)[:, first[np.searchsorted(every, samples.times)]]
-    stranger = touches.STRANGER if len(players) > 1 else touches.ALONE
-    windows = _windows(samples, where)
+    samples = build_samples(times, ball, where)
+    unique_times, first = np.unique(np.asarray(times, float), return_index=True)
+    positions = np.asarray(positions, float)[:, first[np.searchsorted(unique_times, samples.times)]]
+    untracked_cost = touches.UNTRACKED_COST if len(players) > 1 else touches.SINGLE_UNTRACKED_COST
+    windows = _find_windows(samples, where)
     found = []
     for number, window in enumerate(windows):
         if cancelled is not None and cancelled():
-            raise Cancelled("solving the ball: cancelled")
+            raise UserCancelledError("solving the ball: cancelled")
         if progress is not None:
             progress(0.6 * number / len(windows), "touches")
-        found.append(_solve_window(samples, window, positions, stranger))
-    solved = _named(samples, found, positions, players=players, teams=teams, pitch=pitch, stranger=stranger)
-    curves = [piece for window, cuts in zip(windows, found) for piece in _pieces(samples, window, cuts)]
+        found.append(_solve_window(samples, window, positions, untracked_cost))
+    solved = _label_touches(samples, found, positions, players=players, teams=teams, pitch=pitch, untracked_cost=untracked_cost)
+    curves = [piece for window, cuts in zip(windows, found) for piece in _build_pieces(samples, window, cuts)]
     if progress is not None:
         progress(0.6, "flights")
     moments = np.array([touch.time for touch in solved])
     heights = _has_heights(samples)
-    path = SolvedPath(tuple(flown(samples, curves, moments, heights, cancelled)))
-    solved = [_along(touch, path, heights) for touch in solved]
-    ends = ball_ends(samples.times, path.at(samples.times), *pitch)
-    solved = _thrown_in(solved, ends, pitch[1])
+    path = SolvedTrajectory(tuple(replace_by_flights(samples, curves, moments, heights, cancelled)))
+    solved = [_update_touch(touch, path, heights) for touch in solved]
+    ends = find_ball_ends(samples.times, path.at(samples.times), *pitch)
+    solved = _label_throw_ins(solved, ends, pitch[1])
     residuals = np.where(samples.known, path.residuals(samples.times, samples.positions), np.nan)
-    sure = float(np.mean([touch.confidence for touch in solved])) if solved else 0.0
+    confidence = float(np.mean([touch.confidence for touch in solved])) if solved else 0.0
     return SolvedBall(times=samples.times, touches=tuple(solved), ball=path, filled=samples.filled,
-                      outlier=samples.outlier, measured=frozen_array(samples.measured, bool),
-                      residuals=frozen_array(residuals), ends=tuple(_by_whom(end, solved) for end in ends),
-                      confidence=sure, notes=_notes(samples, heights))
+                      outlier=samples.outlier, measured=freeze_array(samples.measured, bool),
+                      residuals=freeze_array(residuals), ends=tuple(_add_last_player(end, solved) for end in ends),
+                      confidence=confidence, notes=_describe_feed(samples, heights))
 
 
-def _windows(samples: Samples, where: str) -> list[slice]:
+def _find_windows(samples: Samples, where: str) -> list[slice]:
     """Find the stretches in which the ball is known, with gaps of up to _MAX_GAP; at least one."""
     there = np.flatnonzero(samples.used)
-    breaks = np.flatnonzero(np.diff(samples.times[there]) > _GAP)
+    breaks = np.flatnonzero(np.diff(samples.times[there]) > _MAX_GAP)
     firsts, lasts = [there[0], *there[breaks + 1]], [*there[breaks], there[-1]]
     spans = [slice(int(first), int(last) + 1) for first, last in zip(firsts, lasts)]
     spans = [span for span in spans if span.stop - span.start >= _FEWEST]
     if not spans:
-        found = f"the ball's samples are mostly more than {_GAP:g} s apart"
+        found = f"the ball's samples are mostly more than {_MAX_GAP:g} s apart"
         raise InputError(where, found, "at least five closer together", "choose a feed that has the ball more often")
-    kept = [span for span in spans if samples.times[span.stop - 1] - samples.times[span.start] >= _SHORTEST]
-    return kept or spans[:1]
+    long_spans = [span for span in spans if samples.times[span.stop - 1] - samples.times[span.start] >= _SHORTEST]
+    return long_spans or spans[:1]
 
 
-def _bridged(samples: Samples, window: slice) -> np.ndarray:
+def _bridge_gaps(samples: Samples, window: slice) -> np.ndarray:
     """Bridge gaps and wrong samples of a window: (n, 2 or 3) m, with heights if the feed has them."""
     points, used = samples.positions[window], samples.used[window]
     heights = np.isfinite(points[:, 2])
-    axes = 3 if np.count_nonzero(heights & used) > _HEIGHTS * np.count_nonzero(used) else 2
+    axes = 3 if np.count_nonzero(heights & used) > _MIN_HEIGHT_SHARE * np.count_nonzero(used) else 2
     there = np.flatnonzero(used & heights) if axes == 3 else np.flatnonzero(used)
     every = np.arange(len(points))
-    return interpolate(every, there, points[there, :axes])
+    return interpolate_columns(every, there, points[there, :axes])
 
 
-def _solve_window(samples: Samples, window: slice, positions: np.ndarray, stranger: float) -> touches.Cuts:
-    times, points = samples.times[window], _bridged(samples, window)
-    weights = samples.used[window] / samples.scatter[window] ** 2 * min(1.0, samples.interval / _TOGETHER)
-    places = pieces.find_promising(times, points, samples.used[window], samples.interval)
+def _solve_window(samples: Samples, window: slice, positions: np.ndarray, untracked_cost: float) -> touches.Cuts:
+    times, points = samples.times[window], _bridge_gaps(samples, window)
+    weights = samples.used[window] / samples.scatter[window] ** 2 * min(1.0, samples.interval / _CORRELATED_SECONDS)
+    places = pieces.find_candidate_cuts(times, points, samples.used[window], samples.interval)
     chosen = pieces.choose_cuts(times, points, weights, places)
-    cost = _reach_cost(times, points, positions[:, window], chosen, stranger)
+    cost = _compute_reach_cost(times, points, positions[:, window], chosen, untracked_cost)
     return touches.solve_cuts(times, points, weights, chosen, cost)
 
 
-def _reach_cost(times, points, positions, cuts, stranger) -> np.ndarray:
+def _compute_reach_cost(times, points, positions, cuts, untracked_cost) -> np.ndarray:
     """Compute the nats (C,) of the nearest player touching the ball between the samples before and after each cut."""
     costs = []
     for near in (cuts - 1, cuts):
         index = np.clip(near, 0, len(times) - 1)
-        away = touches.player_distances(times, points[index, :2], positions, times[index]).min(axis=0, initial=np.inf)
-        costs.append(touches.reach_cost(away, points[index, 2] if points.shape[1] == 3 else None, stranger))
+        away = touches.measure_player_distances(times, points[index, :2], positions, times[index]).min(axis=0, initial=np.inf)
+        costs.append(touches.compute_reach_cost(away, points[index, 2] if points.shape[1] == 3 else None, untracked_cost))
     return np.minimum(*costs)
 
 
-def _pieces(samples: Samples, window: slice, cuts: touches.Cuts) -> list[BallPiece]:
+def _build_pieces(samples: Samples, window: slice, cuts: touches.Cuts) -> list[BallPiece]:
     """Build the trajectory of one window; the ends of pieces are bent to the positions of the cuts."""
     times = samples.times[window]
     edges = np.concatenate([[times[0]], cuts.time, [times[-1]]])
@@ -211,16 +211,16 @@ def _pieces(samples: Samples, window: slice, cuts: touches.Cuts) -> list[BallPie
         which = np.full(count, index)
         places, speeds = cuts.pieces.position(at, which), cuts.pieces.velocity(at, which)
         # At the start (cut index - 1) and at the end (cut index) add a shift that falls quadratically to zero.
-        for edge, place, way in ((index - 1, 0, -2.0), (index, -1, 2.0)):
+        for edge, place, slope_sign in ((index - 1, 0, -2.0), (index, -1, 2.0)):
             if 0 <= edge < len(cuts.time):
                 miss, over = cuts.place[edge] - places[place], min(_BLEND, end - start)
                 near = np.maximum(0.0, 1.0 - np.abs(at - at[place]) / over)[:, None]
-                places, speeds = places + near**2 * miss, speeds + way / over * near * miss
-        out.append(_piece(samples, at, *_lifted(places, speeds)))
+                places, speeds = places + near**2 * miss, speeds + slope_sign / over * near * miss
+        out.append(_build_piece(samples, at, *_add_heights(places, speeds)))
     return out
 
 
-def _lifted(places: np.ndarray, speeds: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _add_heights(places: np.ndarray, speeds: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Add heights: three coordinates, the ball's centre never below its radius."""
     if places.shape[1] == 2:
         places = np.pad(places, ((0, 0), (0, 1)), constant_values=BALL_RADIUS)
@@ -230,111 +230,111 @@ def _lifted(places: np.ndarray, speeds: np.ndarray) -> tuple[np.ndarray, np.ndar
     return places, np.where(low[:, None] * [False, False, True], 0.0, speeds)
 
 
-def _piece(samples: Samples, at: np.ndarray, places: np.ndarray, speeds: np.ndarray) -> BallPiece:
+def _build_piece(samples: Samples, at: np.ndarray, places: np.ndarray, speeds: np.ndarray) -> BallPiece:
     """Build one piece with its kind and its residual to the measured samples."""
     part = slice(*np.searchsorted(samples.times, [at[0], at[-1]]))
     seen = samples.measured[part]
     piece = BallPiece(times=at, positions=places, velocities=speeds, kind="", spin=np.zeros(3), residual=np.nan,
                       bounces=np.zeros(0))
-    off = SolvedPath((piece,)).residuals(samples.times[part], samples.positions[part])[seen]
+    off = SolvedTrajectory((piece,)).residuals(samples.times[part], samples.positions[part])[seen]
     fast, high = np.linalg.norm(speeds[:, :2], axis=1).max(), places[:, 2].max()
     kind = "flight" if high > 0.5 else "still" if fast < 0.3 else "roll"
     residual = float(np.sqrt(np.mean(off**2))) if len(off) else np.nan
     return replace(piece, kind=kind, residual=residual)
 
 
-def _named(samples, found, positions, players, teams, pitch, stranger) -> list[SolvedTouch]:
+def _label_touches(samples, found, positions, players, teams, pitch, untracked_cost) -> list[SolvedTouch]:
     """Label the touches with their players, parts and kinds."""
     fields = ("time", "spread", "margin", "place", "before", "after")
-    rows = [tuple(_three(getattr(cuts, name)[cuts.touch]) for name in fields) for cuts in found]
+    rows = [tuple(_pad_to_three(getattr(cuts, name)[cuts.touch]) for name in fields) for cuts in found]
     columns = [np.concatenate(column) for column in zip(*rows)]
     order = np.argsort(columns[0], kind="stable")
     time, spread, margin, place, before, after = (column[order] for column in columns)
     if not len(time):
         return []
-    away = touches.player_distances(samples.times, place[:, :2], positions, time)
-    chosen = touches.choose_players(away, time, _between(samples, positions, time), stranger)
-    everybody = np.isfinite(away).sum(axis=0) >= _EVERYBODY
-    kept = np.flatnonzero((chosen >= 0) | ~everybody)
+    away = touches.measure_player_distances(samples.times, place[:, :2], positions, time)
+    chosen = touches.choose_players(away, time, _measure_mean_distance(samples, positions, time), untracked_cost)
+    all_tracked = np.isfinite(away).sum(axis=0) >= _FULL_TRACKING
+    kept = np.flatnonzero((chosen >= 0) | ~all_tracked)
     time, spread, margin, place = time[kept], spread[kept], margin[kept], place[kept]
     before, after, away, chosen = before[kept], after[kept], away[:, kept], chosen[kept]
-    known_height, goals = _has_heights(samples), _goals(positions, teams, pitch[0])
+    known_height, goals = _has_heights(samples), _find_goal_lines(positions, teams, pitch[0])
     out = []
     for k in range(len(time)):
         player = int(chosen[k])
-        moving = _player_velocity(samples, positions, player, time[k])
-        part = kinds.part_of(place[k, 2] if known_height else None)
+        moving = _estimate_player_velocity(samples, positions, player, time[k])
+        part = kinds.choose_part(place[k, 2] if known_height else None)
         same_next = k + 1 < len(time) and chosen[k + 1] == player and time[k + 1] - time[k] < 3.0
         same_before = k > 0 and chosen[k - 1] == player and time[k] - time[k - 1] < 3.0
-        kind = kinds.kind_of(part, before[k] - moving, after[k] - moving, same_next, same_before)
+        kind = kinds.choose_touch_kind(part, before[k] - moving, after[k] - moving, same_next, same_before)
         since = time[k] - time[k - 1] if k else np.inf
         if kinds.is_throw_in(place[k], before[k], after[k], since, pitch[1]):
             part, kind = "hand", kinds.THROW_IN
         elif player in goals:
-            part, kind = kinds.keeper_kind(place[k], before[k], goals[player], known_height) or (part, kind)
-        sure = _sure(margin[k], away[:, k], player)
-        centre = np.array([place[k, 0], place[k, 1], kinds.ground_height(place[k, 2])])
+            part, kind = kinds.choose_keeper_kind(place[k], before[k], goals[player], known_height) or (part, kind)
+        confidence = _compute_confidence(margin[k], away[:, k], player)
+        centre = np.array([place[k, 0], place[k, 1], kinds.limit_to_ground(place[k, 2])])
         name = players[player] if player >= 0 else ""
         out.append(SolvedTouch(time=float(time[k]), uncertainty=float(spread[k]), player=name, part=part, kind=kind,
-                               position=centre, before=before[k], after=after[k], confidence=sure))
+                               position=centre, before=before[k], after=after[k], confidence=confidence))
     return out
 
 
-def _notes(samples: Samples, heights: bool) -> tuple[str, ...]:
+def _describe_feed(samples: Samples, heights: bool) -> tuple[str, ...]:
     """Describe what people should know about the feed."""
     filled, wrong = float(samples.filled.mean()), int(np.count_nonzero(samples.outlier))
-    lines = [f"{filled:.0%} of the ball's samples were filled in at constant velocity"] if filled > _MANY else []
+    lines = [f"{filled:.0%} of the ball's samples were filled in at constant velocity"] if filled > _REPORTED_FILLED_SHARE else []
     lines += [f"{wrong} of the ball's samples {'is' if wrong == 1 else 'are'} wrong and ignored"] if wrong else []
     lines += [] if heights else ["the feed has no ball heights: estimates are good to a metre or two at best"]
     return tuple(lines)
 
 
-def _goals(positions: np.ndarray, teams: Sequence[str], length: float) -> dict[int, float]:
+def _find_goal_lines(positions: np.ndarray, teams: Sequence[str], length: float) -> dict[int, float]:
     """Find the goalkeepers (indices) and the x m of their goal lines in this part of the match."""
-    found = kinds.keepers(positions, list(teams)) if len(teams) == len(positions) else {}
+    found = kinds.find_keepers(positions, list(teams)) if len(teams) == len(positions) else {}
     places = {keeper: np.nanmedian(positions[keeper, :, 0]) for keeper in found.values()}
     return {keeper: float(np.sign(x)) * length / 2.0 for keeper, x in places.items() if abs(x) > length / 5.0}
 
 
-def _thrown_in(solved: list[SolvedTouch], ends: list[BallEnd], width: float) -> list[SolvedTouch]:
+def _label_throw_ins(solved: list[SolvedTouch], ends: list[BallEnd], width: float) -> list[SolvedTouch]:
     """Label throw-ins: the first touch from the touch line after each ball over it."""
     out = list(solved)
     for end in ends:
         later = [k for k, touch in enumerate(solved) if end.time < touch.time < end.time + _RESTART]
         takes = (k for k in later if out[k].position[1] * end.y > 0.0)
-        first = next((k for k in takes if kinds.leaves_line(out[k].position, out[k].after, width)), None)
+        first = next((k for k in takes if kinds.is_from_touch_line(out[k].position, out[k].after, width)), None)
         if end.kind == "touch line" and first is not None:
             out[first] = replace(out[first], part="hand", kind=kinds.THROW_IN)
     return out
 
 
 def _has_heights(samples: Samples) -> bool:
-    return bool(np.isfinite(samples.positions[samples.used, 2]).mean() > _HEIGHTS)
+    return bool(np.isfinite(samples.positions[samples.used, 2]).mean() > _MIN_HEIGHT_SHARE)
 
 
-def _along(touch: SolvedTouch, path: SolvedPath, heights: bool) -> SolvedTouch:
+def _update_touch(touch: SolvedTouch, path: SolvedTrajectory, heights: bool) -> SolvedTouch:
     """Update a touch with the trajectory's velocities just before and after it.
 
     Where the feed has no heights, also with the height and body part that the arriving flight implies.
     """
     before, after = path.velocity(np.array([touch.time - 1e-4, touch.time + 1e-4]))
-    if touch.kind in (kinds.RECEIVE, kinds.DRIBBLE, kinds.CHESTED):
-        after = np.array([after[0], after[1], max(after[2], -_SINKS)])
+    if touch.kind in (kinds.RECEIVE, kinds.DRIBBLE, kinds.CHEST_CONTROL):
+        after = np.array([after[0], after[1], max(after[2], -_MAX_SINK_SPEED)])
     if heights or touch.part == "hand":
         return replace(touch, before=before, after=after)
     height = float(path.at(np.array([touch.time]))[0, 2])
-    part = kinds.part_of(height)
-    kind = {"head": kinds.HEADER, "chest": kinds.CHESTED}.get(part, touch.kind)
-    position = np.array([*touch.position[:2], kinds.ground_height(height)])
+    part = kinds.choose_part(height)
+    kind = {"head": kinds.HEADER, "chest": kinds.CHEST_CONTROL}.get(part, touch.kind)
+    position = np.array([*touch.position[:2], kinds.limit_to_ground(height)])
     return replace(touch, before=before, after=after, position=position, part=part, kind=kind)
 
 
-def _three(values: np.ndarray) -> np.ndarray:
+def _pad_to_three(values: np.ndarray) -> np.ndarray:
     """Pad rows of two coordinates with a zero third."""
     return np.pad(values, ((0, 0), (0, 1))) if values.ndim == 2 and values.shape[1] == 2 else values
 
 
-def _between(samples: Samples, positions: np.ndarray, time: np.ndarray) -> np.ndarray:
+def _measure_mean_distance(samples: Samples, positions: np.ndarray, time: np.ndarray) -> np.ndarray:
     """Measure each player's mean distance (P, K) m from the ball since the previous touch."""
     ball = samples.positions[:, :2]
     away = np.linalg.norm(positions - ball, axis=2)
@@ -347,7 +347,7 @@ def _between(samples: Samples, positions: np.ndarray, time: np.ndarray) -> np.nd
     return (total[:, at] - total[:, before]) / np.maximum(count[:, at] - count[:, before], 1)
 
 
-def _player_velocity(samples: Samples, positions: np.ndarray, player: int, time: float) -> np.ndarray:
+def _estimate_player_velocity(samples: Samples, positions: np.ndarray, player: int, time: float) -> np.ndarray:
     """Estimate a player's velocity (3,) m/s around `time`; zero if the player is not known then."""
     if player < 0:
         return np.zeros(3)
@@ -359,16 +359,16 @@ def _player_velocity(samples: Samples, positions: np.ndarray, player: int, time:
     return np.array([*((p[1] - p[0]) / 0.4 for p in place), 0.0])
 
 
-def _sure(margin: float, away: np.ndarray, player: int) -> float:
+def _compute_confidence(margin: float, away: np.ndarray, player: int) -> float:
     """Compute the confidence, 0 to 1: that it was a touch, times that it was this player's."""
-    touch = 1.0 / (1.0 + np.exp(-margin / _DOUBT))
+    touch = 1.0 / (1.0 + np.exp(-margin / _CONFIDENCE_SCALE))
     if player < 0:
         return float(0.5 * touch)
-    worth = np.exp(-touches.reach_cost(away, None) - away / touches.STRAY)
-    return float(touch * worth[player] / max(worth.sum(), 1e-12))
+    likelihood = np.exp(-touches.compute_reach_cost(away, None) - away / touches.REACH_DEVIATION)
+    return float(touch * likelihood[player] / max(likelihood.sum(), 1e-12))
 
 
-def _by_whom(end: BallEnd, solved: list[SolvedTouch]) -> BallEnd:
+def _add_last_player(end: BallEnd, solved: list[SolvedTouch]) -> BallEnd:
     earlier = [touch.player for touch in solved if touch.time < end.time]
     return replace(end, player=earlier[-1] if earlier else "")
 
@@ -400,10 +400,10 @@ def solve_ball(source: Match | Track, progress: Callable[[float, str], None] | N
     if isinstance(source, Track):
         unknown = ~source.ball_height_known[:, None] & [False, False, True]
         ball = np.where(unknown, np.nan, source.ball)
-        return solve(source.times[part], ball[part], source.positions[None, part], [source.name], where=source.name,
+        return solve_samples(source.times[part], ball[part], source.positions[None, part], [source.name], where=source.name,
                      pitch=PITCH, progress=progress, cancelled=cancelled)
     playing = [index for index, player in enumerate(source.players) if player.team != REFEREE]
     players = [source.players[index] for index in playing]
-    return solve(source.times[part], source.ball[part], source.positions[playing][:, part],
+    return solve_samples(source.times[part], source.ball[part], source.positions[playing][:, part],
                  players=[player.id for player in players], teams=[player.team for player in players],
                  pitch=(source.length, source.width), where=source.provider, progress=progress, cancelled=cancelled)

@@ -12,27 +12,27 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .pieces import Fits, fit_between
+from .pieces import PieceFits, fit_between
 
 USUAL_CHANGE = 9.0  # m/s, mean change of velocity by a touch
-TOUCH, FREE = 4.0, 3.5  # nats for a cut of either kind, in addition to what is observed there
-_NEAR = 1.0  # nats for a free change just where a player is
+TOUCH_COST, FREE_COST = 4.0, 3.5  # nats for a cut of either kind, in addition to what is observed there
+_NEAR_COST = 1.0  # nats for a free change just where a player is
 _LONGEST = 6.0  # s, the longest piece
 _STEPS = 14  # most cuts one piece may leave out
-_JOINT = 0.12  # m, deviation between the ends of neighbouring pieces
-_JUMP = 8.0  # nats at most for such a gap: the feed lost the ball and found it elsewhere
-_SKIP = 0.16  # s around a cut in which samples may be wrong: bodies hide the ball, feeds attach it to a player
-_SKIPPED = 40.0  # nats per second of samples left out for this
-_SHORT, _SHORT_PRICE = 0.24, 6.0  # s, shorter pieces are unlikely; nats for a piece of no length
+_JOINT_DEVIATION = 0.12  # m, deviation between the ends of neighbouring pieces
+_MAX_JUMP_COST = 8.0  # nats at most for such a gap: the feed lost the ball and found it elsewhere
+_SKIP_SECONDS = 0.16  # s around a cut in which samples may be wrong: bodies hide the ball, feeds attach it to a player
+_SKIP_COST = 40.0  # nats per second of samples left out for this
+_SHORT_SECONDS, _SHORT_COST = 0.24, 6.0  # s, shorter pieces are unlikely; nats for a piece of no length
 
 REACH = 0.6  # m from a player's centre within which a touch has no cost
-STRAY = 0.45  # m, deviation beyond REACH by bodies and tracking
+REACH_DEVIATION = 0.45  # m, deviation beyond REACH by bodies and tracking
 HIGHEST = 2.4  # m of the ball's centre, up to which a header has no cost
-STRANGER = 9.0  # nats for a touch by no tracked player, in a match
-ALONE = 4.0  # the same if only one player is tracked
+UNTRACKED_COST = 9.0  # nats for a touch by no tracked player, in a match
+SINGLE_UNTRACKED_COST = 4.0  # the same if only one player is tracked
 _RISE = 0.3  # m, deviation of jumps and heights beyond HIGHEST
-_OTHER = 1.0  # nats for a touch by another player than the previous one
-_FOLLOWED = 1.0  # s, a player with two touches within this stays near the ball
+_PLAYER_CHANGE_COST = 1.0  # nats for a touch by another player than the previous one
+_FOLLOW_SECONDS = 1.0  # s, a player with two touches within this stays near the ball
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -57,7 +57,7 @@ class Cuts:
     place: np.ndarray
     before: np.ndarray
     after: np.ndarray
-    pieces: Fits
+    pieces: PieceFits
 
 
 def solve_cuts(times, points, weights, cuts, player_cost) -> Cuts:
@@ -81,13 +81,13 @@ def solve_cuts(times, points, weights, cuts, player_cost) -> Cuts:
     ending = np.argsort(upto, kind="stable")
     by_end = np.searchsorted(upto[ending], np.arange(len(cuts) + 1))
     # After a cut, a piece may start up to _SKIP_SECONDS later, so that samples hidden at the touch are left out.
-    reach = np.searchsorted(cuts, np.searchsorted(times, times[cuts[:-1]] + _SKIP), "left") - 1
+    reach = np.searchsorted(cuts, np.searchsorted(times, times[cuts[:-1]] + _SKIP_SECONDS), "left") - 1
     reach = np.clip(np.maximum(reach, np.arange(len(cuts) - 1)), 0, len(cuts) - 2)
     outof = [(by_begin[cut], by_begin[reach[cut] + 1]) for cut in range(len(cuts) - 1)]
-    left, right = _pairs(ending, by_end, outof)
-    knot = _knots(pieces, left, right, times=times, cuts=cuts, upto=upto, begin=begin, player_cost=player_cost)
-    price = np.minimum(knot.touch, knot.free)
-    own = pieces.cost + _short(pieces, times)
+    left, right = _build_pairs(ending, by_end, outof)
+    knot = _estimate_cuts(pieces, left, right, times=times, cuts=cuts, upto=upto, begin=begin, player_cost=player_cost)
+    cost = np.minimum(knot.touch_cost, knot.free_cost)
+    own = pieces.cost + _compute_short_cost(pieces, times)
     best = np.where(begin == 0, own, np.inf)
     back = np.full(len(pieces), -1)
     offset = 0
@@ -96,7 +96,7 @@ def solve_cuts(times, points, weights, cuts, player_cost) -> Cuts:
     for cut in range(1, len(cuts) - 1):
         into, (low, high) = ending[by_end[cut] : by_end[cut + 1]], outof[cut]
         count = len(into) * (high - low)
-        total = best[into][:, None] + price[offset : offset + count].reshape(len(into), high - low)
+        total = best[into][:, None] + cost[offset : offset + count].reshape(len(into), high - low)
         choice = total.argmin(axis=0)
         found = own[low:high] + total[choice, np.arange(high - low)]
         better = found < best[low:high]
@@ -104,20 +104,20 @@ def solve_cuts(times, points, weights, cuts, player_cost) -> Cuts:
         back[low:high] = np.where(better, into[choice], back[low:high])
         offset += count
     last = ending[by_end[len(cuts) - 1] :]
-    way = [int(last[best[last].argmin()])]
-    while back[way[-1]] >= 0:
-        way.append(int(back[way[-1]]))
-    way = np.array(way[::-1])
-    return _chosen(pieces.take(way), times, cuts, player_cost)
+    chain = [int(last[best[last].argmin()])]
+    while back[chain[-1]] >= 0:
+        chain.append(int(back[chain[-1]]))
+    chain = np.array(chain[::-1])
+    return _build_cuts(pieces.take(chain), times, cuts, player_cost)
 
 
-def _short(pieces: Fits, times: np.ndarray) -> np.ndarray:
+def _compute_short_cost(pieces: PieceFits, times: np.ndarray) -> np.ndarray:
     """Compute nats for pieces shorter than _SHORT_SECONDS."""
     ends = times[np.minimum(pieces.last + 1, len(times) - 1)]
-    return _SHORT_PRICE * np.maximum(0.0, 1.0 - (ends - pieces.begin) / _SHORT)
+    return _SHORT_COST * np.maximum(0.0, 1.0 - (ends - pieces.begin) / _SHORT_SECONDS)
 
 
-def _pairs(ending, by_end, outof) -> tuple[np.ndarray, np.ndarray]:
+def _build_pairs(ending, by_end, outof) -> tuple[np.ndarray, np.ndarray]:
     """Build the indices of all pieces that may follow each other, cut by cut, row by row."""
     left, right = [np.zeros(0, int)], [np.zeros(0, int)]
     for cut in range(1, len(outof)):
@@ -128,18 +128,18 @@ def _pairs(ending, by_end, outof) -> tuple[np.ndarray, np.ndarray]:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class _Knots:
+class _CutEstimates:
     """Estimates at K cuts: time, spread, place, velocity before and after, and nats of both kinds."""
     time: np.ndarray
     spread: np.ndarray
     place: np.ndarray
     before: np.ndarray
     after: np.ndarray
-    touch: np.ndarray
-    free: np.ndarray
+    touch_cost: np.ndarray
+    free_cost: np.ndarray
 
 
-def _knots(pieces: Fits, left, right, times, cuts, upto, begin, player_cost) -> _Knots:
+def _estimate_cuts(pieces: PieceFits, left, right, times, cuts, upto, begin, player_cost) -> _CutEstimates:
     """Estimate each cut from its neighbouring pieces, with the costs of both kinds."""
     cut, resumed = upto[left], begin[right]
     first, second = times[cuts[cut] - 1], times[np.minimum(cuts[resumed], len(times) - 1)]
@@ -156,26 +156,26 @@ def _knots(pieces: Fits, left, right, times, cuts, upto, begin, player_cost) -> 
     place_left, speed_left = pieces.spread(time, left)
     place_right, speed_right = pieces.spread(time, right)
     axes = before.shape[1]
-    miss = ((here - there) ** 2).sum(axis=1) / (_JOINT**2 + place_left + place_right)
+    miss = ((here - there) ** 2).sum(axis=1) / (_JOINT_DEVIATION**2 + place_left + place_right)
     speed_var = speed_left + speed_right
     change = after - before
     size = np.sqrt((change**2).sum(axis=1))
-    joint = -np.logaddexp(-0.5 * miss, -_JUMP)
-    joint = joint + _SKIPPED * (second - first - _usual(times)) * (resumed > cut)
+    joint = -np.logaddexp(-0.5 * miss, -_MAX_JUMP_COST)
+    joint = joint + _SKIP_COST * (second - first - _measure_interval(times)) * (resumed > cut)
     near = np.minimum(player_cost[cut], player_cost[resumed])
-    touch = TOUCH + joint + near + _log_touch(size, speed_var, axes)
-    free = FREE + _NEAR * np.exp(-near) + joint + _free_cost(before, change, here, speed_var)
+    touch = TOUCH_COST + joint + near + _compute_touch_cost(size, speed_var, axes)
+    free = FREE_COST + _NEAR_COST * np.exp(-near) + joint + _compute_free_cost(before, change, here, speed_var)
     place = (here * place_right[:, None] + there * place_left[:, None]) / (place_left + place_right)[:, None]
     spread = np.sqrt((place_left + place_right) / np.maximum(size**2, 0.25) + (0.1 * step) ** 2)
-    return _Knots(time=time, spread=np.minimum(spread, step), place=place, before=before, after=after, touch=touch,
-                  free=free)
+    return _CutEstimates(time=time, spread=np.minimum(spread, step), place=place, before=before, after=after, touch_cost=touch,
+                  free_cost=free)
 
 
-def _usual(times: np.ndarray) -> float:
+def _measure_interval(times: np.ndarray) -> float:
     return float(np.median(np.diff(times)))
 
 
-def _log_touch(size, variance, axes) -> np.ndarray:
+def _compute_touch_cost(size, variance, axes) -> np.ndarray:
     """Compute the cost of a velocity change by a touch: its size falls off exponentially, its direction is
     arbitrary.
     """
@@ -183,45 +183,45 @@ def _log_touch(size, variance, axes) -> np.ndarray:
     return size / USUAL_CHANGE + np.log(USUAL_CHANGE * 2.0 * np.pi * np.maximum(size, 0.3))
 
 
-def _free_cost(before, change, place, variance) -> np.ndarray:
+def _compute_free_cost(before, change, place, variance) -> np.ndarray:
     """Compute the cost of a velocity change without a touch: slightly slower along the direction, hardly any
     sideways, and upward only at the ground.
     """
     flat = before[:, :2]
     speed = np.linalg.norm(flat, axis=1)
-    way = flat / np.maximum(speed, 1e-6)[:, None]
-    along = (change[:, :2] * way).sum(axis=1)
-    across = change[:, 0] * way[:, 1] - change[:, 1] * way[:, 0]
+    direction = flat / np.maximum(speed, 1e-6)[:, None]
+    along = (change[:, :2] * direction).sum(axis=1)
+    across = change[:, 0] * direction[:, 1] - change[:, 1] * direction[:, 0]
     slower = np.where(along < 0.0, 0.5 + 0.12 * speed, 0.5) ** 2 + variance
     aside = (0.4 + 0.02 * speed) ** 2 + variance
-    cost = 0.5 * (_heavy(along**2 / slower) + _heavy(across**2 / aside) + np.log(4.0 * np.pi**2 * slower * aside))
+    cost = 0.5 * (_soften_squares(along**2 / slower) + _soften_squares(across**2 / aside) + np.log(4.0 * np.pi**2 * slower * aside))
     if change.shape[1] == 3:
         upward = change[:, 2]
         bounces = (place[:, 2] < 0.5) & (before[:, 2] < 0.0) & (upward > 0.0)
         room = np.where(bounces, 2.0 + np.abs(before[:, 2]), 1.0) ** 2 + variance
-        cost = cost + 0.5 * _heavy(upward**2 / room)
+        cost = cost + 0.5 * _soften_squares(upward**2 / room)
     return cost
 
 
-def _heavy(squares: np.ndarray) -> np.ndarray:
+def _soften_squares(squares: np.ndarray) -> np.ndarray:
     """Soften squares (in deviations) beyond three deviations: errors of feeds have heavier tails than a normal
     distribution.
     """
     return np.where(squares < 9.0, squares, 6.0 * np.sqrt(np.maximum(squares, 9.0)) - 9.0)
 
 
-def _chosen(pieces: Fits, times, cuts, player_cost) -> Cuts:
+def _build_cuts(pieces: PieceFits, times, cuts, player_cost) -> Cuts:
     """Build the cuts between the chosen pieces."""
     upto = np.searchsorted(cuts, pieces.last + 1)
     left = np.arange(len(pieces) - 1)
-    knots = _knots(pieces, left, left + 1, times=times, cuts=cuts, upto=upto, begin=np.searchsorted(cuts, pieces.first),
+    knots = _estimate_cuts(pieces, left, left + 1, times=times, cuts=cuts, upto=upto, begin=np.searchsorted(cuts, pieces.first),
                    player_cost=player_cost)
-    return Cuts(time=knots.time, spread=knots.spread, touch=knots.touch < knots.free,
-                margin=np.abs(knots.touch - knots.free), place=knots.place, before=knots.before, after=knots.after,
+    return Cuts(time=knots.time, spread=knots.spread, touch=knots.touch_cost < knots.free_cost,
+                margin=np.abs(knots.touch_cost - knots.free_cost), place=knots.place, before=knots.before, after=knots.after,
                 pieces=pieces)
 
 
-def player_distances(times: np.ndarray, ball: np.ndarray, positions: np.ndarray, at: np.ndarray) -> np.ndarray:
+def measure_player_distances(times: np.ndarray, ball: np.ndarray, positions: np.ndarray, at: np.ndarray) -> np.ndarray:
     """Measure the horizontal distance from each player to the ball.
 
     Args:
@@ -237,12 +237,12 @@ def player_distances(times: np.ndarray, ball: np.ndarray, positions: np.ndarray,
     share = np.clip((at - times[after - 1]) / (times[after] - times[after - 1]), 0.0, 1.0)[:, None]
     for player, path in enumerate(positions):
         place = path[after - 1] * (1.0 - share) + path[after] * share
-        away = np.linalg.norm(place - ball, axis=1)
-        out[player] = np.where(np.isfinite(away), away, np.inf)
+        distance = np.linalg.norm(place - ball, axis=1)
+        out[player] = np.where(np.isfinite(distance), distance, np.inf)
     return out
 
 
-def reach_cost(away: np.ndarray, height: np.ndarray | None, stranger: float = STRANGER) -> np.ndarray:
+def compute_reach_cost(distance: np.ndarray, height: np.ndarray | None, untracked_cost: float = UNTRACKED_COST) -> np.ndarray:
     """Compute the nats for a player touching the ball at a horizontal distance.
 
     Args:
@@ -252,13 +252,13 @@ def reach_cost(away: np.ndarray, height: np.ndarray | None, stranger: float = ST
     Returns:
         Nats, same shape as `distance`.
     """
-    cost = 0.5 * (np.maximum(away - REACH, 0.0) / STRAY) ** 2
+    cost = 0.5 * (np.maximum(distance - REACH, 0.0) / REACH_DEVIATION) ** 2
     if height is not None:
         cost = cost + 0.5 * (np.maximum(height - HIGHEST, 0.0) / _RISE) ** 2
-    return np.minimum(cost, stranger)
+    return np.minimum(cost, untracked_cost)
 
 
-def choose_players(away: np.ndarray, times: np.ndarray, between: np.ndarray, stranger: float = STRANGER) -> np.ndarray:
+def choose_players(distances: np.ndarray, times: np.ndarray, between: np.ndarray, untracked_cost: float = UNTRACKED_COST) -> np.ndarray:
     """Choose the player of every touch: the chain with the lowest cost, by dynamic programming over the touches.
 
     Args:
@@ -269,24 +269,24 @@ def choose_players(away: np.ndarray, times: np.ndarray, between: np.ndarray, str
     Returns:
         (K,) player indices, -1 for none.
     """
-    players, count = away.shape
+    players, count = distances.shape
     if not count:
         return np.zeros(0, int)
-    own = np.full((players + 1, count), stranger)
-    own[:players] = 0.5 * (np.maximum(away - REACH, 0.0) / STRAY) ** 2 + away / STRAY
+    own = np.full((players + 1, count), untracked_cost)
+    own[:players] = 0.5 * (np.maximum(distances - REACH, 0.0) / REACH_DEVIATION) ** 2 + distances / REACH_DEVIATION
     back = np.zeros((players + 1, count), int)
     best = own[:, 0]
     # best[p]: lowest cost of a chain whose last touch is by p (row P: no tracked player).
     # Either the same player touches again, or the best other one plus _PLAYER_CHANGE_COST.
     for touch in range(1, count):
-        stays = best.copy()
-        if times[touch] - times[touch - 1] < _FOLLOWED:
-            stays[:players] += 0.5 * np.maximum(between[:, touch] - 2.0 * REACH, 0.0) ** 2
-        other = best.min() + _OTHER
-        back[:, touch] = np.where(stays <= other, np.arange(players + 1), best.argmin())
-        best = np.minimum(stays, other) + own[:, touch]
-    who = np.zeros(count, int)
-    who[-1] = best.argmin()
+        same = best.copy()
+        if times[touch] - times[touch - 1] < _FOLLOW_SECONDS:
+            same[:players] += 0.5 * np.maximum(between[:, touch] - 2.0 * REACH, 0.0) ** 2
+        other = best.min() + _PLAYER_CHANGE_COST
+        back[:, touch] = np.where(same <= other, np.arange(players + 1), best.argmin())
+        best = np.minimum(same, other) + own[:, touch]
+    chosen = np.zeros(count, int)
+    chosen[-1] = best.argmin()
     for touch in range(count - 1, 0, -1):
-        who[touch - 1] = back[who[touch], touch]
-    return np.where(who == players, -1, who)
+        chosen[touch - 1] = back[chosen[touch], touch]
+    return np.where(chosen == players, -1, chosen)

@@ -25,7 +25,7 @@ TABLES: dict[str, tuple[Setting, ...]] = {
 """Group -> its settings. A group is the set of settings that one verb or one property class uses together."""
 
 
-def rows_of(group: str) -> tuple[Setting, ...]:
+def list_settings(group: str) -> tuple[Setting, ...]:
     """List the settings of a group.
 
     Args:
@@ -36,7 +36,7 @@ def rows_of(group: str) -> tuple[Setting, ...]:
     return TABLES[group]
 
 
-def setting(group: str, name: str) -> Setting:
+def find_setting(group: str, name: str) -> Setting:
     """Find one setting.
 
     Args:
@@ -48,7 +48,7 @@ def setting(group: str, name: str) -> Setting:
     return next(row for row in TABLES[group] if row.name == name)
 
 
-def defaults(*groups: str) -> dict[str, Any]:
+def collect_defaults(*groups: str) -> dict[str, Any]:
     """Collect the defaults of groups of settings.
 
     Args:

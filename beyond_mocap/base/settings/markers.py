@@ -9,8 +9,8 @@ FILTERS = (
     ("butterworth", "Butterworth", "Zero-phase low-pass filter of fourth order"),
     ("kalman", "Kalman", "Smoothing with a motion model, forwards and backwards"), ("none", "None", "No filter"),
 )
-_THROWN = ("baseball", "tennis", "handball", "volleyball", "football")
-THROWN = tuple((name, name.capitalize(), f"A {name}") for name in _THROWN)
+_BALLS = ("baseball", "tennis", "handball", "volleyball", "football")
+BALL_CHOICES = tuple((name, name.capitalize(), f"A {name}") for name in _BALLS)
 HANDS = (
     ("AUTO", "Detect", "The hand that throws"), ("left", "Left", "The left hand"), ("right", "Right", "The right hand"),
 )
@@ -48,7 +48,7 @@ TABLES = {
         Setting(name="radius", kind=float, least=0.005, most=0.5, unit="metres", option="--ball-radius",
             help="of a ball with a marker", tooltip="Radius of the ball; 0 fits it to a marker on the ball, or "
             "uses that of the ball's kind", precision=4, panel_more=dict(default=0.0, min=0.0)),
-        Setting(name="ball", default="baseball", choices=THROWN, option="--ball-kind"),
+        Setting(name="ball", default="baseball", choices=BALL_CHOICES, option="--ball-kind"),
         Setting(name="hold_ball", default=False, option="--hold-ball", help="use the ball's marker for the pose until "
             "the release"),
         Setting(name="release", default="auto", choices=("auto", "yes", "no"), option="--release",
@@ -71,7 +71,7 @@ TABLES = {
         Setting(name="hand", kind=str, choices=HANDS, option="--hand", help="that throws; default: detected",
             tooltip="The hand that throws", option_more=dict(choices=("left", "right")),
             panel_more=dict(default="AUTO")),
-        Setting(name="ball", default="baseball", choices=THROWN, option="--ball-kind", identifier="thrown",
+        Setting(name="ball", default="baseball", choices=BALL_CHOICES, option="--ball-kind", identifier="thrown",
             tooltip="Kind of ball that is thrown"),
         Setting(name="ball_csv", kind=Path, option="--ball-csv", metavar="B.csv", help="write the ball's trajectory "
             "over the whole trial"),

@@ -7,8 +7,8 @@ import contextlib
 from functools import partial
 from typing import Any
 
-from . import rows_of
-from .setting import Setting, collect
+from . import list_settings
+from .setting import Setting, collect_values
 
 
 def add_options(parser, group: str, *names: str) -> None:
@@ -19,9 +19,9 @@ def add_options(parser, group: str, *names: str) -> None:
         group: key of the settings table.
         names: add only these settings; none adds all.
     """
-    for row in rows_of(group):
+    for row in list_settings(group):
         if row.option and (not names or row.name in names):
-            parser.add_argument(*row.option.split(), **_arguments(row))
+            parser.add_argument(*row.option.split(), **_build_arguments(row))
 
 
 def option_values(record: type, options: argparse.Namespace, *groups: str) -> dict[str, Any]:
@@ -34,11 +34,11 @@ def option_values(record: type, options: argparse.Namespace, *groups: str) -> di
     Returns:
         Field name -> value; fields that are not set are left out.
     """
-    rows = [row for group in groups for row in rows_of(group) if row.option]
-    return collect(record, rows, lambda row: getattr(options, row.name))
+    rows = [row for group in groups for row in list_settings(group) if row.option]
+    return collect_values(record, rows, lambda row: getattr(options, row.name))
 
 
-def _arguments(row: Setting) -> dict:
+def _build_arguments(row: Setting) -> dict:
     """Build the arguments of `add_argument` for a setting."""
     more = {name: value for name, value in row.option_more.items() if name not in ("least", "most")}
     out = {"dest": row.name, "help": row.help, "default": [] if row.kind is tuple else row.default}
@@ -47,18 +47,18 @@ def _arguments(row: Setting) -> dict:
     if row.choices:
         out["choices"] = row.choice_names
     elif row.kind not in (str, tuple):
-        out["type"] = _reader(row)
+        out["type"] = _build_value_parser(row)
     unit = row.unit.upper() if row.unit and " " not in row.unit else None
     return {**out, "metavar": row.metavar or unit, **more}
 
 
-def _reader(row: Setting):
+def _build_value_parser(row: Setting):
     """Build the function that parses an option's text into the setting's value."""
     least, most = (row.option_more.get(name, getattr(row, name)) for name in ("least", "most"))
-    return row.kind if least is None else partial(read_number, row=row, least=least, most=most)
+    return row.kind if least is None else partial(parse_number, row=row, least=least, most=most)
 
 
-def read_number(text: str, row: Setting, least: float, most: float) -> float:
+def parse_number(text: str, row: Setting, least: float, most: float) -> float:
     """Parse a number of an option and check its limits.
 
     Args:
@@ -74,4 +74,4 @@ def read_number(text: str, row: Setting, least: float, most: float) -> float:
         value = row.kind(text)
         if least <= value <= most:
             return value
-    raise argparse.ArgumentTypeError(f"{text!r} is not {row.limits_text(least, most)}")
+    raise argparse.ArgumentTypeError(f"{text!r} is not {row.describe_limits(least, most)}")

@@ -95,7 +95,7 @@ class Setting:
         """The identifiers of the choices."""
         return tuple(choice if isinstance(choice, str) else choice[0] for choice in self.choices)
 
-    def limits_text(self, least: float, most: float) -> str:
+    def describe_limits(self, least: float, most: float) -> str:
         """Describe the expected range of a number.
 
         Args:
@@ -106,7 +106,7 @@ class Setting:
         least, most = (str(limit) if isinstance(limit, int) else f"{limit:g}" for limit in (least, most))
         return self.expected.format(least=least, most=most, unit=self.unit).strip()
 
-    def value(self, said):
+    def convert_value(self, user_value):
         """Convert a user's value to the value that code reads.
 
         Args:
@@ -114,14 +114,14 @@ class Setting:
         Returns:
             The value; None where the user's value stands for "not set".
         """
-        if self.kind is tuple and isinstance(said, str):
-            said = [text.strip() for text in said.split(";") if text.strip()]
-        if self.default is None and said == self.panel_more.get("default"):
+        if self.kind is tuple and isinstance(user_value, str):
+            user_value = [text.strip() for text in user_value.split(";") if text.strip()]
+        if self.default is None and user_value == self.panel_more.get("default"):
             return None
-        if self.blank is not None and said == self.blank:
+        if self.blank is not None and user_value == self.blank:
             return ""
-        found = tuple(said) if self.kind is tuple else said
-        return self.convert(found) if self.convert else found
+        value = tuple(user_value) if self.kind is tuple else user_value
+        return self.convert(value) if self.convert else value
 
 
 def add_fields(rows: Iterable[Setting]) -> Callable[[type], type]:
@@ -165,7 +165,7 @@ def check_limits(record: Any, rows: Iterable[Setting]) -> None:
                 raise InputError(row.name, f"{value:g}", f"{row.least:g} to {row.most:g}")
 
 
-def collect(record: type, rows: Iterable[Setting], said: Callable[[Setting], object]) -> dict[str, Any]:
+def collect_values(record: type, rows: Iterable[Setting], read_value: Callable[[Setting], object]) -> dict[str, Any]:
     """Collect the values of the settings that are fields of a dataclass.
 
     Args:
@@ -176,5 +176,5 @@ def collect(record: type, rows: Iterable[Setting], said: Callable[[Setting], obj
         Field name -> value; settings that are not set are left out.
     """
     names = {one.name for one in fields(record)}
-    found = {row.name: row.value(said(row)) for row in rows if row.name in names}
-    return {name: value for name, value in found.items() if value is not None}
+    values = {row.name: row.convert_value(read_value(row)) for row in rows if row.name in names}
+    return {name: value for name, value in values.items() if value is not None}

@@ -21,7 +21,7 @@ FORMS = (
 )
 
 
-def gait_choices(texts: Iterable[str]) -> tuple[tuple[str, str], ...]:
+def parse_gait_clips(texts: Iterable[str]) -> tuple[tuple[str, str], ...]:
     """Parse texts of the form "WORD=CLIP" to (gait label, clip) pairs; blanks around either are removed.
 
     Raises:
@@ -29,12 +29,12 @@ def gait_choices(texts: Iterable[str]) -> tuple[tuple[str, str], ...]:
     """
     pairs = []
     for text in texts:
-        word, _, clip = (part.strip() for part in text.partition("="))
-        if not word or not clip:
+        label, _, clip = (part.strip() for part in text.partition("="))
+        if not label or not clip:
             raise InputError("gait clips", f"{text!r}", "WORD=CLIP, such as walking=folder/walk.bvh")
-        if word.lower() in dict(pairs):
-            raise InputError("gait clips", f"{word!r} twice", "one clip for each gait")
-        pairs.append((word.lower(), clip.replace("\\", "/")))
+        if label.lower() in dict(pairs):
+            raise InputError("gait clips", f"{label!r} twice", "one clip for each gait")
+        pairs.append((label.lower(), clip.replace("\\", "/")))
     return tuple(pairs)
 
 
@@ -86,7 +86,7 @@ TABLES = {
         Setting(name="gaits", default=(), option="--gait", metavar="WORD=CLIP", help="the clip that represents a gait, "
             "such as walking=folder/walk.bvh; once for each gait", title="Gait Clips", tuning="any",
             tooltip="Clips that represent the gaits, such as walking=folder/walk.bvh; jogging=folder/jog.bvh",
-            convert=gait_choices, option_more=dict(action="append")),
+            convert=parse_gait_clips, option_more=dict(action="append")),
         Setting(name="mirror", default=True, option="--no-mirror", help="do not use mirrored clips",
             title="Mirrored Clips", tooltip="Use each clip also with left and right exchanged", in_preset=True),
         Setting(name="made", default=True, option="--no-made", help="no synthetic or blended clips where recordings "

@@ -20,21 +20,21 @@ import numpy as np
 from ...base.errors import InputError
 from ...base.vectors import unit_vectors
 from ...motion import quaternion
-from ...motion.humanoid import Humanoid, heading, identify, leg_length
-from ...motion.motion import Motion, pose_kinematics
-from ...motion.retargeting.structure import below
+from ...motion.humanoid import Humanoid, compute_heading, identify_joints, measure_leg_length
+from ...motion.motion import Motion, compute_pose
+from ...motion.retargeting.structure import list_descendants
 from ...motion.skeleton import Skeleton
-from ..whole import beside
+from ..whole import atomic_path
 from . import bvh_text
 from .bvh_text import POSITIONS, ROTATIONS, BvhText
-from .bvh_write import BvhForm, RootAbove, document
+from .bvh_write import BvhForm, JointAboveHips, format_bvh
 
 _STILL_METRES = 1e-3  # smaller motion counts as none
 _STILL_ROTATION = np.cos(np.radians(0.1) / 2)  # w of a rotation by a tenth of a degree
 _LARGEST_METRES = 1e6  # larger positions are in a wrong unit or damaged
 _NTSC = [rate * 1000 / 1001 for rate in (24, 30, 48, 60, 120, 240)]  # frames per second
 # file axis -> core axis and sign of a rotation about it; Y up becomes Z up by a quarter turn about X
-TURNS = {"Y": {"X": (0, 1.0), "Y": (2, 1.0), "Z": (1, -1.0)}, "Z": {"X": (0, 1.0), "Y": (1, 1.0), "Z": (2, 1.0)}}
+AXES = {"Y": {"X": (0, 1.0), "Y": (2, 1.0), "Z": (1, -1.0)}, "Z": {"X": (0, 1.0), "Y": (1, 1.0), "Z": (2, 1.0)}}
 _HIP_HEIGHT = (0.75, 1.15)  # metres, adults standing
 _LEG_LENGTH = 0.88  # m, of an adult of 1.80 m
 # centimetres, metres, inches, CMU's (1 inch / 0.45 in hundredths of it), millimetres, feet, decimetres
@@ -58,7 +58,7 @@ class BvhClip:
     notes: tuple[str, ...]
 
 
-def read(path, unit: float | None = None) -> BvhClip:
+def read_bvh(path, unit: float | None = None) -> BvhClip:
     """Read the clip of a BVH file.
 
     Position channels of any joint replace its OFFSET, as Bandai-Namco's and LAFAN1's files mean them; below the hips
@@ -77,22 +77,22 @@ def read(path, unit: float | None = None) -> BvhClip:
     """
     if unit is not None and not (np.isfinite(unit) and unit > 0):
         raise InputError("unit", str(unit), "metres per file unit, above 0", "0.01 for centimetres")
-    text = bvh_text.parse(path)
-    scale = guess_scale(text, unit)
+    text = bvh_text.read_bvh_text(path)
+    scale = estimate_scale(text, unit)
     channels = _Channels(text, scale)
-    hips = _top_of_body(text, scale.body)
-    kept = below(text.parents, hips)
-    root, root_rotations, above = _folded(channels, hips)
-    skeleton, drift = _skeleton(channels, kept)
-    rotations = np.stack([root_rotations.T] + [channels.rotation(joint) for joint in kept[1:]])
+    hips = _find_root(text, scale.body)
+    body_joints = list_descendants(text.parents, hips)
+    root, root_rotations, above = _fold_root(channels, hips)
+    skeleton, drift = _build_skeleton(channels, body_joints)
+    rotations = np.stack([root_rotations.T] + [channels.compute_rotation(joint) for joint in body_joints[1:]])
     _check_size(text, root, skeleton)
-    motion = Motion(skeleton, root, rotations.transpose(2, 0, 1), _rate(text.frame_time))
-    orders = {text.names[joint]: text.channels[joint] for joint in kept}
-    form = BvhForm(orders, _headings(channels, above, motion), scale.unit, scale.up)
-    return BvhClip(motion, form, (*scale.notes, *_notes(text, kept, above, drift)))
+    motion = Motion(skeleton, root, rotations.transpose(2, 0, 1), _round_rate(text.frame_time))
+    orders = {text.names[joint]: text.channels[joint] for joint in body_joints}
+    form = BvhForm(orders, _measure_headings(channels, above, motion), scale.unit, scale.up)
+    return BvhClip(motion, form, (*scale.notes, *_list_notes(text, body_joints, above, drift)))
 
 
-def write(path, motion: Motion, form: BvhForm | None = None) -> tuple[str, ...]:
+def write_bvh(path, motion: Motion, form: BvhForm | None = None) -> tuple[str, ...]:
     """Write a motion as BVH in centimetres with Y up.
 
     A joint that needs a channel missing in its form gets all channels of that kind. A root above the hips that did not
@@ -113,8 +113,8 @@ def write(path, motion: Motion, form: BvhForm | None = None) -> tuple[str, ...]:
     target = Path(path)
     if not target.name:
         raise InputError(path, "has no file name", "a BVH file to write")
-    pieces, notes = document(motion, form or BvhForm())
-    with beside(target) as part, open(part, "w", encoding="utf-8", newline="\n") as file:
+    pieces, notes = format_bvh(motion, form or BvhForm())
+    with atomic_path(target) as temporary, open(temporary, "w", encoding="utf-8", newline="\n") as file:
         file.writelines(pieces)
     return notes
 
@@ -132,13 +132,13 @@ class BvhRows:
 
     def __init__(self, text: BvhText, unit: float | None = None):
         self.text = text
-        self.scale = guess_scale(text, unit)
+        self.scale = estimate_scale(text, unit)
         channels = _Channels(text, self.scale)
-        self.hips = _top_of_body(text, self.scale.body)
-        self.kept = below(text.parents, self.hips)
-        self.skeleton = _skeleton(channels, self.kept)[0]
+        self.hips = _find_root(text, self.scale.body)
+        self.body_joints = list_descendants(text.parents, self.hips)
+        self.skeleton = _build_skeleton(channels, self.body_joints)[0]
 
-    def poses(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def compute_poses(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Convert rows to poses.
 
         Args:
@@ -147,83 +147,83 @@ class BvhRows:
             Root positions (T, 3) m and local rotations (T, J, 4).
         """
         channels = _Channels(replace(self.text, values=np.asarray(values, dtype=float)), self.scale)
-        root, rotation, _ = _folded(channels, self.hips)
-        rotations = np.stack([rotation.T] + [channels.rotation(joint) for joint in self.kept[1:]])
+        root, rotation, _ = _fold_root(channels, self.hips)
+        rotations = np.stack([rotation.T] + [channels.compute_rotation(joint) for joint in self.body_joints[1:]])
         return root, rotations.transpose(2, 0, 1)
 
 
 class _Channels:
     """A file's numbers joint by joint, in core axes and metres."""
 
-    def __init__(self, text: BvhText, scale: Scale):
+    def __init__(self, text: BvhText, scale: FileScale):
         self.text, self.scale = text, scale
         self.first = np.concatenate([[0], np.cumsum([len(c) for c in text.channels])])
 
-    def columns(self, joint: int, kind: tuple[str, ...]) -> list[tuple[str, int]]:
+    def find_columns(self, joint: int, kind: tuple[str, ...]) -> list[tuple[str, int]]:
         """Find axis letters and columns of a joint's channels of one kind, in their order."""
         return [(c[0], self.first[joint] + i) for i, c in enumerate(self.text.channels[joint]) if c in kind]
 
-    def position(self, joint: int) -> np.ndarray:
+    def compute_position(self, joint: int) -> np.ndarray:
         """Compute the joint's position relative to its parent: (T, 3) m with position channels, else (1, 3)."""
-        here = self.text.offsets[joint][None]
-        columns = self.columns(joint, POSITIONS)
+        positions = self.text.offsets[joint][None]
+        columns = self.find_columns(joint, POSITIONS)
         if columns:
-            here = np.repeat(here, len(self.text.values), axis=0)
+            positions = np.repeat(positions, len(self.text.values), axis=0)
             for letter, column in columns:
-                here[:, "XYZ".index(letter)] = self.text.values[:, column]
-        return to_ours(here, self.scale.up) * self.scale.unit
+                positions[:, "XYZ".index(letter)] = self.text.values[:, column]
+        return from_file_axes(positions, self.scale.up) * self.scale.unit
 
-    def rotation(self, joint: int) -> np.ndarray:
+    def compute_rotation(self, joint: int) -> np.ndarray:
         """Compute the joint's rotation relative to its parent, components first: (4, T)."""
-        return rotation_of(self.text.values, self.columns(joint, ROTATIONS), self.scale.up)
+        return compute_rotations(self.text.values, self.find_columns(joint, ROTATIONS), self.scale.up)
 
 
-def _top_of_body(text: BvhText, body: Humanoid | None) -> int:
+def _find_root(text: BvhText, body: Humanoid | None) -> int:
     """Find the joint that becomes the root: the hips if both legs are below them, else the file's root."""
     if body is None:
         return 0
-    hanging = set(below(text.parents, body.hips))
+    hanging = set(list_descendants(text.parents, body.hips))
     return body.hips if {body.left.upper_leg, body.right.upper_leg} <= hanging else 0
 
 
-def _folded(channels: _Channels, hips: int) -> tuple[np.ndarray, np.ndarray, tuple[RootAbove, ...]]:
+def _fold_root(channels: _Channels, hips: int) -> tuple[np.ndarray, np.ndarray, tuple[JointAboveHips, ...]]:
     """Compute the hips in the world frame, (T, 3) m and (T, 4), and list the joints above them."""
     frames, parents = len(channels.text.values), channels.text.parents
-    position = np.broadcast_to(channels.position(hips), (frames, 3))
-    rotation = channels.rotation(hips).T
-    fixed = None if channels.columns(hips, POSITIONS) else position[0]
+    position = np.broadcast_to(channels.compute_position(hips), (frames, 3))
+    rotation = channels.compute_rotation(hips).T
+    fixed = None if channels.find_columns(hips, POSITIONS) else position[0]
     above, joint = [], parents[hips]
     # Walk up to the file's root and accumulate the transforms.
     while joint >= 0:
-        place, turn = channels.position(joint), channels.rotation(joint).T
-        position, rotation = quaternion.rotate(turn, position) + place, quaternion.multiply(turn, rotation)
-        moves = _strays(place) > _STILL_METRES or np.abs(turn @ turn[0]).min() < _STILL_ROTATION
+        place, local_rotation = channels.compute_position(joint), channels.compute_rotation(joint).T
+        position, rotation = quaternion.rotate(local_rotation, position) + place, quaternion.multiply(local_rotation, rotation)
+        moves = _measure_spread(place) > _STILL_METRES or np.abs(local_rotation @ local_rotation[0]).min() < _STILL_ROTATION
         carries = fixed if joint == parents[hips] else None
-        name, its = channels.text.names[joint], channels.text.channels[joint]
-        above.insert(0, RootAbove(name=name, channels=its, moves=bool(moves), position=place[0], rotation=turn[0],
-                                  carries=carries))
+        name, channel_names = channels.text.names[joint], channels.text.channels[joint]
+        above.insert(0, JointAboveHips(name=name, channels=channel_names, is_moving=bool(moves), position=place[0], rotation=local_rotation[0],
+                                  hip_offset=carries))
         joint = parents[joint]
     return position, rotation, tuple(above)
 
 
-def _strays(positions: np.ndarray) -> float:
+def _measure_spread(positions: np.ndarray) -> float:
     """Measure the largest distance in metres of (T, 3) positions from their mean."""
     return float(np.linalg.norm(positions - positions.mean(axis=0), axis=1).max())
 
 
-def _skeleton(channels: _Channels, kept: list[int]) -> tuple[Skeleton, dict[str, float]]:
+def _build_skeleton(channels: _Channels, body_joints: list[int]) -> tuple[Skeleton, dict[str, float]]:
     """Build the skeleton with mean offsets; also return the distance (m) by which joints leave them, above 1 mm."""
     text, offsets, drift = channels.text, [np.zeros(3)], {}
-    for joint in kept[1:]:
-        places = channels.position(joint)
+    for joint in body_joints[1:]:
+        places = channels.compute_position(joint)
         offsets.append(places.mean(axis=0))
-        if _strays(places) > _STILL_METRES:
-            drift[text.names[joint]] = _strays(places)
-    new = {old: i for i, old in enumerate(kept)}
-    parents = [-1] + [new[text.parents[joint]] for joint in kept[1:]]
-    ends = [(new[p], offset) for p, offset in zip(text.end_parents, text.end_offsets) if p in new]
-    end_offsets = to_ours(np.array([offset for _, offset in ends]).reshape(-1, 3), channels.scale.up)
-    names = tuple(text.names[joint] for joint in kept)
+        if _measure_spread(places) > _STILL_METRES:
+            drift[text.names[joint]] = _measure_spread(places)
+    new_index = {old: i for i, old in enumerate(body_joints)}
+    parents = [-1] + [new_index[text.parents[joint]] for joint in body_joints[1:]]
+    ends = [(new_index[p], offset) for p, offset in zip(text.end_parents, text.end_offsets) if p in new_index]
+    end_offsets = from_file_axes(np.array([offset for _, offset in ends]).reshape(-1, 3), channels.scale.up)
+    names = tuple(text.names[joint] for joint in body_joints)
     end_parents = tuple(parent for parent, _ in ends)
     return Skeleton(names, tuple(parents), np.array(offsets), end_parents, end_offsets * channels.scale.unit), drift
 
@@ -236,35 +236,35 @@ def _check_size(text: BvhText, root: np.ndarray, skeleton: Skeleton) -> None:
         raise InputError(where, "a position beyond 1000 km", "a person's motion", "set the unit, or export again")
 
 
-def _headings(channels: _Channels, above: tuple[RootAbove, ...], motion: Motion) -> tuple[RootAbove, ...]:
+def _measure_headings(channels: _Channels, above: tuple[JointAboveHips, ...], motion: Motion) -> tuple[JointAboveHips, ...]:
     """Add the mean angle from the body's heading to each moving joint above the hips."""
-    if not any(joint.moves for joint in above):
+    if not any(joint.is_moving for joint in above):
         return above
     frames = np.unique(np.linspace(0, len(motion) - 1, 256).astype(int))
-    some = Motion(motion.skeleton, motion.root_positions[frames], motion.rotations[frames], motion.fps)
-    facing, turn, out = heading(some), quaternion.identity(len(frames)), []
+    sampled = Motion(motion.skeleton, motion.root_positions[frames], motion.rotations[frames], motion.fps)
+    body_heading, rotation, out = compute_heading(sampled), quaternion.identity(len(frames)), []
     for joint in above:
-        local = channels.rotation(channels.text.names.index(joint.name))[:, frames].T
-        turn = quaternion.multiply(turn, local)
-        mean = np.angle(np.mean(np.exp(1j * (quaternion.yaw(turn) - facing))))
+        local = channels.compute_rotation(channels.text.names.index(joint.name))[:, frames].T
+        rotation = quaternion.multiply(rotation, local)
+        mean = np.angle(np.mean(np.exp(1j * (quaternion.to_yaw(rotation) - body_heading))))
         out.append(replace(joint, heading=float(mean)))
     return tuple(out)
 
 
-def _rate(frame_time: float) -> float:
+def _round_rate(frame_time: float) -> float:
     """Compute frames per second, rounded to a whole number or an NTSC rate within 0.1 %."""
     rate = 1.0 / frame_time
     nearest = min([max(round(rate), 1), *_NTSC], key=lambda r: abs(r - rate))
     return float(nearest) if abs(nearest - rate) <= 1e-3 * nearest else rate
 
 
-def _notes(text: BvhText, kept: list[int], above: tuple[RootAbove, ...], drift: dict[str, float]) -> list[str]:
+def _list_notes(text: BvhText, body_joints: list[int], above: tuple[JointAboveHips, ...], drift: dict[str, float]) -> list[str]:
     """List what reading changed, one line per kind."""
     notes = [f"joint {old!r} is repeated, the second is renamed {new!r}" for old, new in text.renamed]
     for joint in above:
-        how = "moving" if joint.moves else "static"
-        notes.append(f"{joint.name} ({how}) folded into {text.names[kept[0]]}")
-    left_out = sorted(set(text.names) - {text.names[j] for j in kept} - {joint.name for joint in above})
+        state = "moving" if joint.is_moving else "static"
+        notes.append(f"{joint.name} ({state}) folded into {text.names[body_joints[0]]}")
+    left_out = sorted(set(text.names) - {text.names[j] for j in body_joints} - {joint.name for joint in above})
     if left_out:
         notes.append(f"ignored, not part of the body: {', '.join(left_out)}")
     if drift:
@@ -275,7 +275,7 @@ def _notes(text: BvhText, kept: list[int], above: tuple[RootAbove, ...], drift: 
 
 
 @dataclass(frozen=True)
-class Scale:
+class FileScale:
     """Unit and axes of a file.
 
     Attributes:
@@ -291,7 +291,7 @@ class Scale:
     notes: tuple[str, ...]
 
 
-def to_ours(vectors: np.ndarray, up: str) -> np.ndarray:
+def from_file_axes(vectors: np.ndarray, up: str) -> np.ndarray:
     """Convert vectors from a file's axes to the core's.
 
     Args:
@@ -303,7 +303,7 @@ def to_ours(vectors: np.ndarray, up: str) -> np.ndarray:
     return vectors[..., (0, 2, 1)] * (1.0, -1.0, 1.0) if up == "Y" else vectors
 
 
-def rotation_of(values: np.ndarray, columns: list[tuple[str, int]], up: str) -> np.ndarray:
+def compute_rotations(values: np.ndarray, columns: list[tuple[str, int]], up: str) -> np.ndarray:
     """Compute a joint's rotations in core axes from its rotation channels.
 
     Intrinsic, in the channels' order, degrees. The rotations are multiplied in closed form: each has two non-zero
@@ -327,7 +327,7 @@ def rotation_of(values: np.ndarray, columns: list[tuple[str, int]], up: str) -> 
     half = neighbours[np.array(numbers) - min(numbers)] * (np.pi / 360.0)
     cosines, sines = np.cos(half), np.sin(half)
     for (letter, _), c, s in zip(columns, cosines, sines):
-        axis, sign = TURNS[up][letter]
+        axis, sign = AXES[up][letter]
         # Quaternion product with (c, s on axis k): the axes i, j follow k cyclically.
         s = s * sign
         k, i, j = 1 + axis, 1 + (axis + 1) % 3, 1 + (axis + 2) % 3
@@ -336,7 +336,7 @@ def rotation_of(values: np.ndarray, columns: list[tuple[str, int]], up: str) -> 
     return out
 
 
-def guess_scale(text: BvhText, unit: float | None) -> Scale:
+def estimate_scale(text: BvhText, unit: float | None) -> FileScale:
     """Estimate a file's up axis, and its unit if it is not set.
 
     Up is the axis, Y or Z, along which feet to head point (within 35 degrees) in more of 64 frames spread over the
@@ -351,21 +351,21 @@ def guess_scale(text: BvhText, unit: float | None) -> Scale:
     Returns:
         Unit and axes.
     """
-    rest = Skeleton(text.names, text.parents, to_ours(text.offsets, "Y"))
+    rest = Skeleton(text.names, text.parents, from_file_axes(text.offsets, "Y"))
     try:
-        body = identify(rest)
+        body = identify_joints(rest)
     except InputError:
-        told = "set" if unit else "no legs found, centimetres assumed"
-        return Scale(unit or 0.01, "Y", None, (f"unit {unit or 0.01:g} m ({told}), Y up assumed",))
-    skeleton, positions = _sampled(text, rest)
-    up = _up(body, positions, pose_kinematics(rest, np.zeros(3), quaternion.identity(len(rest)))[0])
-    height = _hip_height(skeleton, body, positions[..., 2] if up == "Y" else -positions[..., 1])
-    found = unit or _unit(height, leg_length(skeleton))
-    told = "set" if unit else "estimated"
-    return Scale(found, up, body, (f"unit {found:.6g} m ({told}): hips {height * found:.2f} m high; {up} up",))
+        origin = "set" if unit else "no legs found, centimetres assumed"
+        return FileScale(unit or 0.01, "Y", None, (f"unit {unit or 0.01:g} m ({origin}), Y up assumed",))
+    skeleton, positions = _sample_poses(text, rest)
+    up = _detect_up_axis(body, positions, compute_pose(rest, np.zeros(3), quaternion.identity(len(rest)))[0])
+    height = _measure_hip_height(skeleton, body, positions[..., 2] if up == "Y" else -positions[..., 1])
+    estimated = unit or _estimate_unit(height, measure_leg_length(skeleton))
+    origin = "set" if unit else "estimated"
+    return FileScale(estimated, up, body, (f"unit {estimated:.6g} m ({origin}): hips {height * estimated:.2f} m high; {up} up",))
 
 
-def _sampled(text: BvhText, rest: Skeleton) -> tuple[Skeleton, np.ndarray]:
+def _sample_poses(text: BvhText, rest: Skeleton) -> tuple[Skeleton, np.ndarray]:
     """Sample poses: the skeleton with its posed offsets, and positions (N, J, 3) as if Y were up; file units."""
     rows = text.values[np.unique(np.linspace(0, len(text.values) - 1, _SAMPLES).astype(int))]
     offsets, rotations, first = np.array(text.offsets), np.empty((len(rest), 4, len(rows))), 0
@@ -374,14 +374,14 @@ def _sampled(text: BvhText, rest: Skeleton) -> tuple[Skeleton, np.ndarray]:
         for name, column in columns:
             if name in POSITIONS:
                 offsets[joint, POSITIONS.index(name)] = rows[:, column].mean()
-        rotations[joint] = rotation_of(rows, [(n[0], c) for n, c in columns if n not in POSITIONS], "Y")
+        rotations[joint] = compute_rotations(rows, [(n[0], c) for n, c in columns if n not in POSITIONS], "Y")
         first += len(channels)
-    skeleton = Skeleton(text.names, text.parents, to_ours(offsets, "Y"))
-    positions, _ = pose_kinematics(skeleton, np.zeros((len(rows), 3)), rotations.transpose(2, 0, 1))
+    skeleton = Skeleton(text.names, text.parents, from_file_axes(offsets, "Y"))
+    positions, _ = compute_pose(skeleton, np.zeros((len(rows), 3)), rotations.transpose(2, 0, 1))
     return skeleton, positions
 
 
-def _up(body: Humanoid, posed: np.ndarray, rest: np.ndarray) -> str:
+def _detect_up_axis(body: Humanoid, posed: np.ndarray, rest: np.ndarray) -> str:
     """Detect the up axis, "Y" or "Z", from posed (N, J, 3) and rest (J, 3) positions converted as if Y were up."""
     top = body.head_or_neck
     feet = [body.left.foot, body.right.foot]
@@ -393,14 +393,14 @@ def _up(body: Humanoid, posed: np.ndarray, rest: np.ndarray) -> str:
     return "Z" if votes["Z"] > votes["Y"] else "Y"
 
 
-def _hip_height(skeleton: Skeleton, body: Humanoid, heights: np.ndarray) -> float:
+def _measure_hip_height(skeleton: Skeleton, body: Humanoid, heights: np.ndarray) -> float:
     """Measure the hips' height above the lower foot from heights (N, J), file units; at least the leg's length."""
     feet = [body.left.foot, body.right.foot, body.left.toe_or_foot, body.right.toe_or_foot]
     posed = np.percentile(heights[:, body.hips] - heights[:, feet].min(axis=1), 95)
-    return float(max(posed, leg_length(skeleton)))
+    return float(max(posed, measure_leg_length(skeleton)))
 
 
-def _unit(hip_height: float, leg: float) -> float:
+def _estimate_unit(hip_height: float, leg: float) -> float:
     low, high = _HIP_HEIGHT
     for unit in _USUAL_UNITS:
         if low <= hip_height * unit <= high:

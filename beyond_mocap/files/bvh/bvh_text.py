@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from ...base.errors import InputError
-from ..content import content
+from ..content import read_bytes
 
 POSITIONS = ("Xposition", "Yposition", "Zposition")
 ROTATIONS = ("Xrotation", "Yrotation", "Zrotation")
@@ -57,7 +57,7 @@ class BvhText:
     renamed: tuple[tuple[str, str], ...]
 
 
-def parse(path) -> BvhText:
+def read_bvh_text(path) -> BvhText:
     """Read and parse a BVH file.
 
     Args:
@@ -68,10 +68,10 @@ def parse(path) -> BvhText:
         InputError: with the line, if it is missing, truncated, damaged or not BVH.
     """
     path = Path(path)
-    return parse_data(path, _content(path))
+    return parse_bvh_text(path, _read_content(path))
 
 
-def parse_data(path: Path, data: bytes) -> BvhText:
+def parse_bvh_text(path: Path, data: bytes) -> BvhText:
     """Parse the bytes of a BVH file.
 
     Args:
@@ -85,25 +85,25 @@ def parse_data(path: Path, data: bytes) -> BvhText:
     motion = re.search(rb"^[ \t]*MOTION\b[^\n]*\n?", data, re.M | re.I)
     if motion is None:
         raise InputError(path, "no MOTION section", "HIERARCHY, then MOTION", f"the file is truncated; {_EXPORT_AGAIN}")
-    joints = _Hierarchy(path).read(_decoded(data[: motion.start()]))
+    joints = _HierarchyParser(path).parse(_decode(data[: motion.start()]))
     line = data.count(b"\n", 0, motion.end()) + 1
-    frames, frame_time, body, line = _motion_head(path, data, motion.end(), line)
+    frames, frame_time, rows_start, line = _parse_motion_head(path, data, motion.end(), line)
     columns = sum(len(c) for c in joints.channels)
     if columns == 0:
         raise InputError(path, "no joint has channels", "a CHANNELS line per joint", _EXPORT_AGAIN)
-    values = _rows(path, data[body - 1 :], columns, line)  # start at the previous line's end
+    values = _parse_rows(path, data[rows_start - 1 :], columns, line)  # start at the previous line's end
     if len(values) != frames:
         raise InputError(
             f"{path}:{line}", f"{len(values)} rows of motion", f"{frames}, the number after Frames:",
             f"the file is {'truncated' if len(values) < frames else 'damaged'}; {_EXPORT_AGAIN}",
         )
     _check_angles(path, joints, values, line)
-    return joints.finish(frame_time, values, line)
+    return joints.build_text(frame_time, values, line)
 
 
-def _content(path: Path) -> bytes:
+def _read_content(path: Path) -> bytes:
     """Read the file's bytes with unified line ends; InputError if it cannot be read or is not BVH."""
-    data = content(path, "a BVH file")
+    data = read_bytes(path, "a BVH file")
     if not data or data.isspace():
         raise InputError(path, "the file is empty", "a BVH file", _EXPORT_AGAIN)
     if data.startswith(b"\xef\xbb\xbf"):
@@ -113,14 +113,14 @@ def _content(path: Path) -> bytes:
     return data.replace(b"\r\n", b"\n").replace(b"\r", b"\n") if b"\r" in data else data
 
 
-def _decoded(data: bytes) -> str:
+def _decode(data: bytes) -> str:
     try:
         return data.decode("utf-8")
     except UnicodeDecodeError:
         return data.decode("latin-1")
 
 
-class _Hierarchy:
+class _HierarchyParser:
     """Parses the hierarchy token by token, with a stack instead of recursion: files may nest thousands of levels deep.
     """
 
@@ -135,23 +135,23 @@ class _Hierarchy:
         self.line = 1
         self.stack: list[int | None] = []  # open joints; None for an End Site
 
-    def read(self, text: str) -> "_Hierarchy":
+    def parse(self, text: str) -> "_HierarchyParser":
         """Parse all joints of the HIERARCHY section."""
         lines = text.split("\n")
         for self.line, line in enumerate(lines, 1):
             words = line.replace("{", " { ").replace("}", " } ").split()
             while words:
-                words = self._take(words)
+                words = self._parse_statement(words)
         if self.stack:
-            raise self._error(f"{len(self.stack)} brackets not closed", "a } for each {", "the hierarchy is truncated")
+            raise self._build_error(f"{len(self.stack)} brackets not closed", "a } for each {", "the hierarchy is truncated")
         if not self.names:
-            raise self._error("no ROOT", "ROOT and a joint's name", _EXPORT_AGAIN)
+            raise self._build_error("no ROOT", "ROOT and a joint's name", _EXPORT_AGAIN)
         for joint, offset in enumerate(self.offsets):
             if offset is None:
                 raise InputError(self.path, f"joint {self.names[joint]!r} has no OFFSET", "OFFSET x y z", _EXPORT_AGAIN)
         return self
 
-    def finish(self, frame_time: float, values: np.ndarray, first_row: int) -> BvhText:
+    def build_text(self, frame_time: float, values: np.ndarray, first_row: int) -> BvhText:
         """Combine the joints with the motion's numbers."""
         ends = [(joint, offset) for joint, offset in self.ends if offset is not None]
         return BvhText(
@@ -161,86 +161,86 @@ class _Hierarchy:
             first_row=first_row, renamed=tuple(self.renamed),
         )
 
-    def _error(self, found: str, expected: str = "", next_step: str = _EXPORT_AGAIN) -> InputError:
+    def _build_error(self, found: str, expected: str = "", next_step: str = _EXPORT_AGAIN) -> InputError:
         return InputError(f"{self.path}:{self.line}", found, expected, next_step)
 
-    def _take(self, words: list[str]) -> list[str]:
+    def _parse_statement(self, words: list[str]) -> list[str]:
         """Parse one statement; return the rest of the line."""
         keyword = words[0].upper()
         if keyword in ("HIERARCHY", "{"):
             return words[1:]
         if keyword in ("ROOT", "JOINT", "END"):
-            return self._open(keyword, words)
+            return self._open_joint(keyword, words)
         if keyword == "}":
             if not self.stack:
-                raise self._error("one } too many", "a { for each }")
+                raise self._build_error("one } too many", "a { for each }")
             self.stack.pop()
             return words[1:]
         if keyword == "OFFSET":
-            return self._offset(words)
+            return self._parse_offset(words)
         if keyword == "CHANNELS":
-            return self._take_channels(words)
-        raise self._error(f"{words[0]!r}", "ROOT, JOINT, End Site, OFFSET, CHANNELS or a bracket")
+            return self._parse_channels(words)
+        raise self._build_error(f"{words[0]!r}", "ROOT, JOINT, End Site, OFFSET, CHANNELS or a bracket")
 
-    def _open(self, keyword: str, words: list[str]) -> list[str]:
+    def _open_joint(self, keyword: str, words: list[str]) -> list[str]:
         """Open a joint or End Site; return the rest of the line."""
         stop = words.index("{") if "{" in words else len(words)
         name = " ".join(words[1:stop])
         if (keyword == "ROOT") == bool(self.names) or (self.stack == [] and self.names):
-            raise self._error(f"{keyword} {name}", "one ROOT with all joints inside it", "export one body per file")
+            raise self._build_error(f"{keyword} {name}", "one ROOT with all joints inside it", "export one body per file")
         if self.stack and self.stack[-1] is None:
-            raise self._error(f"{keyword} {name} inside an End Site", "}")
+            raise self._build_error(f"{keyword} {name} inside an End Site", "}")
         parent = self.stack[-1] if self.stack else -1
         if keyword == "END":
             self.ends.append([parent, None])
             self.stack.append(None)
             return words[stop:]
         if not name:
-            raise self._error(f"{keyword} without a name", f"{keyword} and a name")
+            raise self._build_error(f"{keyword} without a name", f"{keyword} and a name")
         self.stack.append(len(self.names))
-        self.names.append(self._unique(name))
+        self.names.append(self._make_unique(name))
         self.parents.append(parent)
         self.offsets.append(None)
         self.channels.append(())
         return words[stop:]
 
-    def _unique(self, name: str) -> str:
-        taken, number, unique = set(self.names), 2, name
-        while unique in taken:
+    def _make_unique(self, name: str) -> str:
+        used, number, unique = set(self.names), 2, name
+        while unique in used:
             unique, number = f"{name}_{number}", number + 1
         if unique != name:
             self.renamed.append((name, unique))
         return unique
 
-    def _offset(self, words: list[str]) -> list[str]:
-        numbers = [_number(word) for word in words[1:4]]
+    def _parse_offset(self, words: list[str]) -> list[str]:
+        numbers = [_parse_number(word) for word in words[1:4]]
         if len(numbers) < 3 or None in numbers:
-            raise self._error(f"{' '.join(words)[:60]!r}", "OFFSET and three numbers")
+            raise self._build_error(f"{' '.join(words)[:60]!r}", "OFFSET and three numbers")
         if not self.stack:
-            raise self._error("OFFSET outside of a joint", "ROOT first")
+            raise self._build_error("OFFSET outside of a joint", "ROOT first")
         if self.stack[-1] is None:
             self.ends[-1][1] = numbers
         else:
             self.offsets[self.stack[-1]] = numbers
         return words[4:]
 
-    def _take_channels(self, words: list[str]) -> list[str]:
+    def _parse_channels(self, words: list[str]) -> list[str]:
         """Parse the channels of the open joint; return the rest of the line."""
         count = int(words[1]) if len(words) > 1 and re.fullmatch("[0-6]", words[1]) else None
         names = [_CHANNELS.get(word.lower()) for word in words[2 : 2 + (count or 0)]]
         if count is None or len(names) < count or None in names:
-            raise self._error(f"{' '.join(words)[:90]!r}", "CHANNELS, a number (0 to 6), and Xposition ... Zrotation")
+            raise self._build_error(f"{' '.join(words)[:90]!r}", "CHANNELS, a number (0 to 6), and Xposition ... Zrotation")
         if len(set(names)) < count:
-            raise self._error("a channel is repeated", "each channel once per joint")
+            raise self._build_error("a channel is repeated", "each channel once per joint")
         if not self.stack or self.stack[-1] is None:
-            raise self._error("CHANNELS outside of a joint", "a joint first")
+            raise self._build_error("CHANNELS outside of a joint", "a joint first")
         if self.channels[self.stack[-1]]:
-            raise self._error("CHANNELS is repeated", "one CHANNELS line per joint")
+            raise self._build_error("CHANNELS is repeated", "one CHANNELS line per joint")
         self.channels[self.stack[-1]] = tuple(names)
         return words[2 + count :]
 
 
-def _number(word: str) -> float | None:
+def _parse_number(word: str) -> float | None:
     """Parse a word as a finite number, else None."""
     try:
         value = float(word) if "_" not in word else math.nan
@@ -249,16 +249,16 @@ def _number(word: str) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def _motion_head(path: Path, data: bytes, start: int, line: int) -> tuple[int, float, int, int]:
+def _parse_motion_head(path: Path, data: bytes, start: int, line: int) -> tuple[int, float, int, int]:
     """Parse the two lines after MOTION: frames, seconds per frame, and where the rows start (byte, line)."""
-    frames_text, start, line = _labelled(path, data, start, line=line, label=rb"Frames\s*:",
+    frames_text, start, line = _parse_labelled_value(path, data, start, line=line, label=rb"Frames\s*:",
                                          expected="Frames: and their number")
     frames = int(frames_text) if re.fullmatch(r"\d{1,12}", frames_text) else 0
     if frames < 1:
         raise InputError(f"{path}:{line - 1}", f"Frames: {frames_text[:40]}", "a whole number above 0", _EXPORT_AGAIN)
     expected = "Frame Time: and seconds per frame"
-    time_text, start, line = _labelled(path, data, start, line=line, label=rb"Frame\s*Time\s*:", expected=expected)
-    frame_time = _number(time_text)
+    time_text, start, line = _parse_labelled_value(path, data, start, line=line, label=rb"Frame\s*Time\s*:", expected=expected)
+    frame_time = _parse_number(time_text)
     if frame_time is None or not 1e-5 <= frame_time <= 1e3:
         raise InputError(
             f"{path}:{line - 1}", f"Frame Time: {time_text[:40]}", "seconds, above 0 (0.00001 to 1000)",
@@ -267,7 +267,7 @@ def _motion_head(path: Path, data: bytes, start: int, line: int) -> tuple[int, f
     return frames, frame_time, start, line
 
 
-def _labelled(path: Path, data: bytes, start: int, line: int, label: bytes, expected: str) -> tuple[str, int, int]:
+def _parse_labelled_value(path: Path, data: bytes, start: int, line: int, label: bytes, expected: str) -> tuple[str, int, int]:
     """Parse the value after `label` on the next line that is not blank; also return where the line after it starts."""
     while True:
         stop = data.find(b"\n", start)
@@ -278,11 +278,11 @@ def _labelled(path: Path, data: bytes, start: int, line: int, label: bytes, expe
         start, line = stop + 1, line + 1
     match = re.match(label, text, re.I)
     if match is None:
-        raise InputError(f"{path}:{line}", f"{_decoded(text[:40])!r}", expected, _DAMAGED)
-    return _decoded(text[match.end() :].strip()), stop + 1, line + 1
+        raise InputError(f"{path}:{line}", f"{_decode(text[:40])!r}", expected, _DAMAGED)
+    return _decode(text[match.end() :].strip()), stop + 1, line + 1
 
 
-def _rows(path: Path, text: bytes, columns: int, line: int) -> np.ndarray:
+def _parse_rows(path: Path, text: bytes, columns: int, line: int) -> np.ndarray:
     """Parse the motion's numbers (T, columns); InputError with the first invalid line."""
     if not text or text.isspace():
         raise InputError(f"{path}:{line}", "no rows of motion", f"rows of {columns} numbers", _DAMAGED)
@@ -292,10 +292,10 @@ def _rows(path: Path, text: bytes, columns: int, line: int) -> np.ndarray:
             return values
     except ValueError:
         pass
-    raise _row_error(path, text, columns, line)
+    raise _build_row_error(path, text, columns, line)
 
 
-def _check_angles(path: Path, joints: _Hierarchy, values: np.ndarray, line: int) -> None:
+def _check_angles(path: Path, joints: _HierarchyParser, values: np.ndarray, line: int) -> None:
     if max(values.max(), -values.min()) <= _LARGEST_ANGLE:
         return
     names = [f"{name} {c}" for name, channels in zip(joints.names, joints.channels) for c in channels]
@@ -305,13 +305,13 @@ def _check_angles(path: Path, joints: _Hierarchy, values: np.ndarray, line: int)
             raise InputError(f"{path}:{line + row}", found, "an angle", _EXPORT_AGAIN)
 
 
-def _row_error(path: Path, text: bytes, columns: int, line: int) -> InputError:
+def _build_row_error(path: Path, text: bytes, columns: int, line: int) -> InputError:
     """Build the error of the first invalid row; `text` begins with the end of the line before `line`."""
-    for at, row in enumerate(_decoded(text).split("\n"), line - 1):
+    for at, row in enumerate(_decode(text).split("\n"), line - 1):
         words = row.split()
-        bad = next((word for word in words if _number(word) is None or abs(float(word)) >= 1e300), None)
-        if bad is not None:
-            return InputError(f"{path}:{at}", f"{bad[:30]!r}", "a number of normal size", _EXPORT_AGAIN)
+        invalid = next((word for word in words if _parse_number(word) is None or abs(float(word)) >= 1e300), None)
+        if invalid is not None:
+            return InputError(f"{path}:{at}", f"{invalid[:30]!r}", "a number of normal size", _EXPORT_AGAIN)
         if words and len(words) != columns:
             expected = f"{columns}, one per channel of the hierarchy"
             return InputError(f"{path}:{at}", f"{len(words)} numbers", expected, _DAMAGED)

@@ -11,7 +11,7 @@ from typing import Iterator, Mapping
 import numpy as np
 
 from ...motion import quaternion
-from ...motion.humanoid import heading
+from ...motion.humanoid import compute_heading
 from ...motion.motion import Motion
 from ...motion.skeleton import Skeleton
 from .bvh_text import POSITIONS, ROTATIONS
@@ -23,7 +23,7 @@ _SAME_ANGLE = np.degrees(1e-6)
 
 
 @dataclass(frozen=True, kw_only=True)
-class RootAbove:
+class JointAboveHips:
     """A joint above the hips, from the file's root down.
 
     Attributes:
@@ -39,11 +39,11 @@ class RootAbove:
 
     name: str
     channels: tuple[str, ...]
-    moves: bool
+    is_moving: bool
     position: np.ndarray
     rotation: np.ndarray
     heading: float = 0.0
-    carries: np.ndarray | None = None
+    hip_offset: np.ndarray | None = None
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class BvhForm:
     """
 
     channels: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    above: tuple[RootAbove, ...] = ()
+    above: tuple[JointAboveHips, ...] = ()
     unit: float = 0.01
     up: str = "Y"
 
@@ -86,7 +86,7 @@ class _Joint:
     added: tuple[str, ...]
 
 
-def document(motion: Motion, form: BvhForm) -> tuple[Iterator[str], tuple[str, ...]]:
+def format_bvh(motion: Motion, form: BvhForm) -> tuple[Iterator[str], tuple[str, ...]]:
     """Format a motion as BVH.
 
     Args:
@@ -95,20 +95,20 @@ def document(motion: Motion, form: BvhForm) -> tuple[Iterator[str], tuple[str, .
     Returns:
         The file's text in pieces, and a note for each joint that needs more channels than `form` gives it.
     """
-    joints = _above(motion, form.above)
-    root, rotation = _hips_below(motion, form.above)
-    for i, depth in _depth_first(motion.skeleton):
+    joints = _build_joints_above(motion, form.above)
+    root, rotation = _compute_hips(motion, form.above)
+    for i, depth in _iter_depth_first(motion.skeleton):
         name = motion.skeleton.names[i]
         declared = form.channels.get(name, (POSITIONS if i == 0 else ()) + _ZXY)
-        place = root if i == 0 else motion.skeleton.offsets[i][None]
+        position = root if i == 0 else motion.skeleton.offsets[i][None]
         ends = motion.skeleton.end_offsets[[p == i for p in motion.skeleton.end_parents]]
-        turn = rotation if i == 0 else motion.rotations[:, i]
-        joints.append(_joint(name, len(form.above) + depth, declared, place=place, turn=turn, ends=ends))
+        local_rotation = rotation if i == 0 else motion.rotations[:, i]
+        joints.append(_build_joint(name, len(form.above) + depth, declared, place=position, turn=local_rotation, ends=ends))
     notes = tuple(f"{j.name}: {', '.join(j.added)} added, because the motion needs it" for j in joints if j.added)
-    return _text(joints, motion.fps), notes
+    return _iter_text(joints, motion.fps), notes
 
 
-def euler_degrees(rotations: np.ndarray, letters: str) -> np.ndarray:
+def compute_euler_degrees(rotations: np.ndarray, letters: str) -> np.ndarray:
     """Compute Euler angles in the order of `letters`, completed to a permutation of XYZ.
 
     With three letters, the middle angle is within +-90 degrees. With fewer, two triples give the rotation, (a, b, c)
@@ -133,21 +133,21 @@ def euler_degrees(rotations: np.ndarray, letters: str) -> np.ndarray:
     return np.where((other_spare < spare - _SAME_ANGLE)[:, None], other, angles)
 
 
-def _to_file(vectors: np.ndarray) -> np.ndarray:
+def _to_file_axes(vectors: np.ndarray) -> np.ndarray:
     """Convert core vectors (..., 3), metres, Z up, to the file's centimetres, Y up."""
     return vectors[..., (0, 2, 1)] * (_CENTIMETRES, _CENTIMETRES, -_CENTIMETRES)
 
 
-def _joint(name: str, depth: int, declared: tuple[str, ...], place: np.ndarray, turn: np.ndarray, ends) -> _Joint:
+def _build_joint(name: str, depth: int, declared: tuple[str, ...], place: np.ndarray, turn: np.ndarray, ends) -> _Joint:
     """Build one joint from place (T or 1, 3) metres and turn (T, 4), relative to its parent, in core axes."""
-    places = _to_file(place)
-    lacking = [c for c, spread in zip(POSITIONS, np.ptp(places, axis=0)) if c not in declared and spread > _SAME_PLACE]
+    places = _to_file_axes(place)
+    missing = [c for c, spread in zip(POSITIONS, np.ptp(places, axis=0)) if c not in declared and spread > _SAME_PLACE]
     letters = "".join(c[0] for c in declared if c in ROTATIONS)
     # core axes -> the file's: the same quarter turn as for vectors, on the quaternion's vector part
-    angles = euler_degrees(turn[:, (0, 1, 3, 2)] * (1.0, 1.0, 1.0, -1.0), letters)
+    angles = compute_euler_degrees(turn[:, (0, 1, 3, 2)] * (1.0, 1.0, 1.0, -1.0), letters)
     if np.abs(angles[:, len(letters) :]).max(initial=0.0) > _SAME_ANGLE:
-        lacking += [axis + "rotation" for axis in "ZXY" if axis not in letters]
-    channels = declared + tuple(lacking)
+        missing += [axis + "rotation" for axis in "ZXY" if axis not in letters]
+    channels = declared + tuple(missing)
     order = [c[0] for c in channels if c in ROTATIONS]
     frames = len(turn)
     columns = [
@@ -156,11 +156,11 @@ def _joint(name: str, depth: int, declared: tuple[str, ...], place: np.ndarray, 
     ]
     offset = places[0] if len(places) == 1 else np.where([c in channels for c in POSITIONS], 0.0, places[0])
     columns = np.stack(columns, axis=1) if columns else np.zeros((frames, 0))
-    return _Joint(name=name, depth=depth, offset=offset, channels=channels, columns=columns, ends=_to_file(ends),
-                  added=tuple(lacking))
+    return _Joint(name=name, depth=depth, offset=offset, channels=channels, columns=columns, ends=_to_file_axes(ends),
+                  added=tuple(missing))
 
 
-def _depth_first(skeleton: Skeleton) -> Iterator[tuple[int, int]]:
+def _iter_depth_first(skeleton: Skeleton) -> Iterator[tuple[int, int]]:
     """Iterate over joints in the order BVH nests them, with their depth; a skeleton that was read keeps its order."""
     children: list[list[int]] = [[] for _ in skeleton.names]
     for joint, parent in enumerate(skeleton.parents):
@@ -173,7 +173,7 @@ def _depth_first(skeleton: Skeleton) -> Iterator[tuple[int, int]]:
         waiting += [(child, depth + 1) for child in reversed(children[joint])]
 
 
-def _chain(motion: Motion, above: tuple[RootAbove, ...]) -> list[tuple[np.ndarray, np.ndarray]]:
+def _compute_chain(motion: Motion, above: tuple[JointAboveHips, ...]) -> list[tuple[np.ndarray, np.ndarray]]:
     """Compute positions (T, 3) and rotations (T, 4) in the world frame of the joints above the hips, after the world's
     own.
 
@@ -181,47 +181,47 @@ def _chain(motion: Motion, above: tuple[RootAbove, ...]) -> list[tuple[np.ndarra
     """
     frames = len(motion)
     worlds = [(np.zeros((frames, 3)), quaternion.identity(frames))]
-    moving = next((joint for joint in above if joint.moves), None)
+    moving = next((joint for joint in above if joint.is_moving), None)
     for joint in above:
         place, turn = worlds[-1]
         if joint is moving:
-            facing = quaternion.about_up(heading(motion) + joint.heading)
+            body_heading = quaternion.from_up_angle(compute_heading(motion) + joint.heading)
             ground = motion.root_positions * (1.0, 1.0, 0.0)
-            if joint.carries is not None:
-                ground = motion.root_positions - quaternion.rotate(facing, joint.carries)
-            worlds.append((ground, facing))
+            if joint.hip_offset is not None:
+                ground = motion.root_positions - quaternion.rotate(body_heading, joint.hip_offset)
+            worlds.append((ground, body_heading))
         else:
             worlds.append((place + quaternion.rotate(turn, joint.position), quaternion.multiply(turn, joint.rotation)))
     return worlds
 
 
-def _relative(world, parent) -> tuple[np.ndarray, np.ndarray]:
+def _to_parent_frame(world, parent) -> tuple[np.ndarray, np.ndarray]:
     """Convert a position and rotation in the world frame, (T, 3) and (T, 4), to a parent's frame."""
-    back = quaternion.inverse(parent[1])
-    return quaternion.rotate(back, world[0] - parent[0]), quaternion.multiply(back, world[1])
+    inverse = quaternion.inverse(parent[1])
+    return quaternion.rotate(inverse, world[0] - parent[0]), quaternion.multiply(inverse, world[1])
 
 
-def _above(motion: Motion, above: tuple[RootAbove, ...]) -> list[_Joint]:
+def _build_joints_above(motion: Motion, above: tuple[JointAboveHips, ...]) -> list[_Joint]:
     """Build the joints above the hips."""
-    worlds, out = _chain(motion, above) if above else [], []
+    worlds, out = _compute_chain(motion, above) if above else [], []
     for depth, (joint, parent, world) in enumerate(zip(above, worlds, worlds[1:])):
-        place, turn = _relative(world, parent)
-        place = place if joint.moves else joint.position[None]
-        out.append(_joint(joint.name, depth, joint.channels, place=place, turn=turn, ends=np.zeros((0, 3))))
+        place, turn = _to_parent_frame(world, parent)
+        place = place if joint.is_moving else joint.position[None]
+        out.append(_build_joint(joint.name, depth, joint.channels, place=place, turn=turn, ends=np.zeros((0, 3))))
     return out
 
 
-def _hips_below(motion: Motion, above: tuple[RootAbove, ...]) -> tuple[np.ndarray, np.ndarray]:
+def _compute_hips(motion: Motion, above: tuple[JointAboveHips, ...]) -> tuple[np.ndarray, np.ndarray]:
     """Compute the hips' positions (T, 3) and rotations (T, 4) relative to the joints above them."""
     hips = (motion.root_positions, motion.rotations[:, 0])
-    return _relative(hips, _chain(motion, above)[-1]) if above else hips
+    return _to_parent_frame(hips, _compute_chain(motion, above)[-1]) if above else hips
 
 
-def _text(joints: list[_Joint], fps: float) -> Iterator[str]:
+def _iter_text(joints: list[_Joint], fps: float) -> Iterator[str]:
     """Iterate over the pieces of the file."""
     yield "HIERARCHY\n"
     for joint, depth_after in zip(joints, [j.depth for j in joints[1:]] + [0]):
-        yield from _joint_text(joint)
+        yield from _iter_joint_text(joint)
         for depth in range(joint.depth, depth_after - 1, -1):
             yield "\t" * depth + "}\n"
     values = np.concatenate([joint.columns for joint in joints], axis=1)
@@ -231,14 +231,14 @@ def _text(joints: list[_Joint], fps: float) -> Iterator[str]:
     yield from (row % tuple(frame) for frame in (np.round(values, 6) + 0.0).tolist())
 
 
-def _joint_text(joint: _Joint) -> Iterator[str]:
+def _iter_joint_text(joint: _Joint) -> Iterator[str]:
     """Iterate over a joint's lines; its bracket stays open."""
     tabs = "\t" * joint.depth
-    yield f"{tabs}{'JOINT' if joint.depth else 'ROOT'} {joint.name}\n{tabs}{{\n{tabs}\t{_offset(joint.offset)}"
+    yield f"{tabs}{'JOINT' if joint.depth else 'ROOT'} {joint.name}\n{tabs}{{\n{tabs}\t{_format_offset(joint.offset)}"
     yield f"{tabs}\tCHANNELS {' '.join([str(len(joint.channels)), *joint.channels])}\n"
     for end in joint.ends:
-        yield f"{tabs}\tEnd Site\n{tabs}\t{{\n{tabs}\t\t{_offset(end)}{tabs}\t}}\n"
+        yield f"{tabs}\tEnd Site\n{tabs}\t{{\n{tabs}\t\t{_format_offset(end)}{tabs}\t}}\n"
 
 
-def _offset(vector: np.ndarray) -> str:
+def _format_offset(vector: np.ndarray) -> str:
     return "OFFSET %.6f %.6f %.6f\n" % tuple(np.round(vector, 6) + 0.0)

@@ -13,8 +13,8 @@ from typing import TypeVar
 
 from ...base.errors import InputError
 
-_HEAD = 8192  # bytes that identify a format
-_BY_LINES = {".dat", ".csv", ".txt", ".jsonl"}  # suffixes of files that are read line by line
+_HEAD_BYTES = 8192  # bytes that identify a format
+_LINE_SUFFIXES = {".dat", ".csv", ".txt", ".jsonl"}  # suffixes of files that are read line by line
 
 Samples = Iterator[tuple[int, str, float, float]]
 """Frame number, id, x and y in the provider's coordinates."""
@@ -92,12 +92,12 @@ class Feed:
         return self.tracking[0]
 
     @property
-    def by_lines(self) -> bool:
+    def is_line_based(self) -> bool:
         """Whether a truncated tracking file still has whole lines."""
-        return self.path.suffix.lower() in _BY_LINES
+        return self.path.suffix.lower() in _LINE_SUFFIXES
 
     @property
-    def by_teams(self) -> bool:
+    def has_team_files(self) -> bool:
         """Whether each team has its own tracking file."""
         return bool(self.provider.team_loader) and not self.meta
 
@@ -113,7 +113,7 @@ def read_head(path: Path) -> bytes:
     if not path.is_file():
         return b""
     with open(path, "rb") as file:
-        return file.read(_HEAD).removeprefix(b"\xef\xbb\xbf")
+        return file.read(_HEAD_BYTES).removeprefix(b"\xef\xbb\xbf")
 
 
 Known = TypeVar("Known", bound=Provider)
@@ -132,7 +132,7 @@ def find_provider(path: Path, providers: Mapping[str, Known]) -> Known | None:
     return next((one for one in providers.values() if any(re.match(form, head) for form in one.patterns)), None)
 
 
-def load_through_kloppy(path: Path, provider: str, loader: str, arguments: Mapping, form: str, others: str):
+def load_with_kloppy(path: Path, provider: str, loader: str, arguments: Mapping, expected: str, others: str):
     """Load a dataset with kloppy.
 
     Args:
@@ -159,5 +159,5 @@ def load_through_kloppy(path: Path, provider: str, loader: str, arguments: Mappi
             warnings.simplefilter("ignore")
             return getattr(module, loader)(**arguments)
     except Exception as error:  # kloppy's parsers raise many kinds of errors
-        found = f"not readable as {form} ({type(error).__name__}: {str(error)[:120]})"
-        raise InputError(path, found, f"{form}{others}", "check the files, and the provider") from None
+        found = f"not readable as {expected} ({type(error).__name__}: {str(error)[:120]})"
+        raise InputError(path, found, f"{expected}{others}", "check the files, and the provider") from None

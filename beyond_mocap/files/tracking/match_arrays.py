@@ -12,7 +12,7 @@ USUAL_PITCH = (105.0, 68.0)
 _PERIOD_BREAK = 10.0  # seconds inserted between the periods of a match
 
 
-def records_of(dataset) -> list:
+def list_records(dataset) -> list:
     """List the frames with a player or a ball.
 
     Args:
@@ -23,7 +23,7 @@ def records_of(dataset) -> list:
     return [frame for frame in dataset.records if frame.players_data or frame.ball_coordinates is not None]
 
 
-def tracked_players(records) -> list:
+def list_players(records) -> list:
     """List the players of any frame, the away team's first, by shirt number.
 
     Args:
@@ -31,10 +31,10 @@ def tracked_players(records) -> list:
     Returns:
         kloppy's players.
     """
-    return sorted({player for frame in records for player in frame.players_data}, key=_shirt)
+    return sorted({player for frame in records for player in frame.players_data}, key=_sort_key)
 
 
-def player_samples(records, players) -> np.ndarray:
+def build_player_samples(records, players) -> np.ndarray:
     """Build the players' samples.
 
     Args:
@@ -52,7 +52,7 @@ def player_samples(records, players) -> np.ndarray:
     return out
 
 
-def ball_samples(records) -> np.ndarray:
+def build_ball_samples(records) -> np.ndarray:
     """Build the ball's samples; many feeds have no height.
 
     Args:
@@ -69,7 +69,7 @@ def ball_samples(records) -> np.ndarray:
     return out
 
 
-def clock(records) -> tuple[np.ndarray, list[tuple[float, float, int, float]]]:
+def build_clock(records) -> tuple[np.ndarray, list[tuple[float, float, int, float]]]:
     """Build one clock for all periods.
 
     Args:
@@ -90,11 +90,11 @@ def clock(records) -> tuple[np.ndarray, list[tuple[float, float, int, float]]]:
     return times, spans
 
 
-def _shirt(player) -> tuple[str, int, str]:
+def _sort_key(player) -> tuple[str, int, str]:
     return str(player.team.ground), int(player.jersey_no or 0), str(player.player_id)
 
 
-def described(player) -> tuple[str, str, str, str, str]:
+def describe_player(player) -> tuple[str, str, str, str, str]:
     """Describe one of kloppy's players.
 
     Args:
@@ -104,17 +104,17 @@ def described(player) -> tuple[str, str, str, str, str]:
     """
     id_, shirt = str(player.player_id), str(-1 if player.jersey_no is None else int(player.jersey_no))
     ground = str(player.team.ground)
-    return id_, ground if ground in ("home", "away") else REFEREE, player.name or id_, shirt, _position(player)
+    return id_, ground if ground in ("home", "away") else REFEREE, player.name or id_, shirt, _format_position(player)
 
 
-def _position(player) -> str:
+def _format_position(player) -> str:
     """Format the position in words: "left center back"."""
     position = getattr(player, "starting_position", None)
-    said = re.sub(r"\s+", " ", str(position or "")).strip().lower()
-    return "" if said in ("unknown", "none") or "." in said else said
+    text = re.sub(r"\s+", " ", str(position or "")).strip().lower()
+    return "" if text in ("unknown", "none") or "." in text else text
 
 
-def pitch_of(dataset, pitch: tuple[float, float] | None, in_feed: bool) -> tuple[float, float, bool]:
+def find_pitch_size(dataset, pitch: tuple[float, float] | None, in_feed: bool) -> tuple[float, float, bool]:
     """Find the pitch's size.
 
     Args:
@@ -126,13 +126,13 @@ def pitch_of(dataset, pitch: tuple[float, float] | None, in_feed: bool) -> tuple
     """
     size = dataset.metadata.pitch_dimensions
     length, width = size.pitch_length, size.pitch_width
-    kloppys_guess = size.unit.name == "NORMED" and (length, width) == USUAL_PITCH
-    if length and width and not kloppys_guess and in_feed:
+    is_kloppy_default = size.unit.name == "NORMED" and (length, width) == USUAL_PITCH
+    if length and width and not is_kloppy_default and in_feed:
         return float(length), float(width), False
     return (*(pitch or USUAL_PITCH), pitch is None)
 
 
-def height_unit(dataset) -> float:
+def find_height_unit(dataset) -> float:
     """Find the unit of heights; feeds that scale the pitch to 0..1 have no heights, or metres.
 
     Args:
@@ -143,7 +143,7 @@ def height_unit(dataset) -> float:
     return 0.01 if dataset.metadata.coordinate_system.pitch_dimensions.unit.name == "CENTIMETERS" else 1.0
 
 
-def to_metres(system, length: float, width: float, upward: bool):
+def build_metre_map(system, length: float, width: float, upward: bool):
     """Build the map from a provider's plane coordinates to metres.
 
     kloppy's own transformations pass through its standard pitch and bend positions between the lines; this one is

@@ -13,7 +13,7 @@ from functools import partial
 from pathlib import Path
 
 from ...base.errors import InputError
-from .feed import Feed, Files, TrackingProvider, find_provider, load_through_kloppy, read_head
+from .feed import Feed, Files, TrackingProvider, find_provider, load_with_kloppy, read_head
 from .referees import read_signality_referees, read_sportec_referees, read_tracab_referees
 
 _META_NAMES = ("{}_meta.xml", "{}_meta.json", "{}_metadata.xml", "{}_metadata.json", "{}.xml", "{}.json")
@@ -32,7 +32,7 @@ def find_feed(path: str | os.PathLike, meta: str | os.PathLike | None, provider:
     path, notes = _check_file(path), []
     if provider and provider.lower() not in PROVIDERS:
         raise InputError("provider", f"{provider.lower()!r}", f"one of {', '.join(PROVIDERS)}")
-    record = PROVIDERS[provider.lower()] if provider else _guess_provider(path, notes)
+    record = PROVIDERS[provider.lower()] if provider else _detect_provider(path, notes)
     second = _check_file(meta) if meta else _find_metadata(path, record, notes) if record.needs_metadata else None
     return Feed(record, *record.find_files(path, second, notes)), notes
 
@@ -50,15 +50,15 @@ def load_tracking(feed: Feed, pitch: tuple[float, float]):
     """
     record, files, half = feed.provider, list(map(str, feed.tracking)), len(feed.tracking) // 2
     meta, more, *_ = [*map(str, feed.meta), None, None]
-    known = {"raw": files[0], "all": files, "first": files[:half], "second": files[half:], "meta": meta, "more": more,
+    values = {"raw": files[0], "all": files, "first": files[:half], "second": files[half:], "meta": meta, "more": more,
              "length": pitch[0], "width": pitch[1]}  # fmt: skip
-    arguments = {key: known[name] for key, name in record.arguments.items()}
-    if feed.by_teams:
+    arguments = {key: values[name] for key, name in record.arguments.items()}
+    if feed.has_team_files:
         arguments = {"home_data": files[0], "away_data": files[1]}
     arguments["coordinates"] = record.coordinates or record.name
     others = f" and its metadata {', '.join(one.name for one in feed.meta) or feed.tracking[-1].name}"
-    loader = record.team_loader if feed.by_teams else record.loader
-    return load_through_kloppy(feed.path, record.name, loader, arguments=arguments, form=f"{record.name} tracking",
+    loader = record.team_loader if feed.has_team_files else record.loader
+    return load_with_kloppy(feed.path, record.name, loader, arguments=arguments, expected=f"{record.name} tracking",
                                others=others)
 
 
@@ -69,7 +69,7 @@ def _check_file(path: str | os.PathLike) -> Path:
     return Path(path)
 
 
-def _guess_provider(path: Path, notes: list[str]) -> TrackingProvider:
+def _detect_provider(path: Path, notes: list[str]) -> TrackingProvider:
     record = find_provider(path, PROVIDERS)
     if record is not None:
         notes.append(f"{path.name} is read as {record.name}")
@@ -85,17 +85,17 @@ def _find_metadata(path: Path, record: TrackingProvider, notes: list[str]) -> Pa
     names = [path.name.replace(a, b) for a, b in record.renamed if a in path.name]
     names += [form.format(path.stem) for form in _META_NAMES]
     for name in names:
-        beside = path.with_name(name)
-        if beside.is_file() and beside != path:
-            notes.append(f"{name} is used as its {'second' if beside.suffix == path.suffix else 'metadata'} file")
-            return beside
+        candidate = path.with_name(name)
+        if candidate.is_file() and candidate != path:
+            notes.append(f"{name} is used as its {'second' if candidate.suffix == path.suffix else 'metadata'} file")
+            return candidate
     raise InputError(
         path, f"the metadata file for {record.name} is missing", names[0],
         "add it there, or choose the metadata file",
     )
 
 
-def _find_beside(meta: Path, word: str, path: Path, notes: list[str]) -> Path:
+def _find_companion(meta: Path, word: str, path: Path, notes: list[str]) -> Path:
     """Find the one other file that a provider needs, with `word` in its own or its folder's name.
 
     Among several, the one that shares a number with the metadata's or the tracking file's name is used.
@@ -106,8 +106,8 @@ def _find_beside(meta: Path, word: str, path: Path, notes: list[str]) -> Path:
         if word in f"{folder.name}/{one.name}".lower() and one != meta
     )  # fmt: skip
     numbers = set(re.findall(r"\d+", f"{meta.stem} {path.stem}"))
-    fitting = [one for one in found if numbers & set(re.findall(r"\d+", one.stem))]
-    chosen = fitting if len(fitting) == 1 else found
+    matching = [one for one in found if numbers & set(re.findall(r"\d+", one.stem))]
+    chosen = matching if len(matching) == 1 else found
     if len(chosen) != 1:
         raise InputError(
             meta, f"{len(chosen)} files with '{word}' in their names beside it", "one that belongs to this match",
@@ -142,7 +142,7 @@ def _find_secondspectrum(path: Path, meta: Path, notes: list[str]) -> Files:
 
 
 def _find_pff(path: Path, meta: Path, notes: list[str]) -> Files:
-    return (path,), (meta, _find_beside(meta, "roster", path, notes))
+    return (path,), (meta, _find_companion(meta, "roster", path, notes))
 
 
 def _find_pff_number(metadata: bytes) -> str | None:
@@ -157,7 +157,7 @@ def _find_signality(path: Path, meta: Path, notes: list[str]) -> Files:
     names = [re.sub(r"(?i)(?<![a-z0-9])(p)[1-5](?![0-9])", rf"\g<1>{number}", path.name) for number in range(1, 6)]
     found = tuple(dict.fromkeys(path.with_name(name) for name in names if path.with_name(name).is_file()))
     notes += [f"{', '.join(one.name for one in found)} are used as one match"] * (len(found) > 1)
-    return found or (path,), (meta, _find_beside(meta, "venue", path, notes))
+    return found or (path,), (meta, _find_companion(meta, "venue", path, notes))
 
 
 def _find_hawkeye(path: Path, meta: Path | None, notes: list[str]) -> Files:

@@ -14,10 +14,10 @@ from pathlib import Path
 import numpy as np
 
 from ...base.errors import InputError
-from ...motion.skeleton import frozen_array
+from ...motion.skeleton import freeze_array
 from ...motion.track import Track
-from ...motion.track.match_data import REFEREE, Match, MatchPlayer, Team, presence_lines
-from ..tables import number, read_rows
+from ...motion.track.match_data import REFEREE, Match, MatchPlayer, Team, describe_presence
+from ..tables import parse_number, read_rows
 from ..whole import atomic_write
 from . import match_arrays
 from .feed import Feed
@@ -26,21 +26,21 @@ from .match_repairs import (
     check_players,
     check_rows,
     check_same_match,
-    mended_ball,
-    mended_players,
-    mended_sides,
-    side_lines,
-    whole_lines,
+    repair_ball,
+    repair_players,
+    repair_sides,
+    check_side_names,
+    cut_to_whole_lines,
 )
 from .providers import find_feed, load_tracking
-from .referees import described_referee, read_team_colours, referee_samples
+from .referees import describe_referee, read_team_colours, read_referee_samples
 
 RATES = (5.0, 100.0)
 """Smallest and largest sampling rate of a track, samples per second."""
 
 _BALL = ("ball_x_m", "ball_y_m", "ball_z_m")
 _CACHE_VERSION = 3
-_ARRAYS = ("times", "positions", "ball", "players", "pitch", "periods", "teams", "lines")
+_ARRAY_NAMES = ("times", "positions", "ball", "players", "pitch", "periods", "teams", "lines")
 
 
 def read_track_csv(path: str | os.PathLike) -> Track:
@@ -62,19 +62,19 @@ def read_track_csv(path: str | os.PathLike) -> Track:
     """
     rows = list(read_rows(path, ("time_s", "x_m", "y_m")))
     names = rows[0][1] if rows else {}
-    player = _cells(rows, ("time_s", "x_m", "y_m"))
+    player = _parse_cells(rows, ("time_s", "x_m", "y_m"))
     ball = np.full((len(rows), 3), np.nan)
     if "ball_x_m" in names and "ball_y_m" in names:
-        ball = _cells(rows, [name for name in _BALL if name in names])
+        ball = _parse_cells(rows, [name for name in _BALL if name in names])
         ball = np.pad(ball, ((0, 0), (0, 3 - ball.shape[1])), constant_values=np.nan)
     track = Track(player[:, 0], player[:, 1:], ball, name=Path(path).name)
     _check_rate(track, path)
     return track
 
 
-def _cells(rows, names) -> np.ndarray:
+def _parse_cells(rows, names) -> np.ndarray:
     """Parse some columns to (N, k) numbers, NaN for blank cells."""
-    cells = [[number(row[name], name, place, blank=True) for name in names] for place, row in rows]
+    cells = [[parse_number(row[name], name, place, blank=True) for name in names] for place, row in rows]
     return np.array(cells, dtype=float).reshape(len(rows), len(names))
 
 
@@ -107,94 +107,94 @@ def read_match(
         InputError: if files are missing, invalid or not of one match, or without kloppy.
     """
     feed, notes = find_feed(path, meta, provider)
-    cache = _cache_folder(cache_dir) / f"{_key(feed, pitch)}.npz"
-    arrays = _cached(cache)
+    cache = _choose_cache_folder(cache_dir) / f"{_compute_key(feed, pitch)}.npz"
+    arrays = _load_cache(cache)
     if arrays is None:
-        arrays = _read(feed, pitch)
-        _keep(cache, arrays, notes)
-    return _match(arrays, feed, notes)
+        arrays = _read_arrays(feed, pitch)
+        _save_cache(cache, arrays, notes)
+    return _build_match(arrays, feed, notes)
 
 
-def _read(feed: Feed, pitch: tuple[float, float] | None) -> dict[str, np.ndarray]:
+def _read_arrays(feed: Feed, pitch: tuple[float, float] | None) -> dict[str, np.ndarray]:
     """Read the match's arrays from its files; a file that ends within a line is read up to that line."""
     check_same_match(feed)
     size = pitch or match_arrays.USUAL_PITCH
     try:
-        return _arrays(load_tracking(feed, size), feed, pitch)
+        return _build_arrays(load_tracking(feed, size), feed, pitch)
     except InputError:
-        if not feed.by_lines or all(path.read_bytes()[-1:] == b"\n" for path in feed.tracking):
+        if not feed.is_line_based or all(path.read_bytes()[-1:] == b"\n" for path in feed.tracking):
             raise
-        with whole_lines(feed) as shorter:
+        with cut_to_whole_lines(feed) as whole_feed:
             try:
-                dataset = load_tracking(shorter, size)
+                dataset = load_tracking(whole_feed, size)
             except InputError:
                 dataset = None
         if dataset is None:
             raise
-    told = "the file ends within a line: it is read up to that line"
-    return _arrays(dataset, feed, pitch, [told])
+    note = "the file ends within a line: it is read up to that line"
+    return _build_arrays(dataset, feed, pitch, [note])
 
 
-def _arrays(dataset, feed: Feed, pitch: tuple[float, float] | None, lines=()) -> dict[str, np.ndarray]:
+def _build_arrays(dataset, feed: Feed, pitch: tuple[float, float] | None, lines=()) -> dict[str, np.ndarray]:
     """Build the named arrays of a match, which the cache stores."""
-    records = match_arrays.records_of(dataset)
+    records = match_arrays.list_records(dataset)
     lines = [*lines, *check_rows(feed), *check_periods(records, dataset, feed)]
-    players = match_arrays.tracked_players(records)
+    players = match_arrays.list_players(records)
     lines += check_players(players, dataset, feed)
-    times, periods = match_arrays.clock(records)
-    length, width, guessed = match_arrays.pitch_of(dataset, pitch, feed.provider.has_pitch_size)
-    metric = match_arrays.to_metres(dataset.metadata.coordinate_system, length, width, upward=feed.by_teams)
-    ball = match_arrays.ball_samples(records)
-    ball = np.concatenate([metric(ball[:, :2]), ball[:, 2:] * match_arrays.height_unit(dataset)], axis=1)
-    referees, places, of_referees = referee_samples(feed, np.array([frame.frame_id for frame in records]))
-    who = [*map(match_arrays.described, players), *map(described_referee, referees)]
-    positions = metric(np.concatenate([match_arrays.player_samples(records, players), places]))
-    positions, more = mended_players(times, positions, length, width, [one[0] for one in who])
-    ball, of_ball = mended_ball(ball, length, width)
-    spans, teams = [one[:2] for one in periods], [one[1] for one in who]
-    positions, ball, turned = mended_sides(times, positions, ball, spans, teams)
-    turned += side_lines(times, positions, spans, teams, [one[4] for one in who])
+    times, periods = match_arrays.build_clock(records)
+    length, width, is_default = match_arrays.find_pitch_size(dataset, pitch, feed.provider.has_pitch_size)
+    to_metres = match_arrays.build_metre_map(dataset.metadata.coordinate_system, length, width, upward=feed.has_team_files)
+    ball = match_arrays.build_ball_samples(records)
+    ball = np.concatenate([to_metres(ball[:, :2]), ball[:, 2:] * match_arrays.find_height_unit(dataset)], axis=1)
+    referees, places, referee_lines = read_referee_samples(feed, np.array([frame.frame_id for frame in records]))
+    people = [*map(match_arrays.describe_player, players), *map(describe_referee, referees)]
+    positions = to_metres(np.concatenate([match_arrays.build_player_samples(records, players), places]))
+    positions, player_lines = repair_players(times, positions, length, width, [one[0] for one in people])
+    ball, ball_lines = repair_ball(ball, length, width)
+    spans, teams = [one[:2] for one in periods], [one[1] for one in people]
+    positions, ball, side_messages = repair_sides(times, positions, ball, spans, teams)
+    side_messages += check_side_names(times, positions, spans, teams, [one[4] for one in people])
     return {
-        "times": times, "positions": positions, "ball": ball, "players": np.array(who, dtype=str).reshape(len(who), 5),
-        "pitch": np.array([length, width, guessed, float(dataset.metadata.frame_rate)]), "periods": np.array(periods),
-        "teams": np.array(_teams(dataset, feed), dtype=str).reshape(-1, 3),
-        "lines": np.array([*lines, *turned, *of_ball, *more, *of_referees], dtype=str),
+        "times": times, "positions": positions, "ball": ball, "players": np.array(people, dtype=str).reshape(len(people), 5),
+        "pitch": np.array([length, width, is_default, float(dataset.metadata.frame_rate)]), "periods": np.array(periods),
+        "teams": np.array(_list_teams(dataset, feed), dtype=str).reshape(-1, 3),
+        "lines": np.array([*lines, *side_messages, *ball_lines, *player_lines, *referee_lines], dtype=str),
     }
 
 
-def _teams(dataset, feed: Feed) -> list[tuple[str, str, str]]:
+def _list_teams(dataset, feed: Feed) -> list[tuple[str, str, str]]:
     """List ground, name and colour of the home and the away team."""
     colours = read_team_colours(feed)
     names = {str(team.ground): str(team.name or "") for team in dataset.metadata.teams}
     return [(ground, names.get(ground, ""), colours[ground]) for ground in ("home", "away")]
 
 
-def _match(arrays: dict[str, np.ndarray], feed: Feed, notes: list[str]) -> Match:
-    length, width, guessed, fps = arrays["pitch"].tolist()
-    notes = [*notes, f"no pitch size in the feed, {length:g} x {width:g} m assumed"] if guessed else notes
+def _build_match(arrays: dict[str, np.ndarray], feed: Feed, notes: list[str]) -> Match:
+    length, width, is_default, fps = arrays["pitch"].tolist()
+    notes = [*notes, f"no pitch size in the feed, {length:g} x {width:g} m assumed"] if is_default else notes
     players = tuple(
         MatchPlayer(id_, team, name, int(shirt), position)
         for id_, team, name, shirt, position in arrays["players"].tolist()
     )
     referees = (Team(REFEREE, "referees"),) if any(player.team == REFEREE for player in players) else ()
     match = Match(
-        times=frozen_array(arrays["times"]), players=players, positions=frozen_array(arrays["positions"]),
-        ball=frozen_array(arrays["ball"]), length=length, width=width, fps=fps, provider=feed.provider.name,
+        times=freeze_array(arrays["times"]), players=players, positions=freeze_array(arrays["positions"]),
+        ball=freeze_array(arrays["ball"]), length=length, width=width, fps=fps, provider=feed.provider.name,
         periods=tuple((start, end) for start, end, _, _ in arrays["periods"].tolist()), notes=tuple(notes),
         teams=(*(Team(*team) for team in arrays["teams"].tolist()), *referees),
-        passed=tuple((int(number), before) for _, _, number, before in arrays["periods"].tolist()),
+        elapsed=tuple((int(number), before) for _, _, number, before in arrays["periods"].tolist()),
     )
-    return replace(match, report=(*notes, *arrays["lines"].tolist(), *presence_lines(match)))
+    return replace(match, report=(*notes, *arrays["lines"].tolist(), *describe_presence(match)))
 
 
-def _cache_folder(folder: str | os.PathLike | None) -> Path:
+def _choose_cache_folder(folder: str | os.PathLike | None) -> Path:
     if folder is not None:
         return Path(folder)
     home = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
     return Path(home) / "beyond_mocap" / "tracking"
 
 
-def _key(feed: Feed, pitch: tuple[float, float] | None) -> str:
+def _compute_key(feed: Feed, pitch: tuple[float, float] | None) -> str:
     """Compute a key from the files' contents, independent of their names."""
     digest = hashlib.sha256(f"{_CACHE_VERSION} {feed.provider.name} {pitch}".encode())
     for file in (*feed.tracking, *feed.meta):
@@ -203,20 +203,20 @@ def _key(feed: Feed, pitch: tuple[float, float] | None) -> str:
     return digest.hexdigest()[:40]
 
 
-def _cached(cache: Path) -> dict[str, np.ndarray] | None:
+def _load_cache(cache: Path) -> dict[str, np.ndarray] | None:
     """Load the arrays from the cache; None if they are missing or damaged."""
     try:
-        with np.load(cache, allow_pickle=False) as kept:
-            arrays = {name: kept[name] for name in _ARRAYS}
+        with np.load(cache, allow_pickle=False) as stored:
+            arrays = {name: stored[name] for name in _ARRAY_NAMES}
     except Exception:  # zipfile, zlib and numpy raise many kinds of errors for damaged files
         return None
-    count, who = arrays["times"].size, arrays["players"].size // 5
-    shapes = {"times": (count,), "positions": (who, count, 2), "ball": (count, 3), "pitch": (4,), "players": (who, 5)}
+    count, player_count = arrays["times"].size, arrays["players"].size // 5
+    shapes = {"times": (count,), "positions": (player_count, count, 2), "ball": (count, 3), "pitch": (4,), "players": (player_count, 5)}
     fits = all(arrays[name].shape == shape for name, shape in shapes.items())
     return arrays if fits and arrays["periods"].shape[1:] == (4,) and arrays["teams"].shape[1:] == (3,) else None
 
 
-def _keep(cache: Path, arrays: dict[str, np.ndarray], notes: list[str]) -> None:
+def _save_cache(cache: Path, arrays: dict[str, np.ndarray], notes: list[str]) -> None:
     """Save the arrays to the cache; if the folder is not writable, add a note."""
     content = io.BytesIO()
     np.savez(content, **arrays)

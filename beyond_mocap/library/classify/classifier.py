@@ -18,31 +18,31 @@ from scipy.signal import find_peaks
 
 from ...annotation import LOCOMOTION, ClipAnnotation, swap_sides
 from ...base.errors import InputError
-from ...base.time_series import runs
+from ...base.time_series import find_runs
 from ...files.whole import atomic_write
 from ...motion.motion import Motion
 from ..word_sources import LEARNED, Proposal
 from .details import Details
 from .kernel import Kernel, compute_confidence
-from .signals import LENGTH, RATE, STRIKES, Signals, Space, signals, windows
+from .signals import LENGTH, RATE, STRIKES, Signals, Space, build_signals, build_windows
 
-LEAST = 0.2
+MIN_CONFIDENCE = 0.2
 """Moments of lower confidence are not proposed."""
 
-_APART = 0.35  # seconds between two moments of any acts: of two nearer ones the one of higher confidence counts
-_SHORTEST = 0.3  # least duration of a stretch, seconds
+_MIN_SEPARATION = 0.35  # seconds between two moments of any acts: of two nearer ones the one of higher confidence counts
+_MIN_SECONDS = 0.3  # least duration of a stretch, seconds
 NEAR = 0.15  # seconds within which a rule's moment and a candidate are the same
 _CANDIDATES_APART = 10  # samples between two candidates
 _STEADY = 9  # samples over which a stretch's score is averaged
-_NOTHING = 0.01  # seconds: shorter leads are within the accuracy of annotation
-_AROUND = 0.12  # seconds around a candidate in which its strike is searched
+_MIN_LEAD = 0.01  # seconds: shorter leads are within the accuracy of annotation
+_STRIKE_SEARCH = 0.12  # seconds around a candidate in which its strike is searched
 
 _FILE_VERSION = 1
 FILE_NAME = "learned_words.npz"
 """The file's name beside a library's cache."""
 
-_LARGEST = 256 * 1024 * 1024
-_NEXT = "learn from annotated clips again"
+_MAX_BYTES = 256 * 1024 * 1024
+_NEXT_STEP = "learn from annotated clips again"
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -66,20 +66,20 @@ class Act:
     moment: bool
     kernel: Kernel
     weights: np.ndarray
-    silent: float
-    shown: float
+    silence: float
+    example_amount: float
     strike: int
     lead: float
     before: float
     after: float
     details: Details
 
-    def told(self) -> str:
+    def describe(self) -> str:
         """Describe the act and what it was learned from."""
-        return f"{self.word}: {self.shown:.0f} moments" if self.moment else f"{self.word}: {self.shown:.1f} s"
+        return f"{self.word}: {self.example_amount:.0f} moments" if self.moment else f"{self.word}: {self.example_amount:.1f} s"
 
 
-def candidates(kernel: Kernel, rows: np.ndarray, seconds: np.ndarray, ruled: Sequence[Proposal], word: str):
+def find_candidates(kernel: Kernel, rows: np.ndarray, seconds: np.ndarray, ruled: Sequence[Proposal], word: str):
     """Find the samples at which an act may have its moment: peaks of the score, and moments of the rules without a peak
     near.
 
@@ -92,57 +92,57 @@ def candidates(kernel: Kernel, rows: np.ndarray, seconds: np.ndarray, ruled: Seq
     Returns:
         Samples (C,) and their scores (C,).
     """
-    score = smoothed(kernel.scores(rows))
+    score = smooth_score(kernel.compute_scores(rows))
     at = find_peaks(np.pad(score, 1, constant_values=-9.0), distance=_CANDIDATES_APART)[0] - 1
-    for time in rule_moments(ruled, word):
+    for time in list_rule_moments(ruled, word):
         if not np.any(np.abs(seconds[at] - time) <= NEAR):
             at = np.append(at, np.argmin(np.abs(seconds - time)))
     return np.sort(at), score[np.sort(at)]
 
 
-def smoothed(score: np.ndarray) -> np.ndarray:
+def smooth_score(score: np.ndarray) -> np.ndarray:
     """Smooth a score (N,) so that single samples do not count."""
     padded = np.pad(score, 1, mode="edge")
     return 0.25 * padded[:-2] + 0.5 * padded[1:-1] + 0.25 * padded[2:]
 
 
-def steady(score: np.ndarray) -> np.ndarray:
+def average_score(score: np.ndarray) -> np.ndarray:
     """Average a stretch's score (N,) over a third of a second."""
     return uniform_filter1d(score, _STEADY, mode="nearest") if len(score) else score
 
 
-def rule_moments(ruled: Sequence[Proposal], word: str) -> list[float]:
+def list_rule_moments(ruled: Sequence[Proposal], word: str) -> list[float]:
     """List the seconds of the rules' key moments of an act; `ruled` in seconds (`convert_to_seconds`)."""
     return [one.annotation.key for one in ruled if one.annotation.key is not None and word in one.annotation.words]
 
 
-def rule_at(ruled: Sequence[Proposal], word: str, moment: bool, time: float) -> Proposal | None:
+def find_rule_proposal(ruled: Sequence[Proposal], word: str, moment: bool, time: float) -> Proposal | None:
     """Find the rules' proposal of an act at a time in seconds, of highest confidence; None where there is none."""
-    there = [one for one in ruled if word in one.annotation.words and (one.annotation.key is not None) == moment]
+    matches = [one for one in ruled if word in one.annotation.words and (one.annotation.key is not None) == moment]
     if moment:
-        there = [one for one in there if abs(one.annotation.key - time) <= NEAR]
+        matches = [one for one in matches if abs(one.annotation.key - time) <= NEAR]
     else:
-        there = [one for one in there if one.annotation.start <= time <= one.annotation.end]
-    return max(there, key=lambda one: one.confidence, default=None)
+        matches = [one for one in matches if one.annotation.start <= time <= one.annotation.end]
+    return max(matches, key=lambda one: one.confidence, default=None)
 
 
-def rule_sure(ruled: Sequence[Proposal], word: str, moment: bool, seconds: np.ndarray, silent: float) -> np.ndarray:
+def collect_rule_confidences(ruled: Sequence[Proposal], word: str, moment: bool, seconds: np.ndarray, silent: float) -> np.ndarray:
     """Collect the rules' confidences (N,) at each of the times, `silent` where they propose nothing."""
-    found = (rule_at(ruled, word, moment, time) for time in seconds)
+    found = (find_rule_proposal(ruled, word, moment, time) for time in seconds)
     return np.array([silent if one is None else one.confidence for one in found])
 
 
-def struck(signals: Signals, strike: int, time: float) -> float:
+def find_strike_time(signals: Signals, strike: int, time: float) -> float:
     """Find the second of the strike's peak within a few frames of a time; the time itself where there is none."""
     fps = signals.fps
-    first = max(0, int(np.ceil((time - _AROUND) * fps)))
-    part = signals.strikes[first : int((time + _AROUND) * fps) + 1, strike]
+    first = max(0, int(np.ceil((time - _STRIKE_SEARCH) * fps)))
+    part = signals.strikes[first : int((time + _STRIKE_SEARCH) * fps) + 1, strike]
     if strike < 0 or len(part) < 3:
         return time
     return (first + int(np.argmax(part))) / fps
 
 
-def strike_of(signals: Sequence[tuple[Signals, float]]) -> tuple[int, float]:
+def select_strike(signals: Sequence[tuple[Signals, float]]) -> tuple[int, float]:
     """Select the strike that peaks most consistently near the key moments of an act.
 
     Args:
@@ -152,17 +152,17 @@ def strike_of(signals: Sequence[tuple[Signals, float]]) -> tuple[int, float]:
     """
     best = (2.0 / RATE, -1, 0.0)
     for strike in range(len(STRIKES)):
-        late = np.array([time - struck(one, strike, time) for one, time in signals])
-        lead = float(np.median(late))
-        lead = lead if abs(lead) > _NOTHING else 0.0
-        off = float(np.mean(np.abs(late - lead)))
-        best = min(best, (off, strike, lead))
+        delays = np.array([time - find_strike_time(one, strike, time) for one, time in signals])
+        lead = float(np.median(delays))
+        lead = lead if abs(lead) > _MIN_LEAD else 0.0
+        deviation = float(np.mean(np.abs(delays - lead)))
+        best = min(best, (deviation, strike, lead))
     return best[1], best[2]
 
 
-def in_space(signals: Signals, space: Space) -> np.ndarray:
+def project_signals(signals: Signals, space: Space) -> np.ndarray:
     """Project the windows of signals: (N, K)."""
-    return space.within(windows(signals))
+    return space.project(build_windows(signals))
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,12 +179,12 @@ class Classifier:
     acts: tuple[Act, ...]
     clips: int
 
-    def told(self) -> tuple[str, ...]:
+    def describe(self) -> tuple[str, ...]:
         """Describe what it has learned, one line each."""
         first = f"learned from {self.clips} {'clip' if self.clips == 1 else 'clips'}"
-        return (first, *(act.told() for act in self.acts))
+        return (first, *(act.describe() for act in self.acts))
 
-    def propose(self, motion: Motion, ruled: Sequence[Proposal]) -> tuple[Proposal, ...]:
+    def propose_labels(self, motion: Motion, ruled: Sequence[Proposal]) -> tuple[Proposal, ...]:
         """Propose labels for a recording.
 
         Args:
@@ -196,19 +196,19 @@ class Classifier:
         Raises:
             InputError: if the skeleton has no legs.
         """
-        seen = signals(motion)
-        rows, seconds = in_space(seen, self.space), seen.frames / seen.fps
-        told = in_seconds(ruled, seen.fps)
-        moments = [one for act in self.acts if act.moment for one in _moments(act, seen, rows, seconds, told)]
-        stretches = [one for act in self.acts if not act.moment for one in _stretches(act, seen, rows, seconds, told)]
+        seen = build_signals(motion)
+        rows, seconds = project_signals(seen, self.space), seen.frames / seen.fps
+        rule_proposals = convert_to_seconds(ruled, seen.fps)
+        moments = [one for act in self.acts if act.moment for one in _propose_moments(act, seen, rows, seconds, rule_proposals)]
+        stretches = [one for act in self.acts if not act.moment for one in _propose_stretches(act, seen, rows, seconds, rule_proposals)]
         own = {(act.word, act.moment) for act in self.acts}
         rest = [one for one in ruled if not any(
             (word, one.annotation.key is not None) in own for word in one.annotation.words)]
-        found = [*_surest(moments, seen.fps), *stretches, *rest]
+        found = [*_select_surest(moments, seen.fps), *stretches, *rest]
         return tuple(sorted(found, key=lambda one: (one.annotation.start, one.annotation.end)))
 
 
-def in_seconds(ruled: Sequence[Proposal], fps: float, mirrored: bool = False) -> tuple[Proposal, ...]:
+def convert_to_seconds(ruled: Sequence[Proposal], fps: float, mirrored: bool = False) -> tuple[Proposal, ...]:
     """Convert proposals' rows from frames to seconds; of the mirrored body if requested."""
     out = []
     for one in ruled:
@@ -219,41 +219,41 @@ def in_seconds(ruled: Sequence[Proposal], fps: float, mirrored: bool = False) ->
     return tuple(out)
 
 
-def _moments(act: Act, seen: Signals, rows, seconds, told) -> list[Proposal]:
+def _propose_moments(act: Act, seen: Signals, rows, seconds, rule_proposals) -> list[Proposal]:
     """Propose the key moments of one act."""
-    at, score = candidates(act.kernel, rows, seconds, told, act.word)
-    sure = compute_confidence(act.weights, score, rule_sure(told, act.word, True, seconds[at], act.silent))
-    likely = [(sample, float(how)) for sample, how in zip(at, sure) if how >= LEAST]
-    return [_moment(act, seen, rows, seconds=seconds, told=told, sample=sample, sure=how) for sample, how in likely]
+    at, score = find_candidates(act.kernel, rows, seconds, rule_proposals, act.word)
+    confidences = compute_confidence(act.weights, score, collect_rule_confidences(rule_proposals, act.word, True, seconds[at], act.silence))
+    likely = [(sample, float(confidence)) for sample, confidence in zip(at, confidences) if confidence >= MIN_CONFIDENCE]
+    return [_build_moment(act, seen, rows, seconds=seconds, rule_proposals=rule_proposals, sample=sample, confidence=confidence) for sample, confidence in likely]
 
 
-def _moment(act: Act, seen: Signals, rows, seconds, told, sample: int, sure: float) -> Proposal:
+def _build_moment(act: Act, seen: Signals, rows, seconds, rule_proposals, sample: int, confidence: float) -> Proposal:
     """Build one moment: its frame from the strike near the candidate, its labels from the windows there."""
-    rule = rule_at(told, act.word, True, float(seconds[sample]))
-    key = struck(seen, act.strike, float(seconds[sample])) + act.lead
-    there = np.clip(np.round(key * RATE).astype(int) + np.arange(-1, 2), 0, len(rows) - 1)
-    words = (act.word, *act.details.said(rows[there], rule))
-    row = _row(seen, key - act.before, key + act.after, key, words)
-    return Proposal(row, sure, f"similar to the examples; {rule.why}" if rule else "similar to the examples", LEARNED)
+    rule = find_rule_proposal(rule_proposals, act.word, True, float(seconds[sample]))
+    key = find_strike_time(seen, act.strike, float(seconds[sample])) + act.lead
+    samples = np.clip(np.round(key * RATE).astype(int) + np.arange(-1, 2), 0, len(rows) - 1)
+    words = (act.word, *act.details.choose_labels(rows[samples], rule))
+    row = _build_row(seen, key - act.before, key + act.after, key, words)
+    return Proposal(row, confidence, f"similar to the examples; {rule.why}" if rule else "similar to the examples", LEARNED)
 
 
-def _stretches(act: Act, seen: Signals, rows, seconds, told) -> list[Proposal]:
+def _propose_stretches(act: Act, seen: Signals, rows, seconds, rule_proposals) -> list[Proposal]:
     """Propose the stretches of one act."""
-    score = steady(act.kernel.scores(rows))
-    rule = rule_sure(told, act.word, False, seconds, act.silent)
-    sure = compute_confidence(act.weights, score, rule)
+    score = average_score(act.kernel.compute_scores(rows))
+    rule = collect_rule_confidences(rule_proposals, act.word, False, seconds, act.silence)
+    confidences = compute_confidence(act.weights, score, rule)
     out = []
-    for start, stop in runs(sure >= 0.5):
-        if stop - start >= _SHORTEST * RATE:
-            heard = rule_at(told, act.word, False, float(seconds[(start + stop) // 2]))
-            said = act.details.said(rows[start:stop], heard)
-            words = (act.word, *(word for word in said if word not in LOCOMOTION))
-            row = _row(seen, seconds[start], seconds[stop - 1], None, words)
-            out.append(Proposal(row, float(sure[start:stop].mean()), "similar to the examples", LEARNED))
+    for start, stop in find_runs(confidences >= 0.5):
+        if stop - start >= _MIN_SECONDS * RATE:
+            rule_proposal = find_rule_proposal(rule_proposals, act.word, False, float(seconds[(start + stop) // 2]))
+            labels = act.details.choose_labels(rows[start:stop], rule_proposal)
+            words = (act.word, *(word for word in labels if word not in LOCOMOTION))
+            row = _build_row(seen, seconds[start], seconds[stop - 1], None, words)
+            out.append(Proposal(row, float(confidences[start:stop].mean()), "similar to the examples", LEARNED))
     return out
 
 
-def _row(seen: Signals, start: float, end: float, key: float | None, words) -> ClipAnnotation:
+def _build_row(seen: Signals, start: float, end: float, key: float | None, words) -> ClipAnnotation:
     """Build a row in frames of the recording from seconds, cut to it."""
     last = seen.count - 1
     first, final = (int(np.clip(round(time * seen.fps), 0, last)) for time in (start, end))
@@ -261,13 +261,13 @@ def _row(seen: Signals, start: float, end: float, key: float | None, words) -> C
     return ClipAnnotation(first, final, frame, tuple(words))
 
 
-def _surest(found: list[Proposal], fps: float) -> list[Proposal]:
+def _select_surest(found: list[Proposal], fps: float) -> list[Proposal]:
     """Select, of moments that are too near to each other, the ones of highest confidence."""
-    kept: list[Proposal] = []
+    selected: list[Proposal] = []
     for one in sorted(found, key=lambda one: -one.confidence):
-        if all(abs(one.annotation.key - other.annotation.key) > _APART * fps for other in kept):
-            kept.append(one)
-    return kept
+        if all(abs(one.annotation.key - other.annotation.key) > _MIN_SEPARATION * fps for other in selected):
+            selected.append(one)
+    return selected
 
 
 def write_classifier(path: str | os.PathLike, known: Classifier) -> None:
@@ -289,8 +289,8 @@ def read_classifier(path: str | os.PathLike) -> Classifier:
     """Read a classifier; InputError where the file is missing, damaged, or of another version."""
     path = Path(path)
     try:
-        if path.stat().st_size > _LARGEST:
-            raise InputError(path, "more than 256 MiB", "a file of learned labels", _NEXT)
+        if path.stat().st_size > _MAX_BYTES:
+            raise InputError(path, "more than 256 MiB", "a file of learned labels", _NEXT_STEP)
         with np.load(path, allow_pickle=False) as stored:
             arrays = {name: stored[name] for name in stored.files}
         header = json.loads(arrays["header"].tobytes())
@@ -298,23 +298,23 @@ def read_classifier(path: str | os.PathLike) -> Classifier:
     except InputError:
         raise
     except FileNotFoundError:
-        raise InputError(path, "no such file", "a file of learned labels", _NEXT) from None
+        raise InputError(path, "no such file", "a file of learned labels", _NEXT_STEP) from None
     except Exception:  # a damaged file can raise any of zipfile's, numpy's and json's exceptions
-        raise InputError(path, "a file that cannot be read", "a file of learned labels", _NEXT) from None
+        raise InputError(path, "a file that cannot be read", "a file of learned labels", _NEXT_STEP) from None
     if version != _FILE_VERSION:
-        raise InputError(path, f"version {version!r}", f"version {_FILE_VERSION}", _NEXT)
+        raise InputError(path, f"version {version!r}", f"version {_FILE_VERSION}", _NEXT_STEP)
     try:
         return _restore_classifier(header, arrays)
     except (LookupError, TypeError, ValueError, AttributeError, OverflowError):
-        raise InputError(path, "inconsistent or invalid numbers", "a file of learned labels", _NEXT) from None
+        raise InputError(path, "inconsistent or invalid numbers", "a file of learned labels", _NEXT_STEP) from None
 
 
 def _describe_act(act: Act) -> dict:
     return {
         "word": act.word, "moment": act.moment, "shift": act.kernel.shift, "gamma": act.kernel.gamma,
-        "silent": act.silent, "shown": act.shown, "strike": act.strike, "lead": act.lead,
+        "silent": act.silence, "shown": act.example_amount, "strike": act.strike, "lead": act.lead,
         "before": act.before, "after": act.after,
-        "choices": act.details.choices, "by_rule": act.details.by_rule,
+        "choices": act.details.choices, "by_rule": act.details.rules_first,
     }
 
 
@@ -346,8 +346,8 @@ def _restore_act(number: int, header: dict, arrays: dict, components: int) -> Ac
         raise ValueError("header")
     before, after = (_check_number(header[name], least=0.0) for name in ("before", "after"))
     return Act(word=_check_word(header["word"]), moment=bool(header["moment"]), kernel=kernel,
-               weights=_check_array(arrays, f"{number}.sure", (3,)), silent=_check_number(header["silent"]),
-               shown=_check_number(header["shown"]), strike=strike, lead=_check_number(header["lead"]), before=before,
+               weights=_check_array(arrays, f"{number}.sure", (3,)), silence=_check_number(header["silent"]),
+               example_amount=_check_number(header["shown"]), strike=strike, lead=_check_number(header["lead"]), before=before,
                after=after, details=Details(choices, planes, by_rule))
 
 

@@ -36,9 +36,9 @@ class Details:
 
     choices: tuple[tuple[str, ...], ...]
     planes: tuple[np.ndarray, ...]
-    by_rule: tuple[bool, ...]
+    rules_first: tuple[bool, ...]
 
-    def said(self, rows: np.ndarray, rule: Proposal | None) -> tuple[str, ...]:
+    def choose_labels(self, rows: np.ndarray, rule: Proposal | None) -> tuple[str, ...]:
         """Choose the labels for one act.
 
         Args:
@@ -47,12 +47,12 @@ class Details:
         Returns:
             The labels.
         """
-        mean = _told(rows).mean(axis=0)
-        found = []
-        for group, plane, asked in zip(self.choices, self.planes, self.by_rule):
-            ruled = value_of(rule.annotation.words, _whole(group)) if rule is not None and asked else ""
-            found.append(ruled or group[int(np.argmax(plane @ mean))])
-        return tuple(word for word in found if word)
+        mean = _append_constant(rows).mean(axis=0)
+        labels = []
+        for group, plane, rules_first in zip(self.choices, self.planes, self.rules_first):
+            ruled = find_in_group(rule.annotation.words, _find_group(group)) if rule is not None and rules_first else ""
+            labels.append(ruled or group[int(np.argmax(plane @ mean))])
+        return tuple(word for word in labels if word)
 
 
 def fit_details(
@@ -68,59 +68,59 @@ def fit_details(
     Returns:
         The details.
     """
-    told = _told(rows)
+    features = _append_constant(rows)
     choices, planes, by_rule = [], [], []
-    for group in [*EXCLUSIVE, *((word,) for word in _others(words))]:
-        named = np.array([value_of(one, group) for one in words])
-        kinds = tuple(sorted(set(named.tolist())))
+    for group in [*EXCLUSIVE, *((word,) for word in _list_other_labels(words))]:
+        examples = np.array([find_in_group(one, group) for one in words])
+        kinds = tuple(sorted(set(examples.tolist())))
         if kinds != ("",):
-            heard = np.array([value_of(one.annotation.words, group) if one is not None else "" for one in ruled])
+            from_rules = np.array([find_in_group(one.annotation.words, group) if one is not None else "" for one in ruled])
             choices.append(kinds)
-            planes.append(_plane(told, named, kinds))
-            by_rule.append(bool(np.any(heard != "")) and not _beaten(told, named, heard, clip))
+            planes.append(_fit_plane(features, examples, kinds))
+            by_rule.append(bool(np.any(from_rules != "")) and not _beats_rules(features, examples, from_rules, clip))
     return Details(tuple(choices), tuple(planes), tuple(by_rule))
 
 
-def value_of(words: Iterable[str], group: Sequence[str]) -> str:
+def find_in_group(words: Iterable[str], group: Sequence[str]) -> str:
     """Find the first of `words` in a group, "" if there is none: in "kick right low left" the foot is the right one."""
     return next((word for word in words if word in group), "")
 
 
-def _whole(kinds: tuple[str, ...]) -> tuple[str, ...]:
+def _find_group(kinds: tuple[str, ...]) -> tuple[str, ...]:
     """Find all labels that exclude those of a group, also those that no example has."""
     return next((group for group in EXCLUSIVE if set(group) & set(kinds)), kinds)
 
 
-def _others(words: Sequence[tuple[str, ...]]) -> list[str]:
+def _list_other_labels(words: Sequence[tuple[str, ...]]) -> list[str]:
     """List the labels outside all groups."""
     known = {word for group in EXCLUSIVE for word in group}
     return sorted({word for one in words for word in one} - known)
 
 
-def _told(rows: np.ndarray) -> np.ndarray:
+def _append_constant(rows: np.ndarray) -> np.ndarray:
     """Scale windows and append 1: (N, K + 1)."""
     return np.append(rows * _SPREAD, np.ones((len(rows), 1)), axis=1)
 
 
-def _plane(told: np.ndarray, named: np.ndarray, kinds: tuple[str, ...]) -> np.ndarray:
+def _fit_plane(features: np.ndarray, examples: np.ndarray, kinds: tuple[str, ...]) -> np.ndarray:
     """Fit the scores of each kind: (C, K + 1)."""
     from sklearn.linear_model import LogisticRegression
 
     if len(kinds) == 1:
-        return np.zeros((1, told.shape[1]))
-    line = LogisticRegression(C=_PENALTY, class_weight="balanced", max_iter=300).fit(told[:, :-1], named)
+        return np.zeros((1, features.shape[1]))
+    line = LogisticRegression(C=_PENALTY, class_weight="balanced", max_iter=300).fit(features[:, :-1], examples)
     plane = np.concatenate([line.coef_, line.intercept_[:, None]], axis=1)
     return plane if len(kinds) > 2 else np.concatenate([-0.5 * plane, 0.5 * plane])
 
 
-def _beaten(told: np.ndarray, named: np.ndarray, heard: np.ndarray, clip: np.ndarray) -> bool:
+def _beats_rules(features: np.ndarray, examples: np.ndarray, from_rules: np.ndarray, clip: np.ndarray) -> bool:
     """Whether a plane labels examples of unseen clips better than the rules do."""
-    right = []
+    is_correct = []
     for fold in range(_FOLDS):
         out = clip % _FOLDS == fold
-        kinds = tuple(sorted(set(named[~out].tolist())))
+        kinds = tuple(sorted(set(examples[~out].tolist())))
         if np.any(out) and kinds:
-            plane = _plane(told[~out], named[~out], kinds)
-            right.append(np.array(kinds)[np.argmax(told[out] @ plane.T, axis=1)] == named[out])
-    ours = float(np.mean(np.concatenate(right))) if right else 0.0
-    return ours > float(np.mean(heard == named)) + _BETTER
+            plane = _fit_plane(features[~out], examples[~out], kinds)
+            is_correct.append(np.array(kinds)[np.argmax(features[out] @ plane.T, axis=1)] == examples[out])
+    ours = float(np.mean(np.concatenate(is_correct))) if is_correct else 0.0
+    return ours > float(np.mean(from_rules == examples)) + _BETTER

@@ -8,16 +8,16 @@ from pathlib import Path
 
 import numpy as np
 
-from ...annotation import LOCOMOTION, VOCABULARY, ClipAnnotation, spoken
+from ...annotation import LOCOMOTION, VOCABULARY, ClipAnnotation, sort_labels
 from ...annotation.labels import list_labels
-from ...base.errors import Cancelled, InputError
-from ...motion.humanoid import identify
+from ...base.errors import UserCancelledError, InputError
+from ...motion.humanoid import identify_joints
 from ...motion.motion import Motion
-from ..proposals import GAITS, propose
-from ..word_sources import Proposal, is_open
-from .signals import Signals, signals
+from ..proposals import GAITS, propose_labels
+from ..word_sources import Proposal, is_unreviewed
+from .signals import Signals, build_signals
 
-_COLOURS = frozenset((*LOCOMOTION, *VOCABULARY["modifier"], *list_labels(group="height")))
+_MODIFIERS = frozenset((*LOCOMOTION, *VOCABULARY["modifier"], *list_labels(group="height")))
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,31 +34,31 @@ class Example:
     name: str
     signals: Signals
     rows: tuple[ClipAnnotation, ...]
-    ruled: tuple[Proposal, ...]
+    rule_proposals: tuple[Proposal, ...]
 
     @classmethod
-    def of(cls, name: str, motion: Motion, rows: Sequence[ClipAnnotation], gaits=GAITS) -> "Example":
+    def from_clip(cls, name: str, motion: Motion, rows: Sequence[ClipAnnotation], gaits=GAITS) -> "Example":
         """Build an example from a motion and its rows; InputError where the skeleton has no legs."""
-        return cls(name, signals(motion), tuple(rows), propose(motion, gaits))
+        return cls(name, build_signals(motion), tuple(rows), propose_labels(motion, gaits))
 
-    def rows_of(self, act: str, moment: bool) -> list[ClipAnnotation]:
+    def select_rows(self, act: str, moment: bool) -> list[ClipAnnotation]:
         """Select the rows of one act that have a key moment, or that have none."""
-        return [row for row in self.rows if act_of(row) == act and (row.key is not None) == moment]
+        return [row for row in self.rows if find_act(row) == act and (row.key is not None) == moment]
 
-    def seconds(self) -> np.ndarray:
+    def list_sample_times(self) -> np.ndarray:
         """List the times (N,) in seconds of the signals' samples."""
         return self.signals.frames / self.signals.fps
 
 
-def act_of(row: ClipAnnotation) -> str:
+def find_act(row: ClipAnnotation) -> str:
     """Find the act of a row: the first of its labels as spoken that is no modifier; "" where it only describes
     locomotion.
     """
-    return next((word for word in spoken(row.words) if word not in _COLOURS), "")
+    return next((word for word in sort_labels(row.words) if word not in _MODIFIERS), "")
 
 
-def examples_of(
-    folder: str | Path, unit: float | None = None, progress=None, cache_dir=None, cancelled=None, note=None
+def read_examples(
+    folder: str | Path, unit: float | None = None, progress=None, cache_dir=None, cancelled=None, on_note=None
 ) -> tuple[Example, ...]:
     """Read the annotated clips below a library's folder, in its order.
 
@@ -77,26 +77,26 @@ def examples_of(
         InputError: if no clip has labels, a file cannot be read or has no legs.
         Cancelled: if `cancelled` returns True.
     """
-    clips = _Clips(folder, cache_dir)
-    read = clips.read(True, unit, progress, cancelled)
-    out = tuple(Example.of(name, motion, rows) for name, motion, rows in read)
+    clips = _ClipReader(folder, cache_dir)
+    read = clips.iter_clips(True, unit, progress, cancelled)
+    out = tuple(Example.from_clip(name, motion, rows) for name, motion, rows in read)
     if not out:
-        found = "no clip with labels" + (f" ({clips.told()})" if clips.open else "")
+        found = "no clip with labels" + (f" ({clips.describe_unreviewed()})" if clips.unreviewed_count else "")
         raise InputError(folder, found, "some ten annotated clips", "annotate a few clips, then learn")
-    if clips.open and note is not None:
-        note(clips.told())
+    if clips.unreviewed_count and on_note is not None:
+        on_note(clips.describe_unreviewed())
     return out
 
 
-def without_words(
+def iter_unlabelled_clips(
     folder: str | Path, unit: float | None = None, progress=None, cache_dir=None, cancelled=None
 ) -> Iterator[tuple[str, Motion]]:
     """Iterate over the clips without labels: path below the folder, and motion. Arguments as `read_examples`."""
-    for name, motion, _ in _Clips(folder, cache_dir).read(False, unit, progress, cancelled):
+    for name, motion, _ in _ClipReader(folder, cache_dir).iter_clips(False, unit, progress, cancelled):
         yield name, motion
 
 
-class _Clips:
+class _ClipReader:
     """A library's recordings and their annotations.
 
     Attributes:
@@ -105,38 +105,38 @@ class _Clips:
 
     def __init__(self, folder: str | Path, cache_dir):
         from .. import cache
-        from ..scan import Annotations, readable_clips
+        from ..scan import Annotations, find_readable_clips
 
-        self._folder, self.open = Path(folder), 0
-        place = cache.place(self._folder, cache_dir)[0]
-        self._paths, self._conversions, _ = readable_clips(self._folder, place)
-        self._said = Annotations(self._folder, self._paths, self._is_open)
+        self._folder, self.unreviewed_count = Path(folder), 0
+        place = cache.find_cache_folder(self._folder, cache_dir)[0]
+        self._paths, self._conversions, _ = find_readable_clips(self._folder, place)
+        self._annotations = Annotations(self._folder, self._paths, self._skip_unreviewed)
 
-    def _is_open(self, row) -> bool:
-        self.open += is_open(row)
-        return is_open(row)
+    def _skip_unreviewed(self, row) -> bool:
+        self.unreviewed_count += is_unreviewed(row)
+        return is_unreviewed(row)
 
-    def told(self) -> str:
+    def describe_unreviewed(self) -> str:
         """Describe how many rows are left out."""
-        what = "1 proposed row is" if self.open == 1 else f"{self.open} proposed rows are"
-        return f"{what} not used until you accept {'it' if self.open == 1 else 'them'}"
+        what = "1 proposed row is" if self.unreviewed_count == 1 else f"{self.unreviewed_count} proposed rows are"
+        return f"{what} not used until you accept {'it' if self.unreviewed_count == 1 else 'them'}"
 
-    def read(self, worded: bool, unit, progress, cancelled) -> Iterator[tuple]:
+    def iter_clips(self, has_labels: bool, unit, progress, cancelled) -> Iterator[tuple]:
         """Iterate over (path below the folder, motion, rows) of all clips that have labels, or of those that have none.
         """
         from ...files.bvh import bvh
 
         for number, path in enumerate(self._paths):
-            file = self._conversions.readable(path)
+            file = self._conversions.find_readable_file(path)
             if cancelled is not None and cancelled():
-                raise Cancelled("reading clips: cancelled")
+                raise UserCancelledError("reading clips: cancelled")
             if progress is not None:
                 progress(number / len(self._paths), f"Reading {path.name}")
-            if bool(self._said.of(path, 30.0)) != worded:
+            if bool(self._annotations.read_rows(path, 30.0)) != has_labels:
                 continue
-            motion = bvh.read(file, unit if file == path else None).motion
+            motion = bvh.read_bvh(file, unit if file == path else None).motion
             try:
-                identify(motion.skeleton)
+                identify_joints(motion.skeleton)
             except InputError as error:  # a skeleton does not know its file
                 raise InputError(path, str(error)) from None
-            yield path.relative_to(self._folder).as_posix(), motion, self._said.of(path, motion.fps)
+            yield path.relative_to(self._folder).as_posix(), motion, self._annotations.read_rows(path, motion.fps)

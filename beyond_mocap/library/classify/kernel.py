@@ -17,9 +17,9 @@ from dataclasses import dataclass
 import numpy as np
 
 _WIDTH, _PENALTY = 0.3, 3.0  # gamma times the windows' total variance; C
-_AT_ONCE = 2048
-_KNOWN = 0.25  # kernel value of the nearest support from which on a window counts as known
-LIMIT = 1.5
+_BLOCK = 2048
+_KNOWN_SIMILARITY = 0.25  # kernel value of the nearest support from which on a window counts as known
+MAX_SCORE = 1.5
 """Scores are clipped at this value: beyond it they carry no information."""
 
 PRIOR = {True: (5.0, 2.5, 1.3), False: (5.0, 0.0, 1.0)}
@@ -48,18 +48,18 @@ class Kernel:
     shift: float
     gamma: float
 
-    def scores(self, rows: np.ndarray) -> np.ndarray:
+    def compute_scores(self, rows: np.ndarray) -> np.ndarray:
         """Compute the scores (N,) of windows in their space (N, K), about 1 for the act and -1 for anything else."""
         supports = self.supports.astype(float)
         squares = np.sum(supports**2, axis=1)
         out = []
-        for first in range(0, len(rows), _AT_ONCE):
-            part = rows[first : first + _AT_ONCE]
-            apart = np.sum(part**2, axis=1)[:, None] + squares - 2.0 * part @ supports.T
-            alike = np.exp(-self.gamma * np.maximum(apart, 0.0))
-            known = np.minimum(alike.max(axis=1) / _KNOWN, 1.0)
-            out.append(known * (alike @ self.weights + self.shift) + known - 1.0)
-        return np.clip(np.concatenate(out), -LIMIT, LIMIT) if out else np.zeros(0)
+        for first in range(0, len(rows), _BLOCK):
+            part = rows[first : first + _BLOCK]
+            squared_distances = np.sum(part**2, axis=1)[:, None] + squares - 2.0 * part @ supports.T
+            similarity = np.exp(-self.gamma * np.maximum(squared_distances, 0.0))
+            known = np.minimum(similarity.max(axis=1) / _KNOWN_SIMILARITY, 1.0)
+            out.append(known * (similarity @ self.weights + self.shift) + known - 1.0)
+        return np.clip(np.concatenate(out), -MAX_SCORE, MAX_SCORE) if out else np.zeros(0)
 
 
 def fit_kernel(rows: np.ndarray, is_act: np.ndarray) -> Kernel:
@@ -74,11 +74,11 @@ def fit_kernel(rows: np.ndarray, is_act: np.ndarray) -> Kernel:
 
 def compute_confidence(weights: np.ndarray, score: np.ndarray, rule: np.ndarray) -> np.ndarray:
     """Compute probabilities (N,) from scores (N,) and the rules' confidences (N,)."""
-    told = weights[0] * score + weights[1] * rule + weights[2]
-    return 1.0 / (1.0 + np.exp(-np.clip(told, -40.0, 40.0)))
+    logit = weights[0] * score + weights[1] * rule + weights[2]
+    return 1.0 / (1.0 + np.exp(-np.clip(logit, -40.0, 40.0)))
 
 
-def weigh_silence(found: int, shown: int) -> float:
+def estimate_silence_weight(found: int, total: int) -> float:
     """Estimate how much it counts against an act that the rules propose none.
 
     Half of -log of the rules' share of misses, by Laplace's estimate: 1 where they have found all examples, near 0
@@ -91,10 +91,10 @@ def weigh_silence(found: int, shown: int) -> float:
     Returns:
         The weight, at most 1.
     """
-    return float(min(1.0, -0.5 * np.log((shown - found + 1.0) / (shown + 2.0))))
+    return float(min(1.0, -0.5 * np.log((total - found + 1.0) / (total + 2.0))))
 
 
-def fit_confidence(score: np.ndarray, rule: np.ndarray, is_act: np.ndarray, ruled: bool) -> np.ndarray:
+def fit_confidence(score: np.ndarray, rule: np.ndarray, is_act: np.ndarray, has_rules: bool) -> np.ndarray:
     """Fit the weights of the confidence to candidates that the scores had not seen.
 
     Args:
@@ -108,15 +108,15 @@ def fit_confidence(score: np.ndarray, rule: np.ndarray, is_act: np.ndarray, rule
     """
     from scipy.optimize import minimize
 
-    start = np.array(PRIOR[ruled])
-    rows = np.stack([score, rule if ruled else np.zeros_like(rule), np.ones_like(score)], axis=1)
+    start = np.array(PRIOR[has_rules])
+    rows = np.stack([score, rule if has_rules else np.zeros_like(rule), np.ones_like(score)], axis=1)
     yes = int(np.sum(is_act))
     target = np.where(is_act, (yes + 1.0) / (yes + 2.0), 1.0 / (len(is_act) - yes + 2.0))
 
     def loss(weights):
-        told = rows @ weights
-        off = (weights - start) / _PRIOR_SPREAD
-        slope = rows.T @ (1.0 / (1.0 + np.exp(-told)) - target) + off / _PRIOR_SPREAD
-        return float(np.sum(np.logaddexp(0.0, told) - target * told) + 0.5 * off @ off), slope
+        logit = rows @ weights
+        deviation = (weights - start) / _PRIOR_SPREAD
+        slope = rows.T @ (1.0 / (1.0 + np.exp(-logit)) - target) + deviation / _PRIOR_SPREAD
+        return float(np.sum(np.logaddexp(0.0, logit) - target * logit) + 0.5 * deviation @ deviation), slope
 
     return minimize(loss, start, jac=True).x

@@ -14,9 +14,9 @@ from scipy.ndimage import gaussian_filter1d
 
 from ...base.vectors import unit_vectors
 from ...motion import contacts
-from ...motion.humanoid import Humanoid, heading_from_positions, identify, leg_length
+from ...motion.humanoid import Humanoid, compute_heading_from_positions, identify_joints, measure_leg_length
 from ...motion.motion import Motion, forward_kinematics
-from ...motion.quaternion import turned_about_up
+from ...motion.quaternion import rotate_about_up
 
 RATE = 30.0
 """Signals per second."""
@@ -72,68 +72,68 @@ class Signals:
         return replace(self, middle=middle, paired=paired, trunk=self.trunk * trunk)
 
 
-def signals(motion: Motion) -> Signals:
+def build_signals(motion: Motion) -> Signals:
     """Build the signals of a recording; InputError where its skeleton has no legs."""
-    body, leg = identify(motion.skeleton), leg_length(motion.skeleton)
+    body, leg = identify_joints(motion.skeleton), measure_leg_length(motion.skeleton)
     places, _ = forward_kinematics(motion)
-    facing = np.unwrap(heading_from_positions(motion.skeleton, places))
-    moving = _velocity(places, motion.fps)
+    facing = np.unwrap(compute_heading_from_positions(motion.skeleton, places))
+    moving = _compute_velocity(places, motion.fps)
     hips = body.hips
     at = np.arange(0.0, len(motion) - 1 + 1e-6, motion.fps / RATE)
     rows = np.minimum(np.round(at).astype(int), len(motion) - 1)
 
     def points(joints: list[int]) -> np.ndarray:
-        away = places[rows][:, joints] - places[rows][:, [hips]]
-        pace = (moving[rows][:, joints] - moving[rows][:, [hips]]) * _REACH
+        offsets = places[rows][:, joints] - places[rows][:, [hips]]
+        velocities = (moving[rows][:, joints] - moving[rows][:, [hips]]) * _REACH
         turn = -facing[rows][:, None]
-        return np.concatenate([turned_about_up(away, turn), turned_about_up(pace, turn)], axis=-1) / leg
+        return np.concatenate([rotate_about_up(offsets, turn), rotate_about_up(velocities, turn)], axis=-1) / leg
 
-    sides = [_points_of(body, limb) for limb in (body.left, body.right)]
+    sides = [_list_side_joints(body, limb) for limb in (body.left, body.right)]
     head = body.head_or_neck
-    strikes = _strikes(places, moving, body, head, facing)
+    strikes = _compute_strikes(places, moving, body, head, facing)
     return Signals(fps=motion.fps, count=len(motion), frames=at, middle=points([body.chest, head]),
                    paired=np.stack([points(one) for one in sides], axis=1),
-                   trunk=_trunk(motion, body, places, moving=moving, facing=facing, leg=leg)[rows], strikes=strikes)
+                   trunk=_compute_trunk(motion, body, places, moving=moving, facing=facing, leg=leg)[rows], strikes=strikes)
 
 
-def _points_of(body: Humanoid, limb) -> list[int]:
+def _list_side_joints(body: Humanoid, limb) -> list[int]:
     """List the joints of PAIRED on one side; a missing joint is replaced by the one that would carry it."""
     upper = limb.upper_arm if limb.upper_arm is not None else body.chest
     elbow = limb.lower_arm if limb.lower_arm is not None else upper
     return [limb.hand if limb.hand is not None else elbow, elbow, limb.lower_leg, limb.foot, limb.toe_or_foot]
 
 
-def _trunk(motion, body: Humanoid, places, moving, facing, leg: float) -> np.ndarray:
+def _compute_trunk(motion, body: Humanoid, places, moving, facing, leg: float) -> np.ndarray:
     """Compute `Signals.trunk` at the recording's rate: (T, 8)."""
     hips, top = body.hips, body.neck_or_chest
-    height = (places[:, hips, 2] - contacts.ground_height(motion)) / leg
-    pace = turned_about_up(moving[:, hips], -facing)
+    height = (places[:, hips, 2] - contacts.measure_ground_height(motion)) / leg
+    pace = rotate_about_up(moving[:, hips], -facing)
     pace = gaussian_filter1d(pace, max(0.05 * motion.fps, 0.5), axis=0, mode="nearest")
     smooth = gaussian_filter1d(facing, max(0.1 * motion.fps, 0.5), mode="nearest")
     turning = np.gradient(smooth) * motion.fps if len(motion) > 1 else np.zeros(1)
-    up = turned_about_up(places[:, top] - places[:, hips], -facing)
+    up = rotate_about_up(places[:, top] - places[:, hips], -facing)
     up = unit_vectors(up)
     return np.concatenate([height[:, None], pace, turning[:, None], up], axis=1)
 
 
-def _strikes(places, moving, body: Humanoid, head: int, facing) -> np.ndarray:
+def _compute_strikes(places, moving, body: Humanoid, head: int, facing) -> np.ndarray:
     """Compute `Signals.strikes`: (T, 5)."""
     feet = [body.left.toe_or_foot, body.right.toe_or_foot]
-    hands = [_points_of(body, limb)[0] for limb in (body.left, body.right)]
+    hands = [_list_side_joints(body, limb)[0] for limb in (body.left, body.right)]
     speed = np.linalg.norm(moving[:, [*feet, *hands]], axis=-1).reshape(len(places), 2, 2).max(axis=2)
-    nod = turned_about_up(moving[:, head] - moving[:, body.chest], -facing)[:, 0]
+    nod = rotate_about_up(moving[:, head] - moving[:, body.chest], -facing)[:, 0]
     height = places[:, body.hips, 2]
     return np.concatenate([speed, nod[:, None], height[:, None], -height[:, None]], axis=1)
 
 
-def _velocity(places: np.ndarray, fps: float) -> np.ndarray:
+def _compute_velocity(places: np.ndarray, fps: float) -> np.ndarray:
     """Compute the velocity (T, J, 3) m/s of positions (T, J, 3) m."""
     if len(places) < 2:
         return np.zeros_like(places)
     return np.gradient(gaussian_filter1d(places, max(_SMOOTH * fps, 0.5), axis=0, mode="nearest"), axis=0) * fps
 
 
-def windows(signals: Signals) -> np.ndarray:
+def build_windows(signals: Signals) -> np.ndarray:
     """Build the windows (N, LENGTH), one row a sample; beyond the ends the first and last sample repeat."""
     count = len(signals)
     flat = np.concatenate([part.reshape(count, -1) for part in (signals.middle, signals.paired, signals.trunk)], axis=1)
@@ -155,14 +155,14 @@ class Space:
     basis: np.ndarray
 
     @classmethod
-    def of(cls, rows: np.ndarray, components: int) -> "Space":
+    def from_windows(cls, rows: np.ndarray, components: int) -> "Space":
         """Build the space of windows (N, LENGTH), with at most `components` components."""
         mean, scale = rows.mean(axis=0), np.maximum(rows.std(axis=0), 1e-6)
         unit = (rows - mean) / scale
         _, vectors = np.linalg.eigh(unit.T @ unit)
-        kept = min(components, len(rows))
-        return cls(mean, scale, vectors[:, ::-1][:, :kept].astype(np.float32))
+        count = min(components, len(rows))
+        return cls(mean, scale, vectors[:, ::-1][:, :count].astype(np.float32))
 
-    def within(self, rows: np.ndarray) -> np.ndarray:
+    def project(self, rows: np.ndarray) -> np.ndarray:
         """Project windows (N, LENGTH) to the space: (N, K), of unit variance in all."""
         return (rows - self.mean) / self.scale @ self.basis / np.sqrt(self.basis.shape[0])

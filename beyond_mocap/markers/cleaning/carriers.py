@@ -12,20 +12,20 @@ from types import MappingProxyType
 
 import numpy as np
 
-from ..frames import RigidFit, rigid_fit, taken_back
-from .cluster_shape import Shape, distance_spread, mean_shape, median
+from ..frames import RigidFit, fit_rigid, to_model_frame
+from .cluster_shape import ClusterShape, measure_distance_spread, compute_mean_shape, compute_median
 
-_MOST_HELPERS = 5  # carriers of a marker at most
+_MAX_CARRIERS = 5  # carriers of a marker at most
 # metres by which distances between carriers may vary; where too few do, the next value is used
 _TOLERANCES = (0.012, 0.025, 0.05, 0.1)
-_SKIN = 0.01  # metres by which markers of one segment move against each other at most
-_FAR = 0.02  # added softness of a pair for its distance, metres per metre
+_MAX_SKIN_MOVEMENT = 0.01  # metres by which markers of one segment move against each other at most
+_DISTANCE_SOFTNESS = 0.02  # added softness of a pair for its distance, metres per metre
 # a frame whose carriers deviate more than this is not trusted: metres, or multiples of the usual deviation
-_DEFORMED, _TIMES_USUAL = 0.012, 3.0
+_MAX_DEFORMATION, _MAX_DEFORMATION_RATIO = 0.012, 3.0
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Carried:
+class CarriedMarker:
     """One marker relative to its carriers, over T frames.
 
     Attributes:
@@ -38,16 +38,16 @@ class Carried:
         sigma: metres by which it usually deviates from there.
     """
 
-    helpers: tuple[int, ...]
-    shape: Shape | None
+    carriers: tuple[int, ...]
+    shape: ClusterShape | None
     fit: RigidFit | None
-    trusted: np.ndarray
+    is_trusted: np.ndarray
     local: np.ndarray
     place: np.ndarray
     sigma: float
 
     @property
-    def away(self) -> np.ndarray:
+    def deviation(self) -> np.ndarray:
         """Distance (T,) metres of the marker from where its carriers predict it; NaN where they cannot."""
         return np.linalg.norm(self.local - self.place, axis=-1)
 
@@ -56,22 +56,22 @@ class Carried:
         """Metres within which the marker may lie from where its carriers predict it."""
         return max(0.025, 4.0 * self.sigma)
 
-    def predicted(self) -> np.ndarray:
+    def predict_places(self) -> np.ndarray:
         """Predict the marker's place from its carriers, (T, 3) metres, world; NaN where they cannot."""
-        if not self.helpers:
+        if not self.carriers:
             return np.full_like(self.local, np.nan)
         world = np.einsum("tij,j->ti", self.fit.rotation, self.place) + self.fit.shift
-        return np.where(self.trusted[:, None], world, np.nan)
+        return np.where(self.is_trusted[:, None], world, np.nan)
 
-    def brought(self, points: np.ndarray) -> np.ndarray:
+    def to_local(self, points: np.ndarray) -> np.ndarray:
         """Convert points (T, 3) metres of the world to the carriers' frame; NaN where it is not trusted."""
-        if not self.helpers:
+        if not self.carriers:
             return np.full_like(points, np.nan)
-        local = taken_back(self.fit, points[:, None])[:, 0]
-        return np.where(self.trusted[:, None], local, np.nan)
+        local = to_model_frame(self.fit, points[:, None])[:, 0]
+        return np.where(self.is_trusted[:, None], local, np.nan)
 
 
-def softness(positions: np.ndarray, clusters: Iterable[Sequence[int]] = ()) -> np.ndarray:
+def measure_softness(positions: np.ndarray, clusters: Iterable[Sequence[int]] = ()) -> np.ndarray:
     """Measure how much the distance of each pair of markers varies.
 
     Distant pairs get a little more, since their distance may be constant by chance. Within one of the clusters it
@@ -83,17 +83,17 @@ def softness(positions: np.ndarray, clusters: Iterable[Sequence[int]] = ()) -> n
     Returns:
         (M, M) metres.
     """
-    distance, soft = distance_spread(positions)
-    soft = soft + _FAR * distance
+    distance, softness = measure_distance_spread(positions)
+    softness = softness + _DISTANCE_SOFTNESS * distance
     for cluster in clusters:
         inside = np.ix_(cluster, cluster)
-        soft[inside] = np.minimum(0.5 * soft[inside], _SKIN)
-    return soft
+        softness[inside] = np.minimum(0.5 * softness[inside], _MAX_SKIN_MOVEMENT)
+    return softness
 
 
-def carriers(positions: np.ndarray, soft: np.ndarray, wanted: Iterable[int],
-             known: Mapping[int, Carried] = MappingProxyType({}), changed: Iterable[int] = (),
-             ask: Callable[[], None] = lambda: None) -> dict[int, Carried]:
+def find_carriers(positions: np.ndarray, softness: np.ndarray, markers: Iterable[int],
+             known: Mapping[int, CarriedMarker] = MappingProxyType({}), changed: Iterable[int] = (),
+             check_cancelled: Callable[[], None] = lambda: None) -> dict[int, CarriedMarker]:
     """Find how markers are carried.
 
     Args:
@@ -107,19 +107,19 @@ def carriers(positions: np.ndarray, soft: np.ndarray, wanted: Iterable[int],
         Marker -> how it is carried.
     """
     found, changed = {}, set(changed)
-    for marker in wanted:
-        ask()
-        helpers = helpers_of(marker, soft, positions)
-        held = known.get(marker)
-        holds = held is not None and held.helpers == helpers
-        if holds and not changed & {marker, *helpers}:
-            found[marker] = held
+    for marker in markers:
+        check_cancelled()
+        helpers = choose_carriers(marker, softness, positions)
+        earlier = known.get(marker)
+        is_unchanged = earlier is not None and earlier.carriers == helpers
+        if is_unchanged and not changed & {marker, *helpers}:
+            found[marker] = earlier
         else:
-            found[marker] = carried(positions, marker, helpers, held.shape if holds else None)
+            found[marker] = measure_carried_marker(positions, marker, helpers, earlier.shape if is_unchanged else None)
     return found
 
 
-def carried(positions: np.ndarray, marker: int, helpers: Sequence[int], shape: Shape | None = None) -> Carried:
+def measure_carried_marker(positions: np.ndarray, marker: int, carriers: Sequence[int], shape: ClusterShape | None = None) -> CarriedMarker:
     """Measure how given carriers carry a marker.
 
     Args:
@@ -132,24 +132,24 @@ def carried(positions: np.ndarray, marker: int, helpers: Sequence[int], shape: S
     """
     frames = len(positions)
     nothing = np.full((frames, 3), np.nan)
-    alone = Carried(helpers=(), shape=None, fit=None, trusted=np.zeros(frames, dtype=bool), local=nothing,
+    alone = CarriedMarker(carriers=(), shape=None, fit=None, is_trusted=np.zeros(frames, dtype=bool), local=nothing,
                     place=np.full(3, np.nan), sigma=np.inf)
-    if len(helpers) < 3:
+    if len(carriers) < 3:
         return alone
-    seen = positions[:, list(helpers)]
-    shape = shape or mean_shape(seen)
-    fit = rigid_fit(shape.places, seen, 1.0 / (shape.sigma**2 + 0.002**2))
-    trusted = fit.sound & (np.nan_to_num(fit.rms, nan=np.inf) <= max(_DEFORMED, _TIMES_USUAL * shape.usual))
-    local = np.where(trusted[:, None], taken_back(fit, positions[:, marker, None])[:, 0], np.nan)
-    there = np.isfinite(local[:, 0])
-    if not there.any():
+    seen = positions[:, list(carriers)]
+    shape = shape or compute_mean_shape(seen)
+    fit = fit_rigid(shape.places, seen, 1.0 / (shape.sigma**2 + 0.002**2))
+    trusted = fit.is_determined & (np.nan_to_num(fit.rms, nan=np.inf) <= max(_MAX_DEFORMATION, _MAX_DEFORMATION_RATIO * shape.usual_deformation))
+    local = np.where(trusted[:, None], to_model_frame(fit, positions[:, marker, None])[:, 0], np.nan)
+    is_known = np.isfinite(local[:, 0])
+    if not is_known.any():
         return alone
-    place = np.median(local[there], axis=0)
-    sigma = 1.4826 * median(np.linalg.norm(local - place, axis=-1))
-    return Carried(helpers=tuple(helpers), shape=shape, fit=fit, trusted=trusted, local=local, place=place, sigma=sigma)
+    place = np.median(local[is_known], axis=0)
+    sigma = 1.4826 * compute_median(np.linalg.norm(local - place, axis=-1))
+    return CarriedMarker(carriers=tuple(carriers), shape=shape, fit=fit, is_trusted=trusted, local=local, place=place, sigma=sigma)
 
 
-def helpers_of(marker: int, soft: np.ndarray, positions: np.ndarray, most: int = _MOST_HELPERS) -> tuple[int, ...]:
+def choose_carriers(marker: int, softness: np.ndarray, positions: np.ndarray, max_count: int = _MAX_CARRIERS) -> tuple[int, ...]:
     """Choose markers that keep their distances from a marker and from each other, and are not on one line.
 
     Args:
@@ -160,15 +160,15 @@ def helpers_of(marker: int, soft: np.ndarray, positions: np.ndarray, most: int =
     Returns:
         Indices of the carriers; () where fewer than three qualify.
     """
-    order = [other for other in np.argsort(soft[marker], kind="stable").tolist() if other != marker]
+    order = [other for other in np.argsort(softness[marker], kind="stable").tolist() if other != marker]
     for tolerance in _TOLERANCES:
         chosen: list[int] = []
         for other in order:
-            if soft[marker, other] > 2.0 * tolerance or len(chosen) == most:
+            if softness[marker, other] > 2.0 * tolerance or len(chosen) == max_count:
                 break
-            if len(chosen) >= 3 and soft[marker, other] > 2.0 * soft[marker, chosen[2]] + 0.002:
+            if len(chosen) >= 3 and softness[marker, other] > 2.0 * softness[marker, chosen[2]] + 0.002:
                 break  # a much softer one would rotate the frame more than it stabilises it
-            if all(soft[other, one] <= tolerance for one in chosen):
+            if all(softness[other, one] <= tolerance for one in chosen):
                 chosen.append(other)
         if len(chosen) >= 3 and _spans_a_plane(positions[:, chosen]):
             return tuple(chosen)

@@ -14,20 +14,20 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...base.errors import Cancelled, InputError, TimedLine
-from ...base.time_series import runs
+from ...base.errors import UserCancelledError, InputError, TimedMessage
+from ...base.time_series import find_runs
 from ..trial import MarkerTrial
-from .carriers import carriers, softness
-from .gaps import Longest, fill
-from .pieces import assign, leaps, take_out, unlabeled
-from .swaps import mend, there_and_back
+from .carriers import find_carriers, measure_softness
+from .gaps import GapLimits, fill_gaps
+from .pieces import assign_labels, detect_leaps, remove_jumps, find_unlabeled
+from .swaps import correct_swaps, correct_double_leaps
 
 # A marker is reported whose deviation exceeds so many times its tolerance for so many seconds.
-_STRAYED, _FOR = 1.5, 0.1
-_NEAR_BREAK = 3  # frames from a leap or a gap within which such a stretch must begin or end
+_STRAY_RATIO, _STRAY_SECONDS = 1.5, 0.1
+_BREAK_MARGIN = 3  # frames from a leap or a gap within which such a stretch must begin or end
 
 
-_MOST_LINES = 6  # messages of one kind; with more, one message covers all markers
+_MAX_LINES = 6  # messages of one kind; with more, one message covers all markers
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,7 +50,7 @@ class Stretch:
     how: str = ""
     off: float = 0.0
 
-    def when(self) -> str:
+    def format_time(self) -> str:
         """Format the time, as `at 1.234 s` or `1.234 to 1.300 s`."""
         return f"at {self.start:.3f} s" if self.frames == 1 else f"{self.start:.3f} to {self.end:.3f} s"
 
@@ -82,66 +82,66 @@ class CleanReport:
     @property
     def lines(self) -> tuple[str, ...]:
         """Messages for people, the most serious first; each has its seconds (`errors.line_spans`)."""
-        return (*(_swapped(swap) for swap in self.swaps),
-                *(_timed(f"{one.labels[0]} labeled as {one.labels[1]} {one.when()}", [one]) for one in self.assigned),
-                *_by_label(self.jumps, "jumping frames removed"),
-                *_by_label(self.strayed, "frames far from where the surrounding markers place it"),
-                *_by_label(self.left, "occluded frames left open"),
-                *_summed(self.gaps, "occluded frames filled"))
+        return (*(_describe_swap(swap) for swap in self.swaps),
+                *(_build_line(f"{one.labels[0]} labeled as {one.labels[1]} {one.format_time()}", [one]) for one in self.assigned),
+                *_describe_by_label(self.jumps, "jumping frames removed"),
+                *_describe_by_label(self.strayed, "frames far from where the surrounding markers place it"),
+                *_describe_by_label(self.left, "occluded frames left open"),
+                *_summarize(self.gaps, "occluded frames filled"))
 
     def as_dict(self) -> dict:
         """Return the report as plain values, for JSON."""
         return asdict(self) | {"lines": list(self.lines)}
 
 
-def _swapped(swap):
+def _describe_swap(swap):
     """Describe a swap of labels."""
     pairs = ", ".join(f"{a} and {b}" for a, b in zip(swap.labels[::2], swap.labels[1::2]))
     done = "were exchanged, corrected" if swap.how else "seem exchanged, not corrected: no markers around confirm it"
-    return _timed(f"{pairs} {done} {swap.when()}", [swap])
+    return _build_line(f"{pairs} {done} {swap.format_time()}", [swap])
 
 
-def _by_label(stretches, what):
+def _describe_by_label(stretches, what):
     """Describe stretches in one message for each label; labels with the same stretches share one, many labels share
     a summary.
     """
-    own: dict[str, list] = {}
+    by_label: dict[str, list] = {}
     for stretch in stretches:
-        own.setdefault(stretch.labels[0], []).append(stretch)
-    alike: dict[tuple, list[str]] = {}
-    for label, ones in own.items():
-        alike.setdefault(tuple((one.start, one.frames) for one in ones), []).append(label)
-    if len(alike) > _MOST_LINES:
-        yield from _summed(stretches, what)
+        by_label.setdefault(stretch.labels[0], []).append(stretch)
+    groups: dict[tuple, list[str]] = {}
+    for label, own in by_label.items():
+        groups.setdefault(tuple((one.start, one.frames) for one in own), []).append(label)
+    if len(groups) > _MAX_LINES:
+        yield from _summarize(stretches, what)
         return
-    for labels in alike.values():
-        ones = own[labels[0]]
-        count = sum(one.frames for one in ones)
-        counted = what if count != 1 else what.replace("frames", "frame")
-        shown = ", ".join(one.when() for one in ones[:3]) + (f" and {len(ones) - 3} more" if len(ones) > 3 else "")
-        yield _timed(f"{_named(labels)}: {count} {counted}: {shown}", ones)
+    for labels in groups.values():
+        own = by_label[labels[0]]
+        count = sum(one.frames for one in own)
+        noun = what if count != 1 else what.replace("frames", "frame")
+        times = ", ".join(one.format_time() for one in own[:3]) + (f" and {len(own) - 3} more" if len(own) > 3 else "")
+        yield _build_line(f"{_format_labels(labels)}: {count} {noun}: {times}", own)
 
 
-def _summed(stretches, what):
+def _summarize(stretches, what):
     """Describe all stretches in one message: how many frames, and the markers with the most."""
     count: dict[str, int] = {}
     for stretch in stretches:
         count[stretch.labels[0]] = count.get(stretch.labels[0], 0) + stretch.frames
     most = sorted(count, key=lambda label: -count[label])
-    shown = ", ".join(f"{label} {count[label]}" for label in most[:5]) + (", ..." if len(most) > 5 else "")
+    listed = ", ".join(f"{label} {count[label]}" for label in most[:5]) + (", ..." if len(most) > 5 else "")
     if count:
-        yield _timed(f"{sum(count.values())} {what}: {shown}", stretches)
+        yield _build_line(f"{sum(count.values())} {what}: {listed}", stretches)
 
 
-def _named(labels):
+def _format_labels(labels):
     """Format labels, as `LKNE`, `LKNE and LANK`, or `46 markers (LFHD, RFHD, LBHD, ...)`."""
     if len(labels) > 4:
         return f"{len(labels)} markers ({', '.join(labels[:3])}, ...)"
     return " and ".join([", ".join(labels[:-1]), labels[-1]] if len(labels) > 1 else labels)
 
 
-def _timed(text, stretches):
-    return TimedLine(text, *((stretch.start, stretch.end) for stretch in stretches))
+def _build_line(text, stretches):
+    return TimedMessage(text, *((stretch.start, stretch.end) for stretch in stretches))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -173,7 +173,7 @@ class CleanSettings:
                 raise InputError(name, f"{value:g} s", "0 or more seconds")
 
 
-class Cleaned(NamedTuple):
+class CleaningResult(NamedTuple):
     """A cleaned trial and the report.
 
     Attributes:
@@ -184,7 +184,7 @@ class Cleaned(NamedTuple):
     trial: MarkerTrial
     report: CleanReport
 
-    def for_pose(self, longest: float = 0.08) -> MarkerTrial:
+    def build_pose_trial(self, longest: float = 0.08) -> MarkerTrial:
         """Return the trial for the pose solver, without long uncertain fillings.
 
         Gaps filled softly or by a curve are good for display, but no evidence for a pose.
@@ -198,40 +198,40 @@ class Cleaned(NamedTuple):
         for gap in self.report.gaps:
             if gap.how != "cluster" and gap.frames > longest * self.trial.fps:
                 first = round((gap.start - self.trial.start) * self.trial.fps)
-                positions[first : first + gap.frames, self.trial.index(gap.labels[0])] = np.nan
+                positions[first : first + gap.frames, self.trial.index_of(gap.labels[0])] = np.nan
         return self.trial.with_positions(positions)
 
 
 @dataclass
-class _Work:
+class _CleanUp:
     """A trial in the clean-up: its present places, and the findings."""
 
     trial: MarkerTrial
     positions: np.ndarray
     clusters: list[list[int]]
-    nameless: list[int]
-    ask: Callable[[], None]
-    found: dict = field(default_factory=dict)
-    carried: dict = field(default_factory=dict)
-    soft: np.ndarray | None = None
+    unlabeled: list[int]
+    check_cancelled: Callable[[], None]
+    findings: dict = field(default_factory=dict)
+    carried_markers: dict = field(default_factory=dict)
+    softness: np.ndarray | None = None
 
-    def look(self):
+    def find_carriers(self):
         """Find which markers carry which."""
-        named = [i for i in range(len(self.trial.labels)) if i not in self.nameless and self.seen(i)]
-        self.soft = softness(self.positions, self.clusters)
-        self.soft[self.nameless], self.soft[:, self.nameless] = np.inf, np.inf
-        self.carried = carriers(self.positions, self.soft, named, ask=self.ask)
+        labeled = [i for i in range(len(self.trial.labels)) if i not in self.unlabeled and self.is_visible(i)]
+        self.softness = measure_softness(self.positions, self.clusters)
+        self.softness[self.unlabeled], self.softness[:, self.unlabeled] = np.inf, np.inf
+        self.carried_markers = find_carriers(self.positions, self.softness, labeled, check_cancelled=self.check_cancelled)
 
-    def look_again(self, changed: Sequence[int]):
+    def update_carriers(self, changed: Sequence[int]):
         """Update the carriers where a few samples of these markers have changed."""
-        named = [i for i in self.carried if self.seen(i)]
-        self.carried = carriers(self.positions, self.soft, named, known=self.carried, changed=changed, ask=self.ask)
+        labeled = [i for i in self.carried_markers if self.is_visible(i)]
+        self.carried_markers = find_carriers(self.positions, self.softness, labeled, known=self.carried_markers, changed=changed, check_cancelled=self.check_cancelled)
 
-    def seen(self, marker):
+    def is_visible(self, marker):
         """Return whether a marker is visible in any frame."""
         return np.isfinite(self.positions[:, marker, 0]).any()
 
-    def stretch(self, labels, first, end, how="", off=0.0, frames=None):
+    def build_stretch(self, labels, first, end, how="", off=0.0, frames=None):
         """Build the stretch of these markers' frames, in seconds."""
         clock = self.trial.start + np.array([first, end - 1]) / self.trial.fps
         names = tuple(self.trial.labels[i] for i in labels)
@@ -239,9 +239,9 @@ class _Work:
                        off=float(off))
 
 
-def clean(trial: MarkerTrial, clusters: Mapping[str, Sequence[str]] | None = None,
+def clean_trial(trial: MarkerTrial, clusters: Mapping[str, Sequence[str]] | None = None,
           settings: CleanSettings = CleanSettings(), progress: Callable[[float, str], None] | None = None,
-          cancelled: Callable[[], bool] | None = None) -> Cleaned:
+          cancelled: Callable[[], bool] | None = None) -> CleaningResult:
     """Clean a trial: remove swaps and jumps, label unlabeled markers and fill gaps.
 
     Args:
@@ -260,43 +260,43 @@ def clean(trial: MarkerTrial, clusters: Mapping[str, Sequence[str]] | None = Non
     clusters = clusters or {}
     known = [label for labels in clusters.values() for label in labels]
     index = {label: i for i, label in enumerate(trial.labels)}
-    work = _Work(trial, np.array(trial.positions),
+    work = _CleanUp(trial, np.array(trial.positions),
                  [[index[label] for label in labels if label in index] for labels in clusters.values()],
-                 unlabeled(trial.labels, known), lambda: _go_on(cancelled))
-    work.found = {name: () for name in ("swaps", "jumps", "assigned", "strayed", "gaps", "left")}
-    steps = [("finding carriers", _Work.look)]
-    steps += [("swaps", _swaps)] if settings.swaps else []
-    steps += [("jumps", _jumps)] if settings.jumps else []
-    steps += [("unlabeled markers", _names)] if settings.assign and work.nameless else []
-    steps += [("gaps", lambda work: _gaps(work, settings))]
+                 find_unlabeled(trial.labels, known), lambda: _check_cancelled(cancelled))
+    work.findings = {name: () for name in ("swaps", "jumps", "assigned", "strayed", "gaps", "left")}
+    steps = [("finding carriers", _CleanUp.find_carriers)]
+    steps += [("swaps", _correct_swaps)] if settings.swaps else []
+    steps += [("jumps", _remove_jumps)] if settings.jumps else []
+    steps += [("unlabeled markers", _label_unlabeled)] if settings.assign and work.unlabeled else []
+    steps += [("gaps", lambda work: _fill_gaps(work, settings))]
     for number, (text, step) in enumerate(steps):
-        work.ask()
+        work.check_cancelled()
         if progress:
             progress(number / len(steps), f"markers: {text}")
         if len(trial) and trial.labels:
             step(work)
     if progress:
         progress(1.0, "markers: clean")
-    return _told(work)
+    return _build_result(work)
 
 
-def _go_on(cancelled):
+def _check_cancelled(cancelled):
     if cancelled and cancelled():
-        raise Cancelled("clean-up stopped")
+        raise UserCancelledError("clean-up stopped")
 
 
-def _swaps(work):
+def _correct_swaps(work):
     """Exchange swapped labels back: first pairs that leap twice, then those that deform clusters."""
-    work.positions, found = there_and_back(work.positions, work.carried)
-    _note_swaps(work, found)
-    leaping = leaps(work.positions, work.carried, work.trial.fps)
-    work.positions, found = mend(work.positions, work.carried, leaping, fps=work.trial.fps, opposite=_opposite(work),
-                                 ask=work.ask)
-    _note_swaps(work, found)
+    work.positions, found = correct_double_leaps(work.positions, work.carried)
+    _record_swaps(work, found)
+    leaping = detect_leaps(work.positions, work.carried, work.trial.fps)
+    work.positions, found = correct_swaps(work.positions, work.carried, leaping, fps=work.trial.fps, opposite=_list_opposite_pairs(work),
+                                 check_cancelled=work.check_cancelled)
+    _record_swaps(work, found)
 
 
-def _note_swaps(work, found):
-    work.found["swaps"] += tuple(
+def _record_swaps(work, found):
+    work.findings["swaps"] += tuple(
         work.stretch([i for pair in swap.pairs for i in pair], swap.first, swap.end, "mended" if swap.mended else "")
         for swap in found
     )
@@ -304,7 +304,7 @@ def _note_swaps(work, found):
         work.look()
 
 
-def _opposite(work):
+def _list_opposite_pairs(work):
     """List pairs of left and right markers, and for each segment all of its pairs together."""
     index = {label: i for i, label in enumerate(work.trial.labels)}
     pairs = {}
@@ -316,63 +316,63 @@ def _opposite(work):
     return [(pair,) for pair in pairs.values()] + [group for group in groups if len(group) > 1]
 
 
-def _jumps(work):
-    work.positions, found = take_out(work.positions, work.carried, work.trial.fps)
-    work.found["jumps"] = tuple(work.stretch([j.marker], j.first, j.end, "taken out", j.off) for j in found)
+def _remove_jumps(work):
+    work.positions, found = remove_jumps(work.positions, work.carried, work.trial.fps)
+    work.findings["jumps"] = tuple(work.stretch([j.marker], j.first, j.end, "taken out", j.off) for j in found)
     if found:
-        work.look_again([jump.marker for jump in found])
+        work.update_carriers([jump.marker for jump in found])
 
 
-def _names(work):
-    work.positions, found = assign(work.positions, work.carried, work.nameless, work.trial.fps)
-    work.found["assigned"] = tuple(
+def _label_unlabeled(work):
+    work.positions, found = assign_labels(work.positions, work.carried, work.unlabeled, work.trial.fps)
+    work.findings["assigned"] = tuple(
         work.stretch([one.unlabeled, one.label], one.first, one.end, "assigned", one.off) for one in found
     )
     if found:
-        work.look_again([one.label for one in found])
+        work.update_carriers([one.label for one in found])
 
 
-def _gaps(work, settings):
+def _fill_gaps(work, settings):
     """Report markers that stray, fill the gaps, and record which are filled and which stay open."""
-    longest = Longest(settings.longest_gap, settings.longest_soft_gap, settings.longest_spline)
-    work.found["strayed"] = tuple(_strayed(work))
-    work.positions, found = fill(work.positions, work.soft, work.trial.fps, longest=longest, known=work.carried,
-                                 ask=work.ask)
-    for name, kept in (("gaps", True), ("left", False)):
-        work.found[name] = tuple(
-            work.stretch([gap.marker], gap.first, gap.end, gap.how) for gap in found if bool(gap.how) is kept
+    longest = GapLimits(settings.longest_gap, settings.longest_soft_gap, settings.longest_spline)
+    work.findings["strayed"] = tuple(_find_strayed(work))
+    work.positions, found = fill_gaps(work.positions, work.soft, work.trial.fps, limits=longest, known=work.carried,
+                                 check_cancelled=work.check_cancelled)
+    for name, is_filled in (("gaps", True), ("left", False)):
+        work.findings[name] = tuple(
+            work.stretch([gap.marker], gap.first, gap.end, gap.how) for gap in found if bool(gap.how) is is_filled
         )
 
 
-def _strayed(work):
+def _find_strayed(work):
     """Find markers far from where their carriers predict them, after or until a leap or a gap.
 
     They were attached again, or labeled wrongly. A marker that goes there smoothly follows the body.
     """
-    leaping = leaps(work.positions, work.carried, work.trial.fps)
-    broken = np.pad(leaping | np.isnan(work.positions[..., 0]), ((_NEAR_BREAK, _NEAR_BREAK), (0, 0)))
+    leaping = detect_leaps(work.positions, work.carried, work.trial.fps)
+    broken = np.pad(leaping | np.isnan(work.positions[..., 0]), ((_BREAK_MARGIN, _BREAK_MARGIN), (0, 0)))
     for marker, one in work.carried.items():
-        if not one.helpers:
+        if not one.carriers:
             continue
-        far = np.nan_to_num(one.away) > np.maximum(_STRAYED * one.tolerance, 0.06)
-        for first, end in runs(far):
-            edges = broken[first : first + 2 * _NEAR_BREAK + 1, marker], broken[end : end + 2 * _NEAR_BREAK + 1, marker]
-            if end - first >= _FOR * work.trial.fps and any(edge.any() for edge in edges):
+        far = np.nan_to_num(one.away) > np.maximum(_STRAY_RATIO * one.tolerance, 0.06)
+        for first, end in find_runs(far):
+            edges = broken[first : first + 2 * _BREAK_MARGIN + 1, marker], broken[end : end + 2 * _BREAK_MARGIN + 1, marker]
+            if end - first >= _STRAY_SECONDS * work.trial.fps and any(edge.any() for edge in edges):
                 yield work.stretch([marker], first, end, "", float(np.median(one.away[first:end])))
 
 
-def _told(work):
+def _build_result(work):
     """Build the cleaned trial and its report."""
     trial, seen = work.trial, work.trial.seen
     share = {label: float(seen[:, i].mean()) if len(trial) else 0.0 for i, label in enumerate(trial.labels)}
-    keeps = [i for i in range(len(trial.labels)) if i not in work.nameless or work.seen(i)]
-    cleaned = trial.with_positions(work.positions).only([trial.labels[i] for i in keeps])
-    nameless = {trial.labels[i] for i in work.nameless}
+    remaining = [i for i in range(len(trial.labels)) if i not in work.unlabeled or work.seen(i)]
+    cleaned = trial.with_positions(work.positions).only([trial.labels[i] for i in remaining])
+    nameless = {trial.labels[i] for i in work.unlabeled}
     report = CleanReport(
         seen={label: part for label, part in share.items() if label not in nameless},
         unnamed={
-            trial.labels[i]: float(np.isfinite(work.positions[:, i, 0]).mean()) for i in work.nameless if i in keeps
+            trial.labels[i]: float(np.isfinite(work.positions[:, i, 0]).mean()) for i in work.unlabeled if i in remaining
         },
-        **work.found,
+        **work.findings,
     )
-    return Cleaned(cleaned, report)
+    return CleaningResult(cleaned, report)

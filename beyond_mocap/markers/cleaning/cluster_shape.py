@@ -11,13 +11,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..frames import placed, rigid_fit, taken_back
+from ..frames import place_points, fit_rigid, to_model_frame
 
-_ROUNDS = 3  # iterations of shape and weights
-_MOST_FRAMES = 100  # frames of a trial that are used
+_ITERATIONS = 3  # iterations of shape and weights
+_MAX_FRAMES = 100  # frames of a trial that are used
 
 
-class Shape(NamedTuple):
+class ClusterShape(NamedTuple):
     """The shape of a cluster without its movement.
 
     Attributes:
@@ -29,10 +29,10 @@ class Shape(NamedTuple):
 
     places: np.ndarray
     sigma: np.ndarray
-    usual: float
+    usual_deformation: float
 
 
-def mean_shape(positions: np.ndarray) -> Shape:
+def compute_mean_shape(positions: np.ndarray) -> ClusterShape:
     """Compute the robust mean shape of one cluster: generalized Procrustes analysis.
 
     Every frame is fitted to the shape by a rigid motion, and the shape becomes the mean of the fitted frames. Frames
@@ -44,28 +44,28 @@ def mean_shape(positions: np.ndarray) -> Shape:
         The shape.
     """
     positions = np.asarray(positions, dtype=float)
-    chosen = positions[_spread_frames(np.isfinite(positions[..., 0]).sum(axis=1))]
-    places = chosen[_middle_frame(chosen)]
+    chosen = positions[_select_frames(np.isfinite(positions[..., 0]).sum(axis=1))]
+    places = chosen[_find_typical_frame(chosen)]
     seen = np.isfinite(places).all(axis=-1)
     places = places - (places[seen].mean(axis=0) if seen.any() else 0.0)
     weights = np.ones(chosen.shape[:2])
-    for _ in range(_ROUNDS):
-        fit = rigid_fit(places, chosen, weights)
-        back = taken_back(fit, chosen)
+    for _ in range(_ITERATIONS):
+        fit = fit_rigid(places, chosen, weights)
+        back = to_model_frame(fit, chosen)
         away = np.linalg.norm(back - places, axis=-1)
         # Geman-McClure weights; a marker without a place in the shape yet gets a tiny one, to enter it
-        scale = 3.0 * max(median(away), 1e-4)
+        scale = 3.0 * max(compute_median(away), 1e-4)
         weights = np.where(np.isfinite(away), 1.0 / (1.0 + (away / scale) ** 2) ** 2, np.isfinite(back[..., 0]) * 1e-3)
-        weights = np.where(fit.sound[:, None], weights, 0.0)
+        weights = np.where(fit.is_determined[:, None], weights, 0.0)
         total = weights.sum(axis=0)[:, None]
         summed = np.einsum("tn,tnc->nc", weights, np.where(weights[..., None] > 0.0, back, 0.0))
         places = np.where(total > 0.0, summed / np.maximum(total, 1e-12), places)
-    fit = rigid_fit(places, chosen, weights)
-    away = np.linalg.norm(placed(fit, places) - chosen, axis=-1)
-    return Shape(places, 1.4826 * medians(away), median(fit.rms[fit.sound]))
+    fit = fit_rigid(places, chosen, weights)
+    away = np.linalg.norm(place_points(fit, places) - chosen, axis=-1)
+    return ClusterShape(places, 1.4826 * compute_medians(away), compute_median(fit.rms[fit.is_determined]))
 
 
-def distance_spread(positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def measure_distance_spread(positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Measure the median distance of each pair of markers, and how much it varies.
 
     The spread is computed from the range that contains nine tenths of the frames, so that short swaps and ghosts have
@@ -78,13 +78,13 @@ def distance_spread(positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         ever visible together, 0 on the diagonal.
     """
     seen = np.isfinite(positions[..., 0])
-    chosen = positions[_spread_frames(seen.sum(axis=1))]
+    chosen = positions[_select_frames(seen.sum(axis=1))]
     count = chosen.shape[1]
     spread, middle = np.full((count, count), np.inf), np.zeros((count, count))
     for marker in range(count):
         distance = np.linalg.norm(chosen - chosen[:, marker : marker + 1], axis=-1)
         together = np.isfinite(distance).sum(axis=0) >= min(10, len(chosen))
-        low, half, high = (quantile(distance[:, together], share) for share in (0.05, 0.5, 0.95))
+        low, half, high = (compute_quantile(distance[:, together], share) for share in (0.05, 0.5, 0.95))
         # 90 % of a normal distribution lie within 3.29 standard deviations
         spread[marker, together] = (high - low) / 3.29
         middle[marker, together] = half
@@ -93,23 +93,23 @@ def distance_spread(positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return middle, spread
 
 
-def _spread_frames(seen_count):
+def _select_frames(seen_count):
     """Select at most a hundred frames evenly over the trial, of those that show the most markers."""
     full = np.flatnonzero(seen_count >= max(3, 0.8 * seen_count.max(initial=0)))
     if not len(full):
         full = np.arange(len(seen_count))
-    return full[np.unique(np.linspace(0, len(full) - 1, min(len(full), _MOST_FRAMES)).astype(int))]
+    return full[np.unique(np.linspace(0, len(full) - 1, min(len(full), _MAX_FRAMES)).astype(int))]
 
 
-def _middle_frame(positions):
+def _find_typical_frame(positions):
     """Find the frame whose distances between markers lie nearest to their medians over the trial."""
     distance = np.linalg.norm(positions[:, :, None] - positions[:, None], axis=-1)
-    away = np.abs(distance - medians(distance))
+    away = np.abs(distance - compute_medians(distance))
     missing = np.isnan(away).sum(axis=(1, 2))
     return int(np.argmin(np.nansum(away, axis=(1, 2)) + 10.0 * missing))
 
 
-def quantile(values: np.ndarray, share: float, axis: int = 0) -> np.ndarray:
+def compute_quantile(values: np.ndarray, share: float, axis: int = 0) -> np.ndarray:
     """Compute quantiles that ignore NaN, with linear interpolation.
 
     Args:
@@ -129,11 +129,11 @@ def quantile(values: np.ndarray, share: float, axis: int = 0) -> np.ndarray:
     return below + (at - low) * (above - below)
 
 
-def medians(values: np.ndarray, axis: int = 0) -> np.ndarray:
+def compute_medians(values: np.ndarray, axis: int = 0) -> np.ndarray:
     """Compute the median along `axis`, ignoring NaN; 0 where all values are NaN."""
-    return np.nan_to_num(quantile(values, 0.5, axis))
+    return np.nan_to_num(compute_quantile(values, 0.5, axis))
 
 
-def median(values: np.ndarray) -> float:
+def compute_median(values: np.ndarray) -> float:
     """Compute the median of all values, ignoring NaN; 0 where all are NaN."""
-    return float(medians(np.ravel(values)))
+    return float(compute_medians(np.ravel(values)))

@@ -10,16 +10,16 @@ from typing import NamedTuple
 import numpy as np
 
 from ...base.easing import hermite
-from ...base.time_series import runs
-from .carriers import Carried, carried, helpers_of
-from .cluster_shape import Shape, mean_shape, quantile
+from ...base.time_series import find_runs
+from .carriers import CarriedMarker, measure_carried_marker, choose_carriers
+from .cluster_shape import ClusterShape, compute_mean_shape, compute_quantile
 
 # Metres by which a marker deviates from its place among its carriers, from which on they carry it softly: the usual
 # deviation, and its 95 % quantile.
-_SOFT, _SOFT_AT_TIMES = 0.015, 0.03
-_EDGE = 0.03  # s over which the slope at a gap's edge is measured
+_SOFT_SIGMA, _SOFT_QUANTILE = 0.015, 0.03
+_EDGE_SECONDS = 0.03  # s over which the slope at a gap's edge is measured
 # A curve is used if it deviates by at most so many metres over other stretches of that length; so many are tried.
-_NEAR, _TRIES = 0.02, 24
+_MAX_CURVE_ERROR, _TRIAL_COUNT = 0.02, 24
 
 
 class Gap(NamedTuple):
@@ -44,7 +44,7 @@ class Gap(NamedTuple):
         return self.end - self.first
 
 
-class Longest(NamedTuple):
+class GapLimits(NamedTuple):
     """The longest gap that is filled by each method, in seconds.
 
     Attributes:
@@ -58,7 +58,7 @@ class Longest(NamedTuple):
     spline: float = 0.1
 
 
-def gaps_of(positions: np.ndarray, markers: Iterable[int]) -> list[Gap]:
+def find_gaps(positions: np.ndarray, markers: Iterable[int]) -> list[Gap]:
     """Find the gaps of markers that are visible at all.
 
     Args:
@@ -69,11 +69,11 @@ def gaps_of(positions: np.ndarray, markers: Iterable[int]) -> list[Gap]:
     """
     seen = np.isfinite(positions[..., 0])
     return [Gap(marker, first, end, "") for marker in markers if seen[:, marker].any()
-            for first, end in runs(~seen[:, marker])]
+            for first, end in find_runs(~seen[:, marker])]
 
 
-def fill(positions: np.ndarray, soft: np.ndarray, fps: float, longest: Longest, known: Mapping[int, Carried],
-         ask: Callable[[], None] = lambda: None) -> tuple[np.ndarray, list[Gap]]:
+def fill_gaps(positions: np.ndarray, softness: np.ndarray, fps: float, limits: GapLimits, known: Mapping[int, CarriedMarker],
+         check_cancelled: Callable[[], None] = lambda: None) -> tuple[np.ndarray, list[Gap]]:
     """Fill gaps; no visible marker is moved, and no trajectory jumps.
 
     Every gap is filled from visible markers alone, never from another gap's filling.
@@ -88,96 +88,96 @@ def fill(positions: np.ndarray, soft: np.ndarray, fps: float, longest: Longest, 
     Returns:
         The filled positions, and the gaps with the method used.
     """
-    out, told = positions.copy(), []
-    shapes: dict[tuple[int, ...], Shape] = {one.helpers: one.shape for one in known.values() if one.helpers}
-    for gap in gaps_of(positions, known):
-        ask()
-        one = _carried_over(positions, gap, soft, known[gap.marker], shapes)
-        found = _firmly(one, gap, longest.cluster * fps) or _by_a_curve(positions, one, gap, fps, longest)
-        how, path = found or ("", None)
-        if how:
+    out, gaps = positions.copy(), []
+    shapes: dict[tuple[int, ...], ClusterShape] = {one.carriers: one.shape for one in known.values() if one.carriers}
+    for gap in find_gaps(positions, known):
+        check_cancelled()
+        one = _find_gap_carriers(positions, gap, softness, known[gap.marker], shapes)
+        filling = _fill_by_carriers(one, gap, limits.cluster * fps) or _fill_by_curve(positions, one, gap, fps, limits)
+        method, path = filling or ("", None)
+        if method:
             out[gap.first : gap.end, gap.marker] = path
-        told.append(gap._replace(how=how))
-    return out, told
+        gaps.append(gap._replace(how=method))
+    return out, gaps
 
 
-def _carried_over(positions, gap, soft, one, shapes):
+def _find_gap_carriers(positions, gap, softness, one, shapes):
     """Measure how the gap's marker is carried by markers visible throughout the gap and at its edges; None if it is
     not.
     """
     low, high = max(gap.first - 1, 0), min(gap.end + 1, len(positions))
-    there = np.isfinite(positions[low:high, :, 0]).all(axis=0)
-    there[gap.marker] = False
-    if not (one.helpers and there[list(one.helpers)].all() and one.trusted[gap.first : gap.end].all()):
-        one = _others(positions, gap, soft, there, shapes)
-    return one if one.helpers and one.trusted[gap.first : gap.end].all() else None
+    visible = np.isfinite(positions[low:high, :, 0]).all(axis=0)
+    visible[gap.marker] = False
+    if not (one.carriers and visible[list(one.carriers)].all() and one.is_trusted[gap.first : gap.end].all()):
+        one = _carry_by_others(positions, gap, softness, visible, shapes)
+    return one if one.carriers and one.is_trusted[gap.first : gap.end].all() else None
 
 
-def _firmly(one, gap, longest):
+def _fill_by_carriers(one, gap, longest):
     """Fill by firm carriers: ("cluster", path (n, 3)), or None."""
-    if one is None or gap.frames > longest or one.sigma > _SOFT or quantile(one.away, 0.95) > _SOFT_AT_TIMES:
+    if one is None or gap.frames > longest or one.sigma > _SOFT_SIGMA or compute_quantile(one.away, 0.95) > _SOFT_QUANTILE:
         return None
-    begins, ends = gap.first > 0, gap.end < len(one.local)
-    before = one.local[gap.first - 1] if begins else one.local[gap.end]
-    after = one.local[gap.end] if ends else before
+    has_before, has_after = gap.first > 0, gap.end < len(one.local)
+    before = one.local[gap.first - 1] if has_before else one.local[gap.end]
+    after = one.local[gap.end] if has_after else before
     if np.isnan(before[0]) or np.isnan(after[0]):
         return None
     share = np.arange(1, gap.frames + 1)[:, None] / (gap.frames + 1)
-    return "cluster", _in_the_world(one, gap, before + share * (after - before))
+    return "cluster", _to_world(one, gap, before + share * (after - before))
 
 
-def _by_a_curve(positions, one, gap, fps, longest):
+def _fill_by_curve(positions, one, gap, fps, limits):
     """Fill a short gap by a curve: ("soft", path) or ("spline", path), or None.
 
     Of the carriers' frame and the world, the one is used in which the curve deviates less elsewhere in the trial; None
     where both deviate too much.
     """
-    ways = []
-    if one is not None and gap.frames <= longest.soft * fps:
-        ways.append(("soft", one.local))
-    if gap.frames <= longest.spline * fps:
-        ways.append(("spline", positions[:, gap.marker]))
-    tried = [(_expected(way, gap.frames, fps), how, way) for how, way in ways]
-    for expected, how, way in sorted(tried, key=lambda row: row[0]):
-        path = bridge(way, gap.first, gap.end, fps)
-        if path is not None and expected < _NEAR:
-            return how, _in_the_world(one, gap, path) if how == "soft" else path
+    trajectories = []
+    if one is not None and gap.frames <= limits.soft * fps:
+        trajectories.append(("soft", one.local))
+    if gap.frames <= limits.spline * fps:
+        trajectories.append(("spline", positions[:, gap.marker]))
+    rated = [(_estimate_curve_error(trajectory, gap.frames, fps), method, trajectory) for method, trajectory in trajectories]
+    for expected, method, trajectory in sorted(rated, key=lambda row: row[0]):
+        path = bridge_gap(trajectory, gap.first, gap.end, fps)
+        if path is not None and expected < _MAX_CURVE_ERROR:
+            return method, _to_world(one, gap, path) if method == "soft" else path
     return None
 
 
-def _expected(way, frames, fps):
+def _estimate_curve_error(trajectory, frames, fps):
     """Estimate the error in metres of a curve over `frames`: the 90 % quantile over some visible stretches."""
-    seen = np.concatenate([[0], np.cumsum(np.isfinite(way[:, 0]))])
-    edge = max(4, int(round(_EDGE * fps)) + 1)
-    starts = np.arange(edge, len(way) - frames - edge)
+    seen = np.concatenate([[0], np.cumsum(np.isfinite(trajectory[:, 0]))])
+    edge = max(4, int(round(_EDGE_SECONDS * fps)) + 1)
+    starts = np.arange(edge, len(trajectory) - frames - edge)
     # stretches of which all frames and both edges are visible, by differences of the cumulative count
     starts = starts[seen[starts + frames + edge] - seen[starts - edge] == frames + 2 * edge] if len(starts) else starts
     if len(starts) < 3:
         return np.inf
     off = []
-    for first in starts[np.unique(np.linspace(0, len(starts) - 1, _TRIES).astype(int))]:
-        curve = bridge(way, int(first), int(first) + frames, fps)
-        off.append(np.linalg.norm(curve - way[first : first + frames], axis=-1).max())
+    for first in starts[np.unique(np.linspace(0, len(starts) - 1, _TRIAL_COUNT).astype(int))]:
+        curve = bridge_gap(trajectory, int(first), int(first) + frames, fps)
+        off.append(np.linalg.norm(curve - trajectory[first : first + frames], axis=-1).max())
     return float(np.quantile(off, 0.9))
 
 
-def _in_the_world(one, gap, local):
+def _to_world(one, gap, local):
     """Convert places (n, 3) metres in the carriers' frame to the world, over the frames of a gap."""
     turn, shift = one.fit.rotation[gap.first : gap.end], one.fit.shift[gap.first : gap.end]
     return np.einsum("tij,tj->ti", turn, local) + shift
 
 
-def _others(positions, gap, soft, there, shapes):
+def _carry_by_others(positions, gap, softness, visible, shapes):
     """Measure how the marker of a gap is carried by markers that are visible (M,) throughout."""
-    reachable = np.where(there[None, :] & there[:, None], soft, np.inf)
-    reachable[gap.marker] = np.where(there, soft[gap.marker], np.inf)
-    helpers = helpers_of(gap.marker, reachable, positions)
+    reachable = np.where(visible[None, :] & visible[:, None], softness, np.inf)
+    reachable[gap.marker] = np.where(visible, softness[gap.marker], np.inf)
+    helpers = choose_carriers(gap.marker, reachable, positions)
     if helpers and helpers not in shapes:
-        shapes[helpers] = mean_shape(positions[:, list(helpers)])
-    return carried(positions, gap.marker, helpers, shapes.get(helpers))
+        shapes[helpers] = compute_mean_shape(positions[:, list(helpers)])
+    return measure_carried_marker(positions, gap.marker, helpers, shapes.get(helpers))
 
 
-def bridge(way: np.ndarray, first: int, end: int, fps: float) -> np.ndarray | None:
+def bridge_gap(trajectory: np.ndarray, first: int, end: int, fps: float) -> np.ndarray | None:
     """Build a cubic curve across frames, with the slopes of the trajectory on either side.
 
     Args:
@@ -188,24 +188,24 @@ def bridge(way: np.ndarray, first: int, end: int, fps: float) -> np.ndarray | No
     Returns:
         (end - first, 3) metres; None where the trajectory is not visible on both sides.
     """
-    if first == 0 or end == len(way):
+    if first == 0 or end == len(trajectory):
         return None
-    before, after = _edge(way[:first][::-1], fps), _edge(way[end:], fps)
+    before, after = _measure_edge_slope(trajectory[:first][::-1], fps), _measure_edge_slope(trajectory[end:], fps)
     if before is None or after is None:
         return None
     span = end - first + 1
     share = (np.arange(1, span) / span)[:, None]
-    return hermite(share, way[first - 1], -before * span, way[end], after * span)
+    return hermite(share, trajectory[first - 1], -before * span, trajectory[end], after * span)
 
 
-def _edge(way, fps):
+def _measure_edge_slope(trajectory, fps):
     """Measure the slope (3,) metres per frame at the first frame of a trajectory, by a parabola; None where it is
     too short.
     """
-    count = min(len(way), max(4, int(round(_EDGE * fps)) + 1))
-    there = np.flatnonzero(np.isnan(way[:count, 0]))
+    count = min(len(trajectory), max(4, int(round(_EDGE_SECONDS * fps)) + 1))
+    there = np.flatnonzero(np.isnan(trajectory[:count, 0]))
     count = int(there[0]) if len(there) else count
     if count < 2:
         return None
     t = np.arange(count, dtype=float)
-    return np.polynomial.polynomial.polyfit(t, way[:count], min(2, count - 1))[1]
+    return np.polynomial.polynomial.polyfit(t, trajectory[:count], min(2, count - 1))[1]

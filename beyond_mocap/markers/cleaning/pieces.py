@@ -11,32 +11,32 @@ from typing import NamedTuple
 import numpy as np
 
 from ..model.marker_set import UNLABELED
-from .carriers import Carried
-from .cluster_shape import quantile
-from .gaps import bridge
+from .carriers import CarriedMarker
+from .cluster_shape import compute_quantile
+from .gaps import bridge_gap
 
 # A step that bends the trajectory by more than this is a leap, in metres, if it is also more than what a limb can do in
 # a frame, in m/s^2 (in the carriers' frame, and in the world), and this many times the marker's own 95 % quantile.
-_LEAP_LOCAL, _LEAP_WORLD, _TIMES_ITS_OWN = 0.02, 0.04, 6.0
+_LEAP_LOCAL, _LEAP_WORLD, _LEAP_OWN_RATIO = 0.02, 0.04, 6.0
 _LEAP_SWING_LOCAL, _LEAP_SWING_WORLD = 200.0, 500.0
 
-_BURST = 0.08  # s, the longest burst that is removed as a jump
+_MAX_BURST_SECONDS = 0.08  # s, the longest burst that is removed as a jump
 # how far off its trajectory a burst lies at least, in metres and as a share of the marker's movement meanwhile
-_LEAST_BURST, _LEAST_SHARE = 0.015, 0.3
-_GHOST = 0.06  # metres from where the carriers predict the marker, from which on a longer stretch is a ghost
+_MIN_BURST_OFFSET, _MIN_BURST_SHARE = 0.015, 0.3
+_MIN_GHOST_OFFSET = 0.06  # metres from where the carriers predict the marker, from which on a longer stretch is a ghost
 # A single sample is off if it leaves the trajectory by this many metres (in the carriers' frame, in the world), by more
 # than limbs can do in a frame, in m/s^2, and by this many times the 90 % quantile of the samples around it.
-_OFF_LOCAL, _OFF_WORLD, _TIMES = 0.006, 0.015, 3.0
-_SWING_LOCAL, _SWING_WORLD = 100.0, 300.0
-_AROUND = 12  # frames before and after that count as around
+_SPIKE_LOCAL, _SPIKE_WORLD, _SPIKE_RATIO = 0.006, 0.015, 3.0
+_SPIKE_SWING_LOCAL, _SPIKE_SWING_WORLD = 100.0, 300.0
+_AROUND_FRAMES = 12  # frames before and after that count as around
 # Share of a jump in the carriers' frame that must also show in the world; else it is a carrier that jumps.
-_ITS_OWN = 0.5
+_MIN_WORLD_SHARE = 0.5
 
-_SHORTEST = 0.02  # s, shorter pieces are not assigned
+_MIN_PIECE_SECONDS = 0.02  # s, shorter pieces are not assigned
 # Without carriers: distance in metres between the ends of a piece and the label's trajectory, and the gap between them
 # in seconds, at most.
-_JOINS, _WITHIN = 0.02, 0.05
-_AGREES = 0.01  # metres by which label and unlabeled marker may differ where both are visible
+_MAX_JOIN_DISTANCE, _MAX_JOIN_SECONDS = 0.02, 0.05
+_AGREEMENT_TOLERANCE = 0.01  # metres by which label and unlabeled marker may differ where both are visible
 
 
 class Piece(NamedTuple):
@@ -53,7 +53,7 @@ class Piece(NamedTuple):
     end: int
 
 
-def leaps(positions: np.ndarray, carried: Mapping[int, Carried], fps: float) -> np.ndarray:
+def detect_leaps(positions: np.ndarray, carried: Mapping[int, CarriedMarker], fps: float) -> np.ndarray:
     """Detect the frames at which markers leap.
 
     The bend of the trajectory is tested in the world, and in the frame of the marker's carriers.
@@ -65,18 +65,18 @@ def leaps(positions: np.ndarray, carried: Mapping[int, Carried], fps: float) -> 
     Returns:
         (T, M) bool, True at the frame after the leap.
     """
-    out = _leaping(positions, max(_LEAP_WORLD, _LEAP_SWING_WORLD / fps**2))
+    out = _exceeds_bend(positions, max(_LEAP_WORLD, _LEAP_SWING_WORLD / fps**2))
     local = max(_LEAP_LOCAL, _LEAP_SWING_LOCAL / fps**2)
     for marker, one in carried.items():
-        if not one.helpers:
+        if not one.carriers:
             continue
         known = np.isfinite(one.local[:, 0])
         both = np.concatenate([[False], known[1:] & known[:-1]])
-        out[:, marker] |= both & _leaping(one.local[:, None], local)[:, 0]
+        out[:, marker] |= both & _exceeds_bend(one.local[:, None], local)[:, 0]
     return out
 
 
-def pieces(positions: np.ndarray, leaping: np.ndarray) -> list[Piece]:
+def split_pieces(positions: np.ndarray, leaping: np.ndarray) -> list[Piece]:
     """Split the trajectories of markers into pieces.
 
     Args:
@@ -88,16 +88,16 @@ def pieces(positions: np.ndarray, leaping: np.ndarray) -> list[Piece]:
     seen = np.isfinite(positions[..., 0])
     found = []
     for marker in range(positions.shape[1]):
-        there = np.concatenate([[False], seen[:, marker], [False]])
+        visible = np.concatenate([[False], seen[:, marker], [False]])
         # a piece begins after a frame without sight or at a leap, and ends before one
-        begins = there[1:-1] & (~there[:-2] | leaping[:, marker])
+        begins = visible[1:-1] & (~visible[:-2] | leaping[:, marker])
         firsts = np.flatnonzero(begins)
-        ends = np.flatnonzero(there[1:-1] & (~there[2:] | np.append(leaping[1:, marker], False))) + 1
+        ends = np.flatnonzero(visible[1:-1] & (~visible[2:] | np.append(leaping[1:, marker], False))) + 1
         found += [Piece(marker, int(first), int(end)) for first, end in zip(firsts, ends)]
     return found
 
 
-def bend(places: np.ndarray) -> np.ndarray:
+def measure_bend(places: np.ndarray) -> np.ndarray:
     """Measure how much the step into each frame differs from the two before and the two after: the smallest difference.
 
     A leap differs from them all; a frame after a leap, or between two, does not.
@@ -119,13 +119,13 @@ def bend(places: np.ndarray) -> np.ndarray:
     return np.where(np.isfinite(least), least, np.nan)
 
 
-def _leaping(places, least):
+def _exceeds_bend(places, least):
     """Return which of places (T, N, 3) metres bend by more than `least` metres and the marker's own usual: (T, N)
     bool.
     """
-    bent = bend(places)
-    own = np.nan_to_num(quantile(bent, 0.95))
-    return np.nan_to_num(bent) > np.maximum(least, _TIMES_ITS_OWN * own)
+    bends = measure_bend(places)
+    own = np.nan_to_num(compute_quantile(bends, 0.95))
+    return np.nan_to_num(bends) > np.maximum(least, _LEAP_OWN_RATIO * own)
 
 
 class Jump(NamedTuple):
@@ -144,7 +144,7 @@ class Jump(NamedTuple):
     off: float
 
 
-def take_out(positions: np.ndarray, carried: Mapping[int, Carried], fps: float) -> tuple[np.ndarray, list[Jump]]:
+def remove_jumps(positions: np.ndarray, carried: Mapping[int, CarriedMarker], fps: float) -> tuple[np.ndarray, list[Jump]]:
     """Remove samples that jump.
 
     Args:
@@ -155,58 +155,58 @@ def take_out(positions: np.ndarray, carried: Mapping[int, Carried], fps: float) 
         The positions with NaN for removed samples, and the jumps.
     """
     out, found = positions.copy(), []
-    for jump in [*_bursts(positions, carried, fps), *_ghosts(positions, carried, fps)]:
+    for jump in [*_iter_bursts(positions, carried, fps), *_iter_ghosts(positions, carried, fps)]:
         out[jump.first : jump.end, jump.marker] = np.nan
         found.append(jump)
-    for jump in _spikes(out, carried, fps):
+    for jump in _iter_spikes(out, carried, fps):
         out[jump.first, jump.marker] = np.nan
         found.append(jump)
     return out, sorted(found, key=lambda jump: (jump.first, jump.marker))
 
 
-def _bursts(positions, carried, fps):
+def _iter_bursts(positions, carried, fps):
     """Find short pieces between leaps (or a leap and a gap) that lie off the trajectory before and after them."""
-    leaping = leaps(positions, carried, fps)
-    most = max(3, int(round(_BURST * fps)))
+    leaping = detect_leaps(positions, carried, fps)
+    most = max(3, int(round(_MAX_BURST_SECONDS * fps)))
     seen = np.isfinite(positions[..., 0])
     # the shortest first, so that a good piece between two jumps is not taken for one
-    for piece in sorted(pieces(positions, leaping), key=lambda piece: piece.end - piece.first):
+    for piece in sorted(split_pieces(positions, leaping), key=lambda piece: piece.end - piece.first):
         marker, first, end = piece
-        leapt = leaping[first, marker] or (end < len(positions) and leaping[end, marker])
-        if end - first > most or not leapt:
+        has_leap = leaping[first, marker] or (end < len(positions) and leaping[end, marker])
+        if end - first > most or not has_leap:
             continue
         one = carried.get(marker)
-        off, allowed = _off(positions[:, marker], seen[:, marker], piece, most, fps)
-        if one is not None and one.helpers:
-            near, near_allowed = _off(one.local, seen[:, marker] & np.isfinite(one.local[:, 0]), piece, most, fps)
+        off, allowed = _measure_offset(positions[:, marker], seen[:, marker], piece, most, fps)
+        if one is not None and one.carriers:
+            near, near_allowed = _measure_offset(one.local, seen[:, marker] & np.isfinite(one.local[:, 0]), piece, most, fps)
             if np.isfinite(near_allowed):
                 # a marker that only seems to jump, because a carrier does, stays on its trajectory in the world
-                off, allowed = (near, near_allowed) if off > _ITS_OWN * near else (0.0, near_allowed)
+                off, allowed = (near, near_allowed) if off > _MIN_WORLD_SHARE * near else (0.0, near_allowed)
         if off > allowed:
             seen[first:end, marker] = False
             yield Jump(marker, first, end, off)
 
 
-def _ghosts(positions, carried, fps):
+def _iter_ghosts(positions, carried, fps):
     """Find longer pieces that begin or end in a leap and lie throughout far from where the markers around predict
     them.
     """
-    leaping = leaps(positions, carried, fps)
-    most = max(3, int(round(_BURST * fps)))
+    leaping = detect_leaps(positions, carried, fps)
+    most = max(3, int(round(_MAX_BURST_SECONDS * fps)))
     seen = np.isfinite(positions[..., 0])
-    for marker, first, end in pieces(positions, leaping):
+    for marker, first, end in split_pieces(positions, leaping):
         one = carried.get(marker)
-        leapt = leaping[first, marker] or (end < len(positions) and leaping[end, marker])
-        if one is None or not one.helpers or not leapt or end - first <= most:
+        has_leap = leaping[first, marker] or (end < len(positions) and leaping[end, marker])
+        if one is None or not one.carriers or not has_leap or end - first <= most:
             continue
         away = one.away[first:end]
-        near = float(np.nan_to_num(quantile(away, 0.05)))
-        told = np.isfinite(away).mean() > 0.5 and 2 * (end - first) < seen[:, marker].sum()
-        if told and near > max(_GHOST, 2.0 * one.tolerance):
+        near = float(np.nan_to_num(compute_quantile(away, 0.05)))
+        is_comparable = np.isfinite(away).mean() > 0.5 and 2 * (end - first) < seen[:, marker].sum()
+        if is_comparable and near > max(_MIN_GHOST_OFFSET, 2.0 * one.tolerance):
             yield Jump(marker, first, end, near)
 
 
-def _off(way, seen, piece, most, fps):
+def _measure_offset(trajectory, seen, piece, most, fps):
     """Measure how far a piece lies off the smooth curve across it, and how far it may, in metres.
 
     `trajectory` (T, 3) is that of the marker; without a curve the result is 0 and inf.
@@ -216,36 +216,36 @@ def _off(way, seen, piece, most, fps):
     if not (len(before) and len(after)) or after[0] - before[-1] > 2 * most or not seen[first:end].all():
         return 0.0, np.inf
     low, high = int(before[-1]), int(after[0])
-    across = bridge(np.where(seen[:, None], way, np.nan), low + 1, high, fps)
-    if across is None:
+    curve = bridge_gap(np.where(seen[:, None], trajectory, np.nan), low + 1, high, fps)
+    if curve is None:
         return 0.0, np.inf
-    off = np.linalg.norm(way[first:end] - across[first - low - 1 : end - low - 1], axis=-1)
-    return float(off.min()), max(_LEAST_BURST, _LEAST_SHARE * float(np.linalg.norm(way[high] - way[low])))
+    off = np.linalg.norm(trajectory[first:end] - curve[first - low - 1 : end - low - 1], axis=-1)
+    return float(off.min()), max(_MIN_BURST_OFFSET, _MIN_BURST_SHARE * float(np.linalg.norm(trajectory[high] - trajectory[low])))
 
 
-def _spikes(positions, carried, fps):
+def _iter_spikes(positions, carried, fps):
     """Find single samples off the curve through their neighbours."""
-    world = _spiking(positions)
-    usual = _around(world)
-    local_least, world_least = max(_OFF_LOCAL, _SWING_LOCAL / fps**2), max(_OFF_WORLD, _SWING_WORLD / fps**2)
+    world = _measure_spikes(positions)
+    usual = _compute_usual_around(world)
+    local_least, world_least = max(_SPIKE_LOCAL, _SPIKE_SWING_LOCAL / fps**2), max(_SPIKE_WORLD, _SPIKE_SWING_WORLD / fps**2)
     for marker in range(positions.shape[1]):
         one = carried.get(marker)
         off, around, least = world[:, marker], usual[:, marker], np.full(len(positions), world_least)
-        if one is not None and one.helpers:
-            local = _spiking(np.where(np.isfinite(positions[:, marker]), one.local, np.nan)[:, None])[:, 0]
+        if one is not None and one.carriers:
+            local = _measure_spikes(np.where(np.isfinite(positions[:, marker]), one.local, np.nan)[:, None])[:, 0]
             known = np.isfinite(local)
-            around = np.where(known, _around(local[:, None])[:, 0], around)
+            around = np.where(known, _compute_usual_around(local[:, None])[:, 0], around)
             least = np.where(known, local_least, least)
-            off = np.where(known, np.where(off > _ITS_OWN * local, local, 0.0), off)
+            off = np.where(known, np.where(off > _MIN_WORLD_SHARE * local, local, 0.0), off)
         with np.errstate(invalid="ignore"):
-            spike = off > np.maximum(least, _TIMES * around)  # NaN is no spike
+            spike = off > np.maximum(least, _SPIKE_RATIO * around)  # NaN is no spike
         for frame in np.flatnonzero(spike):
             # of neighbours, the one farthest off is the spike; the others are only affected by it
             if off[frame] >= np.nanmax(off[max(frame - 2, 0) : frame + 3]):
                 yield Jump(marker, int(frame), int(frame) + 1, float(off[frame]))
 
 
-def _spiking(places):
+def _measure_spikes(places):
     """Measure how far each sample is off the curve through two before and two after it, (T, N) metres; NaN if one is
     missing.
     """
@@ -257,17 +257,17 @@ def _spiking(places):
     return out
 
 
-def _around(off):
+def _compute_usual_around(off):
     """Compute the 90 % quantile of the frames around each one, (T, N) metres, without itself and its next
     neighbours.
     """
     frames = len(off)
-    steps = [step for step in range(-_AROUND, _AROUND + 1) if abs(step) > 2]
+    steps = [step for step in range(-_AROUND_FRAMES, _AROUND_FRAMES + 1) if abs(step) > 2]
     index = np.clip(np.arange(frames)[:, None] + steps, 0, max(frames - 1, 0))
-    return np.nan_to_num(quantile(off[index], 0.9, axis=1)) if frames else off
+    return np.nan_to_num(compute_quantile(off[index], 0.9, axis=1)) if frames else off
 
 
-class Assigned(NamedTuple):
+class Assignment(NamedTuple):
     """An unlabeled marker that took a label.
 
     Attributes:
@@ -285,7 +285,7 @@ class Assigned(NamedTuple):
     off: float
 
 
-def unlabeled(labels: Sequence[str], known: Sequence[str] = ()) -> list[int]:
+def find_unlabeled(labels: Sequence[str], known: Sequence[str] = ()) -> list[int]:
     """Find the unlabeled markers (`*7`, `U12`, ...).
 
     Args:
@@ -297,8 +297,8 @@ def unlabeled(labels: Sequence[str], known: Sequence[str] = ()) -> list[int]:
     return [index for index, label in enumerate(labels) if label not in known and UNLABELED.match(label)]
 
 
-def assign(positions: np.ndarray, carried: Mapping[int, Carried], nameless: Sequence[int],
-           fps: float) -> tuple[np.ndarray, list[Assigned]]:
+def assign_labels(positions: np.ndarray, carried: Mapping[int, CarriedMarker], unlabeled: Sequence[int],
+           fps: float) -> tuple[np.ndarray, list[Assignment]]:
     """Assign pieces of unlabeled markers to the labels that they belong to.
 
     The best match goes first; a label takes at most one piece at a time, and each frame of a piece is used once.
@@ -312,77 +312,77 @@ def assign(positions: np.ndarray, carried: Mapping[int, Carried], nameless: Sequ
         The positions with the pieces moved, and the assignments.
     """
     out, found = positions.copy(), []
-    alone = np.ascontiguousarray(positions[:, list(nameless)])
-    offered = [
-        Piece(nameless[piece.marker], piece.first, piece.end)
-        for piece in pieces(alone, leaps(alone, {}, fps)) if piece.end - piece.first >= max(2, _SHORTEST * fps)
+    alone = np.ascontiguousarray(positions[:, list(unlabeled)])
+    candidates = [
+        Piece(unlabeled[piece.marker], piece.first, piece.end)
+        for piece in split_pieces(alone, detect_leaps(alone, {}, fps)) if piece.end - piece.first >= max(2, _MIN_PIECE_SECONDS * fps)
     ]
-    lacking = [marker for marker in carried if marker not in nameless and np.isnan(positions[:, marker, 0]).any()]
-    asked = (_offer(positions, carried, piece, marker, fps) for piece in offered for marker in lacking)
-    offers = [offer for offer in asked if offer]
-    for offer in sorted(offers):
+    lacking = [marker for marker in carried if marker not in unlabeled and np.isnan(positions[:, marker, 0]).any()]
+    rated = (_rate_match(positions, carried, piece, marker, fps) for piece in candidates for marker in lacking)
+    matches = [offer for offer in rated if offer]
+    for offer in sorted(matches):
         _, piece, marker, off = offer
-        way = out[piece.first : piece.end, piece.marker]
-        free = np.isfinite(way[:, 0]) & np.isnan(out[piece.first : piece.end, marker, 0])
+        trajectory = out[piece.first : piece.end, piece.marker]
+        free = np.isfinite(trajectory[:, 0]) & np.isnan(out[piece.first : piece.end, marker, 0])
         if not free.any():
             continue
         frames = np.flatnonzero(free) + piece.first
         out[frames, marker] = out[frames, piece.marker]
         out[frames, piece.marker] = np.nan
-        found.append(Assigned(piece.marker, marker, int(frames[0]), int(frames[-1]) + 1, off))
+        found.append(Assignment(piece.marker, marker, int(frames[0]), int(frames[-1]) + 1, off))
     return out, sorted(found, key=lambda one: one.first)
 
 
-def _offer(positions, carried, piece, marker, fps):
+def _rate_match(positions, carried, piece, marker, fps):
     """Rate a piece that may be this marker: (rank, piece, marker, metres off), or None."""
     stretch = slice(piece.first, piece.end)
-    way = positions[stretch, piece.marker]
+    trajectory = positions[stretch, piece.marker]
     missing = np.isnan(positions[stretch, marker, 0])
-    if not missing.any() or _disagree(way, positions[stretch, marker]):
+    if not missing.any() or _has_conflict(trajectory, positions[stretch, marker]):
         return None
     one = carried[marker]
-    joins = _joins(positions, piece, marker, fps)
-    if one.helpers:
-        off = np.linalg.norm(one.brought(_over(positions, piece))[stretch] - one.place, axis=-1)[missing]
-        told = off[np.isfinite(off)]
-        if len(told) >= max(2, 0.3 * missing.sum()):
-            median, worst = float(np.median(told)), float(np.percentile(told, 95.0))
+    join_distance = _measure_join_distance(positions, piece, marker, fps)
+    if one.carriers:
+        off = np.linalg.norm(one.to_local(_expand_piece(positions, piece))[stretch] - one.place, axis=-1)[missing]
+        known = off[np.isfinite(off)]
+        if len(known) >= max(2, 0.3 * missing.sum()):
+            median, worst = float(np.median(known)), float(np.percentile(known, 95.0))
             fits = median < one.tolerance and worst < 2.0 * one.tolerance
             # soft carriers alone are no proof: the trajectories must join as well
-            sure = one.tolerance < 0.06 or joins is not None
+            sure = one.tolerance < 0.06 or join_distance is not None
             return (median / one.tolerance, piece, marker, median) if fits and sure else None
-    return (2.0 + joins, piece, marker, joins) if joins is not None else None
+    return (2.0 + join_distance, piece, marker, join_distance) if join_distance is not None else None
 
 
-def _over(positions, piece):
+def _expand_piece(positions, piece):
     """Return the unlabeled marker's trajectory over all frames, NaN outside the piece: (T, 3) metres."""
-    way = np.full((len(positions), 3), np.nan)
-    way[piece.first : piece.end] = positions[piece.first : piece.end, piece.marker]
-    return way
+    trajectory = np.full((len(positions), 3), np.nan)
+    trajectory[piece.first : piece.end] = positions[piece.first : piece.end, piece.marker]
+    return trajectory
 
 
-def _disagree(way, labelled):
+def _has_conflict(trajectory, labelled):
     """Return whether label and unlabeled marker are both visible, in different places."""
-    apart = np.linalg.norm(way - labelled, axis=-1)
-    return bool((apart > _AGREES).any())
+    apart = np.linalg.norm(trajectory - labelled, axis=-1)
+    return bool((apart > _AGREEMENT_TOLERANCE).any())
 
 
-def _joins(positions, piece, marker, fps):
+def _measure_join_distance(positions, piece, marker, fps):
     """Measure how far the piece is from the label's trajectory where they should meet, in metres.
 
     The larger distance of both ends is returned; None if it is too large, or no end is near enough in time.
     """
     seen = np.isfinite(positions[:, marker, 0])
     before, after = np.flatnonzero(seen[: piece.first]), np.flatnonzero(seen[piece.end :]) + piece.end
-    within, way = max(1, int(_WITHIN * fps)), positions[:, piece.marker]
+    within, trajectory = max(1, int(_MAX_JOIN_SECONDS * fps)), positions[:, piece.marker]
     misses = []
     if len(before) and piece.first - before[-1] <= within and piece.end - piece.first > 1:
         steps = piece.first - before[-1]
         # extrapolate the piece linearly to the label's last visible frame before it
-        back = way[piece.first] - steps * (way[piece.first + 1] - way[piece.first])
+        back = trajectory[piece.first] - steps * (trajectory[piece.first + 1] - trajectory[piece.first])
         misses.append(float(np.linalg.norm(back - positions[before[-1], marker])))
     if len(after) and after[0] - (piece.end - 1) <= within and piece.end - piece.first > 1:
         steps = after[0] - (piece.end - 1)
-        on = way[piece.end - 1] + steps * (way[piece.end - 1] - way[piece.end - 2])
+        on = trajectory[piece.end - 1] + steps * (trajectory[piece.end - 1] - trajectory[piece.end - 2])
         misses.append(float(np.linalg.norm(on - positions[after[0], marker])))
-    return max(misses) if misses and max(misses) < _JOINS else None
+    return max(misses) if misses and max(misses) < _MAX_JOIN_DISTANCE else None

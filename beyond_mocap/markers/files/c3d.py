@@ -17,16 +17,16 @@ from pathlib import Path
 import numpy as np
 
 from ...base.errors import InputError
-from ...files.content import opened
-from ..trial import FEWEST_FPS, MOST_FPS, MarkerTrial
-from .raw_markers import RawMarkers, as_trial
+from ...files.content import open_file
+from ..trial import MIN_FPS, MAX_FPS, MarkerTrial
+from .raw_markers import RawMarkers, build_trial
 
 BLOCK = 512  # bytes
 _PROCESSORS = {84: "<", 85: "<", 86: ">"}  # Intel, DEC, SGI/MIPS: the byte order
 _DEC = 85
-_EVENTS_IN_HEADER = 18
+_MAX_HEADER_EVENTS = 18
 _EXPORT_AGAIN = "export it again"
-_NO_MARKERS = ("ANGLES", "FORCES", "MOMENTS", "POWERS", "SCALARS", "REACTIONS", "MODELED_MARKERS")
+_COMPUTED_GROUPS = ("ANGLES", "FORCES", "MOMENTS", "POWERS", "SCALARS", "REACTIONS", "MODELED_MARKERS")
 _AXES = {sign + axis: ("XYZ".index(axis), -1 if sign == "-" else 1) for sign in ("", "+", "-") for axis in "XYZ"}
 
 
@@ -47,13 +47,13 @@ def read_c3d(path: str | os.PathLike, unit: float | str | None = None, subject: 
         InputError: if the file is missing, damaged, cut off or not a C3D file, and as `raw_markers.build_trial`.
     """
     path = Path(path)
-    with opened(path, "a C3D file") as handle:
+    with open_file(path, "a C3D file") as handle:
         size = os.fstat(handle.fileno()).st_size
-        parameters = _parameters(path, handle, size)
-        layout = _layout(path, parameters, size)
-        words = _words(path, handle, layout)
-    positions, residuals = _points(words, layout, parameters)
-    return as_trial(_raw(path, parameters, layout, positions, residuals), path, unit, subject, up)
+        parameters = _read_parameters(path, handle, size)
+        layout = _find_layout(path, parameters, size)
+        words = _read_words(path, handle, layout)
+    positions, residuals = _decode_points(words, layout, parameters)
+    return build_trial(_build_raw_markers(path, parameters, layout, positions, residuals), path, unit, subject, up)
 
 
 # -- header and parameters
@@ -68,7 +68,7 @@ class _Parameters:
     def __init__(self, reader, order: str, dec: bool):
         self._reader, self.header, self.order, self.dec = reader, reader.header, order, dec
 
-    def numbers(self, name: str, unsigned: bool = True) -> np.ndarray:
+    def read_numbers(self, name: str, unsigned: bool = True) -> np.ndarray:
         """Return the values of a numeric parameter.
 
         Args:
@@ -85,14 +85,14 @@ class _Parameters:
         if size not in kinds:
             return np.zeros(0)
         data = parameter.bytes[: len(parameter.bytes) // size * size]
-        return _floats(data, self) if size == 4 else np.frombuffer(data, kinds[size]).astype(float)
+        return _decode_floats(data, self) if size == 4 else np.frombuffer(data, kinds[size]).astype(float)
 
-    def number(self, name: str) -> float:
+    def read_number(self, name: str) -> float:
         """Return the first value of a parameter; NaN where there is none."""
-        values = self.numbers(name)
+        values = self.read_numbers(name)
         return float(values[0]) if len(values) else math.nan
 
-    def texts(self, name: str) -> list[str]:
+    def read_texts(self, name: str) -> list[str]:
         """Return the texts of a parameter, and of its continuations NAME2, NAME3 ..."""
         out = []
         for number in itertools.chain([""], range(2, 100)):
@@ -101,11 +101,11 @@ class _Parameters:
                 break
             width = parameter.dimensions[0] if parameter.dimensions else 1
             data = parameter.bytes
-            out += [_text(data[i : i + width]) for i in range(0, len(data), width)] if width else []
+            out += [_decode_text(data[i : i + width]) for i in range(0, len(data), width)] if width else []
         return out
 
 
-def _text(data: bytes) -> str:
+def _decode_text(data: bytes) -> str:
     """Decode a text as UTF-8, else as Windows-1252, without control characters."""
     try:
         text = data.decode("utf-8")
@@ -114,7 +114,7 @@ def _text(data: bytes) -> str:
     return " ".join("".join(c if c.isprintable() else " " for c in text).split())
 
 
-def _floats(data: bytes, parameters: _Parameters) -> np.ndarray:
+def _decode_floats(data: bytes, parameters: _Parameters) -> np.ndarray:
     """Decode single-precision numbers as this file writes them, (N,) float."""
     if not parameters.dec:
         with np.errstate(invalid="ignore"):  # some kinds of NaN
@@ -126,7 +126,7 @@ def _floats(data: bytes, parameters: _Parameters) -> np.ndarray:
     return np.where((bits >> 23) & 0xFF == 0, 0.0, values)
 
 
-def _parameters(path: Path, handle, size: int) -> _Parameters:
+def _read_parameters(path: Path, handle, size: int) -> _Parameters:
     """Read header and parameters; raise InputError where they are damaged, or the file is of another kind."""
     head = handle.read(BLOCK)
     if len(head) < BLOCK or head[1] != 0x50 or head[0] == 0:
@@ -140,12 +140,12 @@ def _parameters(path: Path, handle, size: int) -> _Parameters:
     handle.seek(0)
     section = bytearray(handle.read(min(first + max(start[2], 1) * BLOCK, size)))
     order = _PROCESSORS[start[3]]
-    if int.from_bytes(section[300:302], "little" if order == "<" else "big") > _EVENTS_IN_HEADER:
+    if int.from_bytes(section[300:302], "little" if order == "<" else "big") > _MAX_HEADER_EVENTS:
         section[300:302] = b"\0\0"
-    return _Parameters(_parsed(path, bytes(section)), order, start[3] == _DEC)
+    return _Parameters(_parse_parameters(path, bytes(section)), order, start[3] == _DEC)
 
 
-def _parsed(path: Path, section: bytes):
+def _parse_parameters(path: Path, section: bytes):
     """Parse header and parameters with the package, without the data, so that wrong sizes cannot lead into it."""
     try:
         import c3d
@@ -200,19 +200,19 @@ class _Layout:
         return (4 * self.points + self.analog) * self.word
 
 
-def _layout(path: Path, parameters: _Parameters, size: int) -> _Layout:
+def _find_layout(path: Path, parameters: _Parameters, size: int) -> _Layout:
     """Find the layout that fits the size of the file, of all that header and parameters say, the header's first.
 
     Raises InputError where none fits.
     """
-    scale = _one_of(parameters.number("POINT:SCALE"), parameters.header.scale_factor)
+    scale = _find_number(parameters.read_number("POINT:SCALE"), parameters.header.scale_factor)
     if not 1e-12 < abs(scale) < 1e12:
         raise InputError(path, f"scale {scale:g} of the points", "a scale that is not 0", _EXPORT_AGAIN)
-    header, first, frames = parameters.header, *_frames(parameters)
-    blocks = _counts(header.data_block, parameters.number("POINT:DATA_START"))
+    header, first, frames = parameters.header, *_list_frame_counts(parameters)
+    blocks = _list_counts(header.data_block, parameters.read_number("POINT:DATA_START"))
     counts = {"data": [(block - 1) * BLOCK for block in blocks if block > 1],
-              "points": _counts(header.point_count, parameters.number("POINT:USED")),
-              "analog": _counts(header.analog_count, _analog(parameters)), "frames": frames}
+              "points": _list_counts(header.point_count, parameters.read_number("POINT:USED")),
+              "analog": _list_counts(header.analog_count, _count_analog(parameters)), "frames": frames}
     if not (any(counts["points"]) and counts["data"] and counts["frames"]):
         raise InputError(path, f"{header.point_count} markers, {max(counts['frames'], default=0)} frames", "markers",
                          "export the trial with its markers")  # fmt: skip
@@ -220,54 +220,54 @@ def _layout(path: Path, parameters: _Parameters, size: int) -> _Layout:
         _Layout(data=data, points=points, analog=analog, frames=count, scale=scale, first_frame=first, notes=())
         for data, points, analog, count in itertools.product(*counts.values()) if points
     ]
-    left = [size - layout.data - layout.frames * layout.stride for layout in layouts]
-    fitting = [i for i, rest in enumerate(left) if 0 <= rest < BLOCK] or [i for i, rest in enumerate(left) if rest >= 0]
+    remaining_bytes = [size - layout.data - layout.frames * layout.stride for layout in layouts]
+    fitting = [i for i, rest in enumerate(remaining_bytes) if 0 <= rest < BLOCK] or [i for i, rest in enumerate(remaining_bytes) if rest >= 0]
     if not fitting:
         best = layouts[0]
-        there = max(size - best.data, 0) // best.stride
+        present_frames = max(size - best.data, 0) // best.stride
         expected = f"{best.frames} as the header says"
-        raise InputError(path, f"{there} frames", expected, f"the file is cut off; {_EXPORT_AGAIN}")
+        raise InputError(path, f"{present_frames} frames", expected, f"the file is cut off; {_EXPORT_AGAIN}")
     chosen = layouts[fitting[0]]
     notes = [f"header and parameters disagree on {name}: {getattr(chosen, name)} fits the file"
-             for name, said in counts.items() if len(said) > 1]  # fmt: skip
+             for name, candidates in counts.items() if len(candidates) > 1]  # fmt: skip
     return _Layout(data=chosen.data, points=chosen.points, analog=chosen.analog, frames=chosen.frames, scale=scale,
                    first_frame=first, notes=tuple(notes))
 
 
-def _one_of(*values: float) -> float:
+def _find_number(*values: float) -> float:
     """Return the first value that is a number, or NaN."""
     return next((float(value) for value in values if math.isfinite(value)), math.nan)
 
 
-def _counts(*values: float) -> list[int]:
+def _list_counts(*values: float) -> list[int]:
     """List the different whole numbers among these values."""
     return list(dict.fromkeys(int(value) for value in values if math.isfinite(value) and value >= 0))
 
 
-def _analog(parameters: _Parameters) -> float:
+def _count_analog(parameters: _Parameters) -> float:
     """Count the analog values in a frame of points, as the parameters say; NaN where they do not."""
-    used, rate = parameters.number("ANALOG:USED"), parameters.number("ANALOG:RATE")
-    points = _one_of(parameters.number("POINT:RATE"), parameters.header.frame_rate)
+    used, rate = parameters.read_number("ANALOG:USED"), parameters.read_number("ANALOG:RATE")
+    points = _find_number(parameters.read_number("POINT:RATE"), parameters.header.frame_rate)
     if used == 0:
         return 0.0
     ratio = rate / points if points > 0 else math.nan
     return used * round(ratio) if math.isfinite(ratio) and abs(ratio) < 1e6 else math.nan
 
 
-def _frames(parameters: _Parameters) -> tuple[int, list[int]]:
+def _list_frame_counts(parameters: _Parameters) -> tuple[int, list[int]]:
     """Return the number of the first frame, and the numbers of frames given in different places, the most reliable
     first.
     """
-    start, end = (parameters.numbers(f"TRIAL:ACTUAL_{name}_FIELD") for name in ("START", "END"))
+    start, end = (parameters.read_numbers(f"TRIAL:ACTUAL_{name}_FIELD") for name in ("START", "END"))
     header = parameters.header
     first = int(start[0] + 65536 * start[1]) if len(start) == 2 else int(header.first_frame)
-    said = [int(end[0] + 65536 * end[1]) - first + 1] if len(end) == 2 else []
-    said += _counts(parameters.number("POINT:LONG_FRAMES"), header.last_frame - header.first_frame + 1.0,
-                    parameters.number("POINT:FRAMES"))  # fmt: skip
-    return first, list(dict.fromkeys(count for count in said if count > 0))
+    counts = [int(end[0] + 65536 * end[1]) - first + 1] if len(end) == 2 else []
+    counts += _list_counts(parameters.read_number("POINT:LONG_FRAMES"), header.last_frame - header.first_frame + 1.0,
+                    parameters.read_number("POINT:FRAMES"))  # fmt: skip
+    return first, list(dict.fromkeys(count for count in counts if count > 0))
 
 
-def _words(path: Path, handle, layout: _Layout) -> np.ndarray:
+def _read_words(path: Path, handle, layout: _Layout) -> np.ndarray:
     """Read (T, bytes of a frame's points) uint8."""
     handle.seek(layout.data)
     points = 4 * layout.points * layout.word
@@ -278,60 +278,60 @@ def _words(path: Path, handle, layout: _Layout) -> np.ndarray:
     return np.array(mapped[:, :points])
 
 
-def _points(words: np.ndarray, layout: _Layout, parameters: _Parameters) -> tuple[np.ndarray, np.ndarray]:
+def _decode_points(words: np.ndarray, layout: _Layout, parameters: _Parameters) -> tuple[np.ndarray, np.ndarray]:
     """Decode (T, M, 3) places in the file's unit, NaN where not visible, and (T, M) residuals."""
     shape, magnitude = (layout.frames, layout.points, 4), abs(layout.scale)
     if layout.scale < 0:
-        values = _floats(np.ascontiguousarray(words).tobytes(), parameters).reshape(shape)
+        values = _decode_floats(np.ascontiguousarray(words).tobytes(), parameters).reshape(shape)
         places, fourth = values[..., :3], values[..., 3]
     else:
         values = np.ascontiguousarray(words).view(f"{parameters.order}i2").reshape(shape).astype(float)
         places, fourth = values[..., :3] * magnitude, values[..., 3]
     # The fourth word: negative where the point is not visible, else cameras in the upper byte, residual in the lower.
-    unseen = ~(np.isfinite(values).all(axis=-1)) | (fourth < 0)
-    places = np.where(unseen[..., None], np.nan, places)
-    word = np.where(unseen | (fourth > 32767), 0, fourth).astype(int)
-    return places, np.where(unseen, np.nan, (word & 0xFF) * magnitude)
+    is_occluded = ~(np.isfinite(values).all(axis=-1)) | (fourth < 0)
+    places = np.where(is_occluded[..., None], np.nan, places)
+    word = np.where(is_occluded | (fourth > 32767), 0, fourth).astype(int)
+    return places, np.where(is_occluded, np.nan, (word & 0xFF) * magnitude)
 
 
 # -- what the parameters say about them
 
 
-def _raw(path: Path, parameters: _Parameters, layout: _Layout, positions, residuals) -> RawMarkers:
+def _build_raw_markers(path: Path, parameters: _Parameters, layout: _Layout, positions, residuals) -> RawMarkers:
     """Build the raw markers with labels, rate, unit, axes and events from the parameters."""
-    rate = _one_of(parameters.number("POINT:RATE"), parameters.header.frame_rate)
-    if not FEWEST_FPS <= rate <= MOST_FPS:
+    rate = _find_number(parameters.read_number("POINT:RATE"), parameters.header.frame_rate)
+    if not MIN_FPS <= rate <= MAX_FPS:
         rate = float(parameters.header.frame_rate)
-    if not FEWEST_FPS <= rate <= MOST_FPS:
-        raise InputError(path, f"{rate:g} frames per second", f"{FEWEST_FPS:g} to {MOST_FPS:g}", _EXPORT_AGAIN)
-    notes, labels = list(layout.notes), parameters.texts("POINT:LABELS")[: layout.points]
+    if not MIN_FPS <= rate <= MAX_FPS:
+        raise InputError(path, f"{rate:g} frames per second", f"{MIN_FPS:g} to {MAX_FPS:g}", _EXPORT_AGAIN)
+    notes, labels = list(layout.notes), parameters.read_texts("POINT:LABELS")[: layout.points]
     if len(labels) < layout.points:
         notes.append(f"{layout.points - len(labels)} of {layout.points} points have no label")
     return RawMarkers(
         labels=labels + [""] * (layout.points - len(labels)), positions=positions, fps=rate,
-        unit=" ".join(parameters.texts("POINT:UNITS")[:1]), residuals=residuals,
-        up=_AXES.get("".join(parameters.texts("POINT:Y_SCREEN")[:1]).strip().upper()),
-        prefixes=tuple(parameters.texts("SUBJECTS:LABEL_PREFIXES")),
-        listed=tuple(label for group in _listed(parameters) for label in parameters.texts(f"POINT:{group}")),
-        events=_events(parameters), start=max(layout.first_frame - 1, 0) / rate, notes=notes,
+        unit=" ".join(parameters.read_texts("POINT:UNITS")[:1]), residuals=residuals,
+        up=_AXES.get("".join(parameters.read_texts("POINT:Y_SCREEN")[:1]).strip().upper()),
+        prefixes=tuple(parameters.read_texts("SUBJECTS:LABEL_PREFIXES")),
+        computed=tuple(label for group in _list_computed_groups(parameters) for label in parameters.read_texts(f"POINT:{group}")),
+        events=_read_events(parameters), start=max(layout.first_frame - 1, 0) / rate, notes=notes,
     )
 
 
-def _listed(parameters: _Parameters) -> list[str]:
+def _list_computed_groups(parameters: _Parameters) -> list[str]:
     """List the parameters that name points that are no markers: the usual ones and those that the file defines
     itself.
     """
-    named = [name.upper() for name in parameters.texts("POINT:TYPE_GROUPS")]
-    return list(dict.fromkeys([*_NO_MARKERS, *(name for name in named if name not in ("LABELS", "DESCRIPTIONS"))]))
+    file_groups = [name.upper() for name in parameters.read_texts("POINT:TYPE_GROUPS")]
+    return list(dict.fromkeys([*_COMPUTED_GROUPS, *(name for name in file_groups if name not in ("LABELS", "DESCRIPTIONS"))]))
 
 
-def _events(parameters: _Parameters) -> list[tuple[float, str, str, str]]:
+def _read_events(parameters: _Parameters) -> list[tuple[float, str, str, str]]:
     """Read (seconds, label, side, subject) of the EVENT group, else of the header; seconds from frame 1."""
-    times = parameters.numbers("EVENT:TIMES")
-    labels, sides, whose = (parameters.texts(f"EVENT:{name}") for name in ("LABELS", "CONTEXTS", "SUBJECTS"))
-    used = parameters.number("EVENT:USED")
+    times = parameters.read_numbers("EVENT:TIMES")
+    labels, sides, whose = (parameters.read_texts(f"EVENT:{name}") for name in ("LABELS", "CONTEXTS", "SUBJECTS"))
+    used = parameters.read_number("EVENT:USED")
     count = min(len(times) // 2, int(used) if math.isfinite(used) else 0)
-    out = [(60 * times[2 * i] + times[2 * i + 1], _at(labels, i), _side(_at(sides, i)), _at(whose, i))
+    out = [(60 * times[2 * i] + times[2 * i + 1], _get_text(labels, i), _parse_side(_get_text(sides, i)), _get_text(whose, i))
            for i in range(count)]  # fmt: skip
     if not out:
         header = parameters.header
@@ -339,9 +339,9 @@ def _events(parameters: _Parameters) -> list[tuple[float, str, str, str]]:
     return [event for event in out if math.isfinite(event[0]) and abs(event[0]) < 1e6]
 
 
-def _at(values: list[str], index: int) -> str:
+def _get_text(values: list[str], index: int) -> str:
     return values[index] if index < len(values) else ""
 
 
-def _side(context: str) -> str:
+def _parse_side(context: str) -> str:
     return context.lower() if context.lower() in ("left", "right") else ""

@@ -8,23 +8,23 @@ from pathlib import Path
 from typing import Any
 
 from ...base.errors import InputError
-from ...files.content import utf8
+from ...files.content import read_utf8
 from ..model.marker_set import MarkerSet
 from ..model.template import JOINTS, LANDMARKS
 
 SHIPPED = Path(__file__).resolve().parents[2] / "markers" / "sets"
-LARGEST = 1_000_000  # bytes; a larger file is not a marker set
+MAX_BYTES = 1_000_000  # bytes; a larger file is not a marker set
 _FORM = "see docs/markers/markers.md"
 _LISTS = ("static", "optional", "ball", "other")
 _KEYWORDS = "marker set, about, segment JOINT, landmark NAME, also LABEL, static, optional, ball, other"
 
 
-def shipped_sets() -> tuple[MarkerSet, ...]:
+def read_shipped_sets() -> tuple[MarkerSet, ...]:
     """Read the marker sets that come with Beyond Mocap, sorted by name."""
     return tuple(sorted((read_marker_set(path) for path in SHIPPED.glob("*.txt")), key=lambda one: one.name))
 
 
-def chosen_set(named: str) -> MarkerSet:
+def choose_set(name: str) -> MarkerSet:
     """Choose a marker set by name or path.
 
     Args:
@@ -34,13 +34,13 @@ def chosen_set(named: str) -> MarkerSet:
     Raises:
         InputError: if there is neither.
     """
-    shipped = {one.name: one for one in shipped_sets()}
-    if named.strip().lower() in shipped:
-        return shipped[named.strip().lower()]
-    if not Path(named).exists():
-        found = f"no marker set {named[:60]!r}"
+    shipped = {one.name: one for one in read_shipped_sets()}
+    if name.strip().lower() in shipped:
+        return shipped[name.strip().lower()]
+    if not Path(name).exists():
+        found = f"no marker set {name[:60]!r}"
         raise InputError("marker set", found, f"one of {', '.join(shipped)}, or a file", "check the name")
-    return read_marker_set(named)
+    return read_marker_set(name)
 
 
 def read_marker_set(path: str | os.PathLike) -> MarkerSet:
@@ -49,7 +49,7 @@ def read_marker_set(path: str | os.PathLike) -> MarkerSet:
     Raises:
         InputError: if anything is wrong, with the line.
     """
-    return parse_marker_set(utf8(path, "a marker set", LARGEST), str(path))
+    return parse_marker_set(read_utf8(path, "a marker set", MAX_BYTES), str(path))
 
 
 def parse_marker_set(text: str, name: str = "marker set") -> MarkerSet:
@@ -63,23 +63,23 @@ def parse_marker_set(text: str, name: str = "marker set") -> MarkerSet:
     Raises:
         InputError: if anything is wrong, with name and line.
     """
-    read = _Reading()
+    parser = _MarkerSetParser()
     for number, line in enumerate(re.split(r"\r\n|\n|\r", text), 1):
         line = re.sub(r"(^|\s)#.*", "", line).strip()
         if line:
-            read.statement(line, f"{name}:{number}")
-    if not read.name:
+            parser.parse_line(line, f"{name}:{number}")
+    if not parser.name:
         raise InputError(name, "no line `marker set: NAME`", "the name of the set", _FORM)
-    if not read.segments:
+    if not parser.segments:
         raise InputError(name, "no segment", "a line such as `segment Hips: LASI, RASI, SACR`", _FORM)
-    lists: dict[str, Any] = {key: tuple(labels) for key, labels in read.lists.items()}
+    lists: dict[str, Any] = {key: tuple(labels) for key, labels in parser.lists.items()}
     try:
-        return MarkerSet(read.name, read.segments, read.landmarks, read.aliases, about=read.about, **lists)
+        return MarkerSet(parser.name, parser.segments, parser.landmarks, parser.aliases, about=parser.about, **lists)
     except InputError as error:
         raise InputError(name, str(error)) from None
 
 
-class _Reading:
+class _MarkerSetParser:
     """The part of a marker set that has been parsed. Lines on one segment or landmark add up."""
 
     def __init__(self):
@@ -89,30 +89,30 @@ class _Reading:
         self.aliases: dict[str, str] = {}
         self.lists: dict[str, tuple[str, ...]] = {}
 
-    def statement(self, line: str, place: str) -> None:
+    def parse_line(self, line: str, place: str) -> None:
         """Parse one line."""
-        head, colon, said = (part.strip() for part in line.partition(":"))
+        head, colon, value = (part.strip() for part in line.partition(":"))
         if not colon:
             raise InputError(place, f"{line[:40]!r}", "`what: labels`", _FORM)
         word, _, rest = head.partition(" ")
         whole, word, rest = " ".join(head.lower().split()), word.lower(), rest.strip()
         if whole == "marker set":
-            self._named(said, place)
+            self._set_name(value, place)
         elif whole == "about":
-            self.about = said
+            self.about = value
         elif whole in _LISTS:
-            self.lists[whole] = (*self.lists.get(whole, ()), *_labels(said, place))
+            self.lists[whole] = (*self.lists.get(whole, ()), *_parse_labels(value, place))
         elif word in ("segment", "landmark", "also") and rest:
-            getattr(self, f"_{word}")(rest, _labels(said, place), place)
+            getattr(self, f"_{word}")(rest, _parse_labels(value, place), place)
         else:
             raise InputError(place, f"{head[:40]!r}", f"one of {_KEYWORDS}", _FORM)
 
-    def _named(self, said: str, place: str) -> None:
+    def _set_name(self, value: str, place: str) -> None:
         if self.name:
             raise InputError(place, "a second `marker set`", "one set per file", "move it to a second file")
-        if not re.fullmatch(r"[\w\-.]{1,60}", said):
-            raise InputError(place, f"name {said[:40]!r}", "one word of letters, digits, `_`, `-` and `.`", _FORM)
-        self.name = said
+        if not re.fullmatch(r"[\w\-.]{1,60}", value):
+            raise InputError(place, f"name {value[:40]!r}", "one word of letters, digits, `_`, `-` and `.`", _FORM)
+        self.name = value
 
     def _segment(self, joint: str, labels: tuple[str, ...], place: str) -> None:
         if joint not in JOINTS:
@@ -132,17 +132,17 @@ class _Reading:
                 raise InputError(place, found, "one marker for each other label", "remove one")
 
 
-def _labels(said: str, place: str) -> tuple[str, ...]:
+def _parse_labels(text: str, place: str) -> tuple[str, ...]:
     """Parse labels separated by commas; raise InputError for an empty label or one with a colon."""
-    labels = tuple(" ".join(label.split()) for label in said.split(","))
+    labels = tuple(" ".join(label.split()) for label in text.split(","))
     if not all(labels):
-        raise InputError(place, "an empty label" if said else "no labels", "labels, separated by commas", _FORM)
+        raise InputError(place, "an empty label" if text else "no labels", "labels, separated by commas", _FORM)
     if wrong := next((label for label in labels if ":" in label), None):
         raise InputError(place, f"label {wrong[:40]!r}", "labels without a colon", "leave out the subject")
     return labels
 
 
-def marker_set_text(marker_set: MarkerSet) -> str:
+def format_marker_set(marker_set: MarkerSet) -> str:
     """Format a marker set as `read_marker_set` reads it.
 
     Raises:
@@ -150,27 +150,27 @@ def marker_set_text(marker_set: MarkerSet) -> str:
     """
     lines = [f"marker set: {marker_set.name}"]
     lines += [f"about: {' '.join(marker_set.about.split())}"] if marker_set.about else []
-    lines += ["", *(f"segment {joint}: {_joined(labels)}" for joint, labels in marker_set.segments.items() if labels)]
-    lines += ["", *(f"landmark {name}: {_joined(labels)}" for name, labels in marker_set.landmarks.items() if labels)]
+    lines += ["", *(f"segment {joint}: {_format_labels(labels)}" for joint, labels in marker_set.segments.items() if labels)]
+    lines += ["", *(f"landmark {name}: {_format_labels(labels)}" for name, labels in marker_set.landmarks.items() if labels)]
     lists = {key: getattr(marker_set, key) for key in _LISTS}
-    lines += ["", *(f"{key}: {_joined(_in_order(labels))}" for key, labels in lists.items() if labels)]
+    lines += ["", *(f"{key}: {_format_labels(_sort_labels(labels))}" for key, labels in lists.items() if labels)]
     others: dict[str, list[str]] = {}
     for other, own in marker_set.aliases.items():
         others.setdefault(own, []).append(other)
-    lines += [f"also {_written(own)}: {_joined(labels)}" for own, labels in others.items()]
+    lines += [f"also {_format_label(own)}: {_format_labels(labels)}" for own, labels in others.items()]
     return "\n".join(lines) + "\n"
 
 
-def _in_order(labels) -> list[str]:
+def _sort_labels(labels) -> list[str]:
     """Sort sets, which have no order; keep the order of tuples."""
     return sorted(labels) if isinstance(labels, frozenset) else list(labels)
 
 
-def _joined(labels) -> str:
-    return ", ".join(_written(label) for label in labels)
+def _format_labels(labels) -> str:
+    return ", ".join(_format_label(label) for label in labels)
 
 
-def _written(label: str) -> str:
+def _format_label(label: str) -> str:
     """Return the label; raise InputError where the text form cannot contain it."""
     if label != " ".join(label.split()) or not label or re.search(r"[,:]|(^|\s)#", label):
         raise InputError("marker set", f"label {label[:40]!r}", "a label without comma, colon and ` #`", "rename it")

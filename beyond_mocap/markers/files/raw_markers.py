@@ -14,20 +14,20 @@ import numpy as np
 
 from ...base.errors import InputError
 from ..trial import MarkerEvent, MarkerTrial, list_some
-from .unit_and_axes import decide_unit, handedness, read_given_unit, tall, up_axis
+from .unit_and_axes import decide_unit, measure_handedness, check_given_unit, measure_height, detect_up_axis
 
-_WILD = 1e9  # in any unit; a larger coordinate is damage
-_FARTHEST = 1000.0  # metres from the origin; farther is a code for "not visible", or damage
-_UP = {(2, 1): ((0, 1, 2), (1, 1, 1)), (2, -1): ((0, 1, 2), (1, -1, -1)), (1, 1): ((0, 2, 1), (1, -1, 1)),
+_MAX_COORDINATE = 1e9  # in any unit; a larger coordinate is damage
+_MAX_DISTANCE = 1000.0  # metres from the origin; farther is a code for "not visible", or damage
+_UP_ROTATIONS = {(2, 1): ((0, 1, 2), (1, 1, 1)), (2, -1): ((0, 1, 2), (1, -1, -1)), (1, 1): ((0, 2, 1), (1, -1, 1)),
        (1, -1): ((0, 2, 1), (1, 1, -1)), (0, 1): ((1, 2, 0), (1, 1, 1)), (0, -1): ((1, 2, 0), (-1, 1, -1))}
 """(up axis of the file, sign) -> the file's axes that become X, Y and Z, and their signs: rotations, no reflections."""
 
-FEWEST_OF_A_BODY = 10  # markers; a subject of a file with fewer is taken for an object
+MIN_BODY_MARKERS = 10  # markers; a subject of a file with fewer is taken for an object
 
-_COMPUTED = re.compile(
+_COMPUTED_LABEL = re.compile(
     r"(Angles?V?|Force|Moment|Power|GRF|CentreOfMass(Floor)?|CenterOfMass(Floor)?|^CoM(Floor)?|GroundReaction\w*"
     r"|NormalisedGRF)$", re.I)  # fmt: skip
-_FRAME_OF = re.compile(r"(.+)([OALP])")
+_FRAME_LABEL = re.compile(r"(.+)([OALP])")
 
 
 @dataclass(kw_only=True)
@@ -57,13 +57,13 @@ class RawMarkers:
     up: tuple[int, int] | None = None
     usual_up: tuple[int, int] = (2, 1)
     prefixes: tuple[str, ...] = ()
-    listed: tuple[str, ...] = ()
+    computed: tuple[str, ...] = ()
     events: list[tuple[float, str, str, str]] = field(default_factory=list)
     start: float = 0.0
     notes: list[str] = field(default_factory=list)
 
 
-def as_trial(raw: RawMarkers, path: str | os.PathLike, unit: float | str | None, subject: str | None,
+def build_trial(raw: RawMarkers, path: str | os.PathLike, unit: float | str | None, subject: str | None,
              up: str | None) -> MarkerTrial:  # fmt: skip
     """Convert raw markers to a trial.
 
@@ -80,97 +80,97 @@ def as_trial(raw: RawMarkers, path: str | os.PathLike, unit: float | str | None,
             unknown.
     """
     notes = list(raw.notes)
-    chosen, labels, whose = _choose(raw, path, subject, notes)
+    chosen, labels, whose = _choose_subject(raw, path, subject, notes)
     positions = np.array(raw.positions[:, chosen], dtype=float)
     residuals = None if raw.residuals is None else np.array(raw.residuals[:, chosen], dtype=float)
     positions[(positions == 0).all(axis=-1)] = np.nan
-    wild = (np.abs(positions) > _WILD).any(axis=-1)
-    positions[wild] = np.nan
+    is_damaged = (np.abs(positions) > _MAX_COORDINATE).any(axis=-1)
+    positions[is_damaged] = np.nan
     known = unit is not None
-    metres, how = (read_given_unit(path, unit, positions) if known
-                   else decide_unit(path, raw.unit, positions, tall(labels, positions)))  # fmt: skip
-    notes.insert(0, how)
+    metres, unit_note = (check_given_unit(path, unit, positions) if known
+                   else decide_unit(path, raw.unit, positions, measure_height(labels, positions)))  # fmt: skip
+    notes.insert(0, unit_note)
     positions *= metres
-    far = wild | (np.abs(positions) > _FARTHEST).any(axis=-1)
-    if far.any():
-        notes.append(f"{far.sum()} places farther than {_FARTHEST:.0f} m from the origin, treated as not visible")
-        positions[far] = np.nan
+    is_too_far = is_damaged | (np.abs(positions) > _MAX_DISTANCE).any(axis=-1)
+    if is_too_far.any():
+        notes.append(f"{is_too_far.sum()} places farther than {_MAX_DISTANCE:.0f} m from the origin, treated as not visible")
+        positions[is_too_far] = np.nan
     positions[~np.isfinite(positions).all(axis=-1)] = np.nan
-    labels, positions, residuals = _seen_only(path, labels, positions, residuals, notes)
-    positions = _upright(raw, labels, positions, up, notes)
+    labels, positions, residuals = _remove_invisible(path, labels, positions, residuals, notes)
+    positions = _rotate_upright(raw, labels, positions, up, notes)
     if residuals is not None:
         residuals = np.where(np.isfinite(positions).all(axis=-1), residuals * metres, np.nan)
         residuals = residuals if np.nanmax(residuals, initial=0) > 0 else None
-    if handedness(labels, positions) < -0.5:
+    if measure_handedness(labels, positions) < -0.5:
         notes.append("the body is mirrored: its coordinates are left-handed, or left and right labels are exchanged")
     return MarkerTrial(labels=tuple(labels), positions=positions, fps=raw.fps, residuals=residuals,
-                       events=_events(raw, whose), start=raw.start, name=Path(path).stem, subject=whose,
+                       events=_select_events(raw, whose), start=raw.start, name=Path(path).stem, subject=whose,
                        notes=tuple(notes))  # fmt: skip
 
 
-def _choose(raw: RawMarkers, path, subject, notes) -> tuple[list[int], list[str], str]:
+def _choose_subject(raw: RawMarkers, path, subject, notes) -> tuple[list[int], list[str], str]:
     """Choose the subject's points: their indices, their labels, and the subject."""
-    listed = {split_label(label, raw.prefixes)[1] for label in raw.listed}
-    parted = [split_label(label, raw.prefixes) for label in raw.labels]
-    of: dict[str, list[str]] = {}
-    for name, label in parted:
-        of.setdefault(name, []).append(label)
-    dropped = {name: find_computed(labels, listed) for name, labels in of.items()}
-    points = [i for i, (name, label) in enumerate(parted) if label not in dropped[name]]
-    if len(points) < len(parted):
-        some = list(dict.fromkeys(label for name, label in parted if label in dropped[name]))
-        notes.append(f"{len(parted) - len(points)} computed points left out: {list_some(some)}")
+    listed = {split_label(label, raw.prefixes)[1] for label in raw.computed}
+    split_labels = [split_label(label, raw.prefixes) for label in raw.labels]
+    by_subject: dict[str, list[str]] = {}
+    for name, label in split_labels:
+        by_subject.setdefault(name, []).append(label)
+    dropped = {name: find_computed(labels, listed) for name, labels in by_subject.items()}
+    points = [i for i, (name, label) in enumerate(split_labels) if label not in dropped[name]]
+    if len(points) < len(split_labels):
+        some = list(dict.fromkeys(label for name, label in split_labels if label in dropped[name]))
+        notes.append(f"{len(split_labels) - len(points)} computed points left out: {list_some(some)}")
     if not points:
         raise InputError(path, "no markers", "points that are markers", "export the trial with its markers")
     counts: dict[str, int] = {}
     for i in points:
-        counts[parted[i][0]] = counts.get(parted[i][0], 0) + 1
-    whose = chosen_subject(path, counts, subject)
-    kept = [i for i in points if parted[i][0] in ("", whose) or counts[parted[i][0]] < FEWEST_OF_A_BODY]
-    labels = [parted[i][1] if parted[i][0] in ("", whose) else ":".join(parted[i]) for i in kept]
+        counts[split_labels[i][0]] = counts.get(split_labels[i][0], 0) + 1
+    whose = choose_subject(path, counts, subject)
+    selected = [i for i in points if split_labels[i][0] in ("", whose) or counts[split_labels[i][0]] < MIN_BODY_MARKERS]
+    labels = [split_labels[i][1] if split_labels[i][0] in ("", whose) else ":".join(split_labels[i]) for i in selected]
     if others := [name for name in counts if name not in ("", whose)]:
         notes.append(f"subject {whose or 'without a name'!r} of {list_some(list(counts))}")
-        if objects := [name for name in others if counts[name] < FEWEST_OF_A_BODY]:
+        if objects := [name for name in others if counts[name] < MIN_BODY_MARKERS]:
             notes.append(f"markers of {list_some(objects)} kept with their own names")
-    labels, twice = make_unique(labels)
-    if twice:
-        notes.append(f"duplicate labels, numbered: {list_some(twice)}")
-    return kept, labels, whose
+    labels, duplicates = make_unique(labels)
+    if duplicates:
+        notes.append(f"duplicate labels, numbered: {list_some(duplicates)}")
+    return selected, labels, whose
 
 
-def _seen_only(path, labels, positions, residuals, notes):
+def _remove_invisible(path, labels, positions, residuals, notes):
     """Remove markers that are never visible; raise InputError if none is left."""
-    ever = np.isfinite(positions).all(axis=-1).any(axis=0)
-    if not ever.any():
+    is_visible = np.isfinite(positions).all(axis=-1).any(axis=0)
+    if not is_visible.any():
         raise InputError(path, f"{len(labels)} markers, none ever visible", "places of markers", "export it again")
-    if not ever.all():
-        notes.append(f"never visible: {list_some([label for label, seen in zip(labels, ever) if not seen])}")
-    labels = [label for label, seen in zip(labels, ever) if seen]
-    return labels, positions[:, ever], None if residuals is None else residuals[:, ever]
+    if not is_visible.all():
+        notes.append(f"never visible: {list_some([label for label, seen in zip(labels, is_visible) if not seen])}")
+    labels = [label for label, seen in zip(labels, is_visible) if seen]
+    return labels, positions[:, is_visible], None if residuals is None else residuals[:, is_visible]
 
 
-def _upright(raw: RawMarkers, labels, positions, given: str | None, notes) -> np.ndarray:
+def _rotate_upright(raw: RawMarkers, labels, positions, requested: str | None, notes) -> np.ndarray:
     """Rotate the places to Z up: as given, else as the file says, else as the body shows, else as such files usually
     are.
     """
-    stands = up_axis(labels, positions)
-    said = {"as given": None if given is None else axis_named(given), "as the file says": raw.up,
-            "heads above feet": stands, "as such files usually are": raw.usual_up}
-    why, up = next((why, up) for why, up in said.items() if up)
-    notes.append(f"{_axis(up)} is up, {why}")
-    if stands and stands != up and given is None:
-        notes.append(f"but heads are above feet along {_axis(stands)}: check which way is up")
-    axes, signs = _UP[up]
+    body_up = detect_up_axis(labels, positions)
+    candidates = {"as given": None if requested is None else parse_axis(requested), "as the file says": raw.up,
+            "heads above feet": body_up, "as such files usually are": raw.usual_up}
+    why, up = next((why, up) for why, up in candidates.items() if up)
+    notes.append(f"{_format_axis(up)} is up, {why}")
+    if body_up and body_up != up and requested is None:
+        notes.append(f"but heads are above feet along {_format_axis(body_up)}: check which way is up")
+    axes, signs = _UP_ROTATIONS[up]
     return positions[..., axes] * np.array(signs, dtype=float)
 
 
-def _events(raw: RawMarkers, whose: str) -> tuple[MarkerEvent, ...]:
+def _select_events(raw: RawMarkers, whose: str) -> tuple[MarkerEvent, ...]:
     """Select the events of the subject, and those without a subject."""
     return tuple(MarkerEvent(seconds, label, side) for seconds, label, side, name in raw.events
                  if not name or not whose or name == whose)  # fmt: skip
 
 
-def axis_named(name: str) -> tuple[int, int]:
+def parse_axis(name: str) -> tuple[int, int]:
     """Parse the name of an axis: "Z", "+Y", "-x".
 
     Returns:
@@ -178,13 +178,13 @@ def axis_named(name: str) -> tuple[int, int]:
     Raises:
         InputError: if it is not an axis.
     """
-    plain = name.strip().upper().lstrip("+-")
-    if plain not in ("X", "Y", "Z") or len(name.strip()) > 2:
+    letter = name.strip().upper().lstrip("+-")
+    if letter not in ("X", "Y", "Z") or len(name.strip()) > 2:
         raise InputError("up axis", f"axis {name[:20]!r}", "one of X, Y, Z, -X, -Y, -Z", "name the axis that points up")
-    return "XYZ".index(plain), -1 if "-" in name else 1
+    return "XYZ".index(letter), -1 if "-" in name else 1
 
 
-def _axis(up: tuple[int, int]) -> str:
+def _format_axis(up: tuple[int, int]) -> str:
     return ("-" if up[1] < 0 else "") + "XYZ"[up[0]]
 
 
@@ -216,14 +216,14 @@ def find_computed(labels: Sequence[str], listed: Iterable[str] = ()) -> set[str]
     """
     stems: dict[str, set[str]] = {}
     for label in labels:
-        if frame := _FRAME_OF.fullmatch(label):
+        if frame := _FRAME_LABEL.fullmatch(label):
             stems.setdefault(frame[1], set()).add(frame[2])
     frames = {stem + letter for stem, letters in stems.items() if letters == set("OALP") for letter in letters}
     there = set(labels)
-    return {label for label in labels if _COMPUTED.search(label)} | (frames & there) | (set(listed) & there)
+    return {label for label in labels if _COMPUTED_LABEL.search(label)} | (frames & there) | (set(listed) & there)
 
 
-def chosen_subject(path, counts: dict[str, int], wanted: str | None) -> str:
+def choose_subject(path, counts: dict[str, int], requested: str | None) -> str:
     """Choose whose markers are meant.
 
     Args:
@@ -235,20 +235,20 @@ def chosen_subject(path, counts: dict[str, int], wanted: str | None) -> str:
     Raises:
         InputError: if there are several bodies, or not the requested one; the message lists them.
     """
-    named = ", ".join(f"{name!r} ({count} markers)" for name, count in counts.items() if name)
-    if wanted is not None and wanted.strip():
-        if not named:
-            found = f"no subject {wanted.strip()[:60]!r}"
+    listed = ", ".join(f"{name!r} ({count} markers)" for name, count in counts.items() if name)
+    if requested is not None and requested.strip():
+        if not listed:
+            found = f"no subject {requested.strip()[:60]!r}"
             raise InputError(path, found, "no choice, since its labels name no subject", "leave the subject empty")
         for name in counts:
-            if name.lower() == wanted.strip().lower():
+            if name.lower() == requested.strip().lower():
                 return name
-        raise InputError(path, f"no subject {wanted.strip()[:60]!r}", f"one of {named}", "choose one subject")
-    bodies = [name for name, count in counts.items() if count >= FEWEST_OF_A_BODY]
+        raise InputError(path, f"no subject {requested.strip()[:60]!r}", f"one of {listed}", "choose one subject")
+    bodies = [name for name, count in counts.items() if count >= MIN_BODY_MARKERS]
     named_bodies = [name for name in bodies if name]
     bodies = named_bodies or bodies
     if len(bodies) > 1:
-        raise InputError(path, f"{len(bodies)} subjects: {named}", "one", "choose one subject")
+        raise InputError(path, f"{len(bodies)} subjects: {listed}", "one", "choose one subject")
     return bodies[0] if bodies else max(counts, key=counts.__getitem__)
 
 
@@ -263,22 +263,22 @@ def make_unique(labels: Sequence[str]) -> tuple[list[str], list[str]]:
         The unique labels, and those that occurred more than once.
     """
     out: list[str] = []
-    taken, twice, unnamed = {label for label in labels if label}, [], 0
-    met: set[str] = set()
+    taken, duplicates, unnamed = {label for label in labels if label}, [], 0
+    used: set[str] = set()
     for label in labels:
-        while not label or label in met:
+        while not label or label in used:
             if label:
-                twice.append(label)
-                label = _numbered(label, taken | met)
+                duplicates.append(label)
+                label = _number_label(label, taken | used)
             else:
                 unnamed += 1
                 label = f"*{unnamed}" if f"*{unnamed}" not in taken else ""
-        met.add(label)
+        used.add(label)
         out.append(label)
-    return out, list(dict.fromkeys(twice))
+    return out, list(dict.fromkeys(duplicates))
 
 
-def _numbered(label: str, taken: set[str]) -> str:
+def _number_label(label: str, taken: set[str]) -> str:
     number = 2
     while f"{label} ({number})" in taken:
         number += 1

@@ -19,7 +19,7 @@ from .template import JOINTS, LANDMARKS
 
 UNLABELED = re.compile(r"^(\*\d+|[UuxX]_?\d+|C_\d+|[Uu]nlabell?ed.*|[Uu]nnamed.*)$")
 """Labels that recording software gives to unlabeled markers."""
-_MOST = 0.8  # share of a set's markers that a trial must contain
+_MIN_SHARE = 0.8  # share of a set's markers that a trial must contain
 
 
 @dataclass(frozen=True)
@@ -86,20 +86,20 @@ class MarkerSet:
         return tuple(label for group in self.segments.values() for label in group)
 
     @property
-    def needed(self) -> frozenset[str]:
+    def required(self) -> frozenset[str]:
         """Markers that every trial of this set must contain."""
         return frozenset(self.labels) - self.static - self.optional
 
-    def lacking(self, labels: Sequence[str]) -> tuple[str, ...]:
+    def list_missing(self, labels: Sequence[str]) -> tuple[str, ...]:
         """List the required markers that are not among `labels`, in the set's order."""
-        present = {self.renaming(labels).get(label, label) for label in labels}
-        return tuple(label for label in self.labels if label in self.needed and label not in present)
+        present = {self.map_labels(labels).get(label, label) for label in labels}
+        return tuple(label for label in self.labels if label in self.required and label not in present)
 
-    def segment_of(self, label: str) -> str | None:
+    def find_segment(self, label: str) -> str | None:
         """Find the joint that carries a marker; None where it lies on no segment."""
         return next((joint for joint, group in self.segments.items() if label in group), None)
 
-    def renaming(self, labels: Sequence[str]) -> dict[str, str]:
+    def map_labels(self, labels: Sequence[str]) -> dict[str, str]:
         """Map labels to the set's own.
 
         Args:
@@ -108,23 +108,23 @@ class MarkerSet:
             {label: the set's label}, only for labels that differ (an alias, or another case).
         """
         own = (*self.labels, *self.ball, *self.other)
-        plain = {_plain(label): label for label in own} | {_plain(old): new for old, new in self.aliases.items()}
+        plain = {_normalize_label(label): label for label in own} | {_normalize_label(old): new for old, new in self.aliases.items()}
         present = set(labels)
         found: dict[str, str] = {}
         for label in labels:
-            new = plain.get(_plain(label))
+            new = plain.get(_normalize_label(label))
             if label not in own and new is not None and new not in present and new not in found.values():
                 found[label] = new
         return found
 
-    def clusters(self, labels: Sequence[str]) -> dict[str, tuple[str, ...]]:
+    def select_clusters(self, labels: Sequence[str]) -> dict[str, tuple[str, ...]]:
         """Select the markers of each segment that are among `labels`; segments without any are left out."""
         present = set(labels)
         found = {joint: tuple(x for x in group if x in present) for joint, group in self.segments.items()}
         return {joint: group for joint, group in found.items() if group}
 
 
-def recognise(labels: Sequence[str], sets: Iterable[MarkerSet]) -> MarkerSet:
+def choose_marker_set(labels: Sequence[str], sets: Iterable[MarkerSet]) -> MarkerSet:
     """Choose the marker set that fits the labels: of the sets that are present enough, the one that explains most
     labels.
 
@@ -137,17 +137,17 @@ def recognise(labels: Sequence[str], sets: Iterable[MarkerSet]) -> MarkerSet:
         InputError: if every set lacks more; the message names the nearest set and its missing markers.
     """
     sets = list(sets)
-    named = [label for label in labels if not UNLABELED.match(label)]
-    judged = [(marker_set, _present(marker_set, named)) for marker_set in sets]
-    share = [len(present & s.needed) / max(len(s.needed), 1) for s, present in judged]
-    there = [(len(present), part, -len(s.labels), s) for (s, present), part in zip(judged, share) if part >= _MOST]
-    if there:
-        return max(there, key=lambda row: row[:3])[3]
+    labeled = [label for label in labels if not UNLABELED.match(label)]
+    candidates = [(marker_set, _find_present(marker_set, labeled)) for marker_set in sets]
+    share = [len(present & s.required) / max(len(s.required), 1) for s, present in candidates]
+    matching = [(len(present), part, -len(s.labels), s) for (s, present), part in zip(candidates, share) if part >= _MIN_SHARE]
+    if matching:
+        return max(matching, key=lambda row: row[:3])[3]
     if not sets:
         raise InputError("marker sets", "no marker sets", "at least one")
-    nearest, present = judged[share.index(max(share))]
-    missing = sorted(nearest.needed - present)
-    unknown = sorted(set(named) - set(nearest.renaming(named)) - set(nearest.labels))
+    nearest, present = candidates[share.index(max(share))]
+    missing = sorted(nearest.required - present)
+    unknown = sorted(set(labeled) - set(nearest.map_labels(labeled)) - set(nearest.labels))
     raise InputError(
         "markers", f"no marker set fits; nearest is {nearest.name}, of which "
         + f"{list_some(missing, 8)} {'is' if len(missing) == 1 else 'are'} missing"
@@ -156,18 +156,18 @@ def recognise(labels: Sequence[str], sets: Iterable[MarkerSet]) -> MarkerSet:
     )
 
 
-def _present(marker_set: MarkerSet, labels: Sequence[str]) -> set[str]:
+def _find_present(marker_set: MarkerSet, labels: Sequence[str]) -> set[str]:
     """Return the set's markers that are among the labels."""
-    renamed = marker_set.renaming(labels)
+    renamed = marker_set.map_labels(labels)
     return {renamed.get(label, label) for label in labels} & set(marker_set.labels)
 
 
-def _plain(label: str) -> str:
+def _normalize_label(label: str) -> str:
     """Return the label in lower case, without separators."""
     return re.sub(r"[\s_\-.]", "", label).lower()
 
 
-def named_as(trial: MarkerTrial, marker_set: MarkerSet) -> MarkerTrial:
+def convert_labels(trial: MarkerTrial, marker_set: MarkerSet) -> MarkerTrial:
     """Convert a trial to the set's labels.
 
     A set may say which unlabeled marker is which (`also LHAND: x52`), but recording software numbers these differently
@@ -180,40 +180,40 @@ def named_as(trial: MarkerTrial, marker_set: MarkerSet) -> MarkerTrial:
     Returns:
         The trial with the set's labels.
     """
-    names = marker_set.renaming(trial.labels)
-    chance = {new: old for old, new in names.items() if UNLABELED.match(old)}
-    for new, old in chance.items():
-        twin = _twin(new, marker_set, chance)
-        if twin and _side(marker_set, new) == "Left":
-            kept = [_apart(trial, one, marker_set, "Left") + _apart(trial, other, marker_set, "Right")
-                    for one, other in ((old, chance[twin]), (chance[twin], old))]
-            if kept[1] < kept[0]:
-                names[old], names[chance[twin]] = twin, new
-    return trial.renamed(names)
+    names = marker_set.map_labels(trial.labels)
+    unlabeled = {new: old for old, new in names.items() if UNLABELED.match(old)}
+    for new, old in unlabeled.items():
+        twin = _find_twin(new, marker_set, unlabeled)
+        if twin and _find_side(marker_set, new) == "Left":
+            distances = [_measure_side_distance(trial, one, marker_set, "Left") + _measure_side_distance(trial, other, marker_set, "Right")
+                    for one, other in ((old, unlabeled[twin]), (unlabeled[twin], old))]
+            if distances[1] < distances[0]:
+                names[old], names[unlabeled[twin]] = twin, new
+    return trial.rename_labels(names)
 
 
-def _side(marker_set: MarkerSet, label: str) -> str:
+def _find_side(marker_set: MarkerSet, label: str) -> str:
     """Return "Left", "Right" or "" for the segment that carries a marker."""
-    segment = marker_set.segment_of(label) or ""
+    segment = marker_set.find_segment(label) or ""
     return next((side for side in ("Left", "Right") if segment.startswith(side)), "")
 
 
-def _twin(label: str, marker_set: MarkerSet, among) -> str | None:
+def _find_twin(label: str, marker_set: MarkerSet, among) -> str | None:
     """Find the marker with the same name on the other side's segment, or None."""
-    segment = marker_set.segment_of(label) or ""
+    segment = marker_set.find_segment(label) or ""
     other = segment.replace("Left", "Right") if "Left" in segment else segment.replace("Right", "Left")
     there = [x for x in marker_set.segments.get(other, ()) if x in among and x[1:] == label[1:]]
     return there[0] if there and other != segment else None
 
 
-def _apart(trial: MarkerTrial, label: str, marker_set: MarkerSet, side: str) -> float:
+def _measure_side_distance(trial: MarkerTrial, label: str, marker_set: MarkerSet, side: str) -> float:
     """Measure the mean distance in metres from a marker to the nearest marker of a side."""
-    own = trial.positions[:, trial.index(label)]
+    own = trial.positions[:, trial.index_of(label)]
     best = np.inf
     for segment, labels in marker_set.segments.items():
         for other in labels:
             if segment.startswith(side) and other in trial.labels and other != label:
-                apart = np.linalg.norm(trial.positions[:, trial.index(other)] - own, axis=-1)
+                apart = np.linalg.norm(trial.positions[:, trial.index_of(other)] - own, axis=-1)
                 apart = apart[np.isfinite(apart)]
                 if len(apart):
                     best = min(best, float(apart.mean()))

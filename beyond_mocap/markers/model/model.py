@@ -12,23 +12,23 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ...base.errors import InputError
-from ...motion.skeleton import Skeleton, frozen_array
+from ...motion.skeleton import Skeleton, freeze_array
 
-_ANY = (-np.inf, np.inf)
-_NONE = (0.0, 0.0)
+_UNLIMITED = (-np.inf, np.inf)
+_FIXED = (0.0, 0.0)
 # joint (left side) -> axis order, limits in degrees of its three angles, pull to the rest pose in metres per radian
-_TABLE = {"Hips": ("ZYX", (_ANY, _ANY, _ANY), 0.0), "Spine": ("YXZ", (_ANY, _ANY, _ANY), 0.01),
-          "Spine1": ("YXZ", (_ANY, _ANY, _ANY), 0.01), "Chest": ("YXZ", (_ANY, _ANY, _ANY), 0.01),
-          "Neck": ("YXZ", (_ANY, _ANY, _ANY), 0.01), "Neck1": ("YXZ", (_ANY, _ANY, _ANY), 0.01),
-          "Head": ("YXZ", (_ANY, _ANY, _ANY), 0.01), "Shoulder": ("ZXY", ((-45, 45), (-25, 60), _NONE), 0.004),
-          "Scapula": ("ZXY", ((-45, 45), (-25, 60), (-50, 50)), 0.004), "Arm": ("XZY", (_ANY, _ANY, _ANY), 0.0),
+_FREEDOM_TABLE = {"Hips": ("ZYX", (_UNLIMITED, _UNLIMITED, _UNLIMITED), 0.0), "Spine": ("YXZ", (_UNLIMITED, _UNLIMITED, _UNLIMITED), 0.01),
+          "Spine1": ("YXZ", (_UNLIMITED, _UNLIMITED, _UNLIMITED), 0.01), "Chest": ("YXZ", (_UNLIMITED, _UNLIMITED, _UNLIMITED), 0.01),
+          "Neck": ("YXZ", (_UNLIMITED, _UNLIMITED, _UNLIMITED), 0.01), "Neck1": ("YXZ", (_UNLIMITED, _UNLIMITED, _UNLIMITED), 0.01),
+          "Head": ("YXZ", (_UNLIMITED, _UNLIMITED, _UNLIMITED), 0.01), "Shoulder": ("ZXY", ((-45, 45), (-25, 60), _FIXED), 0.004),
+          "Scapula": ("ZXY", ((-45, 45), (-25, 60), (-50, 50)), 0.004), "Arm": ("XZY", (_UNLIMITED, _UNLIMITED, _UNLIMITED), 0.0),
           "ForeArm": ("ZXY", ((-165, 18), (-18, 18), (-150, 150)), 0.0),
-          "Hand": ("XZY", ((-100, 100), (-60, 60), _NONE), 0.002),
+          "Hand": ("XZY", ((-100, 100), (-60, 60), _FIXED), 0.002),
           "UpLeg": ("YXZ", ((-160, 75), (-75, 75), (-80, 80)), 0.0),
           "Leg": ("YXZ", ((-25, 170), (-12, 12), (-60, 60)), 0.0),
-          "Foot": ("YXZ", ((-75, 90), (-60, 60), (-60, 60)), 0.0), "ToeBase": ("YXZ", ((-80, 60), _NONE, _NONE), 0.002)}
-_WEAK = 0.004  # pull in metres per radian of a joint with fewer markers than a technical frame needs
-_WEAK_FOOT = 0.01  # heel, toe and ankle lie nearly on a line: a millimetre of skin would be 2 degrees of roll
+          "Foot": ("YXZ", ((-75, 90), (-60, 60), (-60, 60)), 0.0), "ToeBase": ("YXZ", ((-80, 60), _FIXED, _FIXED), 0.002)}
+_WEAK_PULL = 0.004  # pull in metres per radian of a joint with fewer markers than a technical frame needs
+_WEAK_FOOT_PULL = 0.01  # heel, toe and ankle lie nearly on a line: a millimetre of skin would be 2 degrees of roll
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,9 +52,9 @@ class Freedom:
 
     def __post_init__(self):
         object.__setattr__(self, "order", tuple(self.order))
-        object.__setattr__(self, "free", frozen_array(self.free, dtype=bool).reshape(-1, 3))
-        object.__setattr__(self, "low", frozen_array(self.low).reshape(-1, 3))
-        object.__setattr__(self, "high", frozen_array(self.high).reshape(-1, 3))
+        object.__setattr__(self, "free", freeze_array(self.free, dtype=bool).reshape(-1, 3))
+        object.__setattr__(self, "low", freeze_array(self.low).reshape(-1, 3))
+        object.__setattr__(self, "high", freeze_array(self.high).reshape(-1, 3))
         count = len(self.order)
         if not len(self.free) == len(self.low) == len(self.high) == count:
             raise InputError("model", f"freedom of {count}, {len(self.free)}, {len(self.low)}, {len(self.high)} joints")
@@ -127,10 +127,10 @@ class MarkerModel:
     def __post_init__(self):
         for name in ("markers", "sessions", "notes"):
             object.__setattr__(self, name, tuple(getattr(self, name)))
-        object.__setattr__(self, "joint", frozen_array(self.joint, dtype=int).reshape(-1))
-        object.__setattr__(self, "places", frozen_array(self.places).reshape(-1, 3))
+        object.__setattr__(self, "joint", freeze_array(self.joint, dtype=int).reshape(-1))
+        object.__setattr__(self, "places", freeze_array(self.places).reshape(-1, 3))
         for name in ("sigma", "edge_sigma", "stiffness", "centre_sigma"):
-            object.__setattr__(self, name, frozen_array(getattr(self, name)).reshape(-1))
+            object.__setattr__(self, name, freeze_array(getattr(self, name)).reshape(-1))
         self._check()
 
     def _check(self):
@@ -152,12 +152,12 @@ class MarkerModel:
         if not (self.stiffness >= 0.0).all():
             raise InputError("model", "a stiffness below zero", "metres per radian")
 
-    def clusters(self) -> dict[int, np.ndarray]:
+    def collect_clusters(self) -> dict[int, np.ndarray]:
         """Return joint -> indices of the markers that it carries."""
         return {int(joint): np.flatnonzero(self.joint == joint) for joint in np.unique(self.joint)}
 
 
-def freedom_of(joints: Sequence[str], parents: Sequence[int], counts: Mapping[str, int]) -> tuple[Freedom, np.ndarray]:
+def build_freedom(joints: Sequence[str], parents: Sequence[int], counts: Mapping[str, int]) -> tuple[Freedom, np.ndarray]:
     """Build freedom and stiffness of joints.
 
     Args:
@@ -174,14 +174,14 @@ def freedom_of(joints: Sequence[str], parents: Sequence[int], counts: Mapping[st
     orders, limits, pulls = [], [], []
     for name, under in zip(joints, below):
         part = name.removeprefix("Left").removeprefix("Right")
-        order, ranges, pull = _TABLE[part]
+        order, ranges, pull = _FREEDOM_TABLE[part]
         if not under:
-            ranges = (_NONE, _NONE, _NONE)
+            ranges = (_FIXED, _FIXED, _FIXED)
         elif name.startswith("Right"):  # mirrored across the plane of X and Z: turns about X and Z change their sign
             ranges = tuple(span if axis == "Y" else (-span[1], -span[0]) for axis, span in zip(order, ranges))
         orders.append(order)
         limits.append(np.radians(ranges))
-        weak = _WEAK_FOOT if part == "Foot" else _WEAK
+        weak = _WEAK_FOOT_PULL if part == "Foot" else _WEAK_PULL
         pulls.append(pull if pull or counts.get(name, 0) >= 3 or name == "Hips" else weak)
     limits = np.array(limits)
     return Freedom(tuple(orders), limits[..., 1] > limits[..., 0], limits[..., 0], limits[..., 1]), np.array(pulls)

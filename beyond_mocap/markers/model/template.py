@@ -77,15 +77,15 @@ LANDMARKS = frozenset((*_CENTRE, *(f"{side}_{name}" for side in ("left", "right"
 """All landmarks; those of one side begin with left_ or right_."""
 
 
-def _other(name: str) -> str:
+def _swap_side(name: str) -> str:
     return name.replace("Left", "Right").replace("left_", "right_")
 
 
-def _across(place) -> tuple[float, float, float]:
+def _mirror_place(place) -> tuple[float, float, float]:
     return (place[0], -place[1], place[2])
 
 
-def _joints() -> tuple[dict[str, str | None], dict[str, tuple]]:
+def _build_joints() -> tuple[dict[str, str | None], dict[str, tuple]]:
     """Build the parents and places of all joints, both sides."""
     parents, places = {}, {}
     for name, parent, place in _TRUNK:
@@ -94,27 +94,27 @@ def _joints() -> tuple[dict[str, str | None], dict[str, tuple]]:
         for chain in (_ARM, _LEG):
             for name, parent, place in chain:
                 parents[side + name] = parent if parent in ("Hips", "Chest") else side + parent
-                places[side + name] = place if side == "Left" else _across(place)
+                places[side + name] = place if side == "Left" else _mirror_place(place)
     return parents, places
 
 
-def _both(table):
+def _mirror_table(table):
     """Return a table of the left side with its mirror image added."""
     out = dict(table)
     for name, value in table.items():
         if name.lower().startswith("left"):
-            row = (_other(value[0]), _across(value[1])) if isinstance(value[0], str) else _across(value)
-            out[_other(name)] = row
+            row = (_swap_side(value[0]), _mirror_place(value[1])) if isinstance(value[0], str) else _mirror_place(value)
+            out[_swap_side(name)] = row
     return MappingProxyType(out)
 
 
-_PARENTS, _PLACES = _joints()
+_PARENTS, _PLACES = _build_joints()
 PARENTS = MappingProxyType(_PARENTS)
 """Joint -> the joint above it, None for the root; parents come first. Most skeletons have no scapulae."""
 JOINTS = tuple(PARENTS)  # all joints that a segment may be carried by, parents first
 PLACES = MappingProxyType({name: np.array(place) for name, place in _PLACES.items()})
 """Joint -> its place (3,) m in the T-pose of the typical body, from the middle between the hips."""
-TIPS = MappingProxyType({name: np.array(place) for name, place in _both(_TIPS).items()})
+TIPS = MappingProxyType({name: np.array(place) for name, place in _mirror_table(_TIPS).items()})
 """Joint -> the place (3,) m of the tip that hangs on it, as PLACES."""
-LANDMARK_PLACES = MappingProxyType({name: (row[0], np.array(row[1])) for name, row in _both(_LANDMARKS).items()})
+LANDMARK_PLACES = MappingProxyType({name: (row[0], np.array(row[1])) for name, row in _mirror_table(_LANDMARKS).items()})
 """Landmark -> the joint that carries it and the place (3,) m of a marker on it, as PLACES."""

@@ -56,14 +56,14 @@ class Chain:
     stiffness: np.ndarray
 
     @cached_property
-    def turning(self) -> tuple[bool, ...]:
+    def is_fully_free(self) -> tuple[bool, ...]:
         """Whether each joint is free about all axes (stored as a quaternion)."""
         return tuple(bool(all(row)) for row in self.free)
 
     @cached_property
     def hinges(self) -> tuple[int, ...]:
         """The joints with fewer free angles (stored as angles)."""
-        return tuple(joint for joint, all_ways in enumerate(self.turning) if not all_ways)
+        return tuple(joint for joint, all_ways in enumerate(self.is_fully_free) if not all_ways)
 
     @cached_property
     def clusters(self) -> tuple[tuple[int, np.ndarray], ...]:
@@ -81,7 +81,7 @@ class Chain:
             run = [joint]
             while (above := self.skeleton.parents[run[0]]) > 0 and above not in marked:
                 run.insert(0, above)
-            if len(run) > 1 and all(self.turning[one] for one in run):
+            if len(run) > 1 and all(self.is_fully_free[member] for member in run):
                 found.append(tuple(run))
         used = [joint for run in found for joint in run]
         return tuple(run for run in found if all(used.count(joint) == 1 for joint in run))
@@ -91,7 +91,7 @@ class Chain:
         return replace(self, low=np.where(self.free, -np.inf, 0.0), high=np.where(self.free, np.inf, 0.0))
 
 
-def chain(skeleton: Skeleton, joint, places, order=None, free=None, low=None, high=None, stiffness=None) -> Chain:
+def build_chain(skeleton: Skeleton, joint, places, order=None, free=None, low=None, high=None, stiffness=None) -> Chain:
     """Build a chain.
 
     Args:
@@ -109,7 +109,7 @@ def chain(skeleton: Skeleton, joint, places, order=None, free=None, low=None, hi
         found = f"joints {joint.shape}, places {places.shape}"
         raise InputError("marker model", found, "(M,) joint indices and (M, 3)")
     order = ("XYZ",) * count if order is None else tuple(order)
-    if len(order) != count or any(sorted(one) != ["X", "Y", "Z"] for one in order):
+    if len(order) != count or any(sorted(letters) != ["X", "Y", "Z"] for letters in order):
         raise InputError("marker model", f"axis orders {order}", f"{count} permutations of XYZ")
     free = np.broadcast_to(True if free is None else np.asarray(free, dtype=bool), (count, 3))
     stiff = np.zeros(count) if stiffness is None else np.asarray(stiffness, dtype=float)
@@ -133,21 +133,21 @@ class Poses:
     local: np.ndarray
     angles: np.ndarray
 
-    def frames(self, chosen) -> "Poses":
+    def select_frames(self, chosen) -> "Poses":
         """Return the poses of these frames (indices, a mask or a slice)."""
         return Poses(self.root[:, chosen], self.local[..., chosen], self.angles[..., chosen])
 
-    def put(self, chosen, other: "Poses") -> None:
+    def overwrite_frames(self, chosen, other: "Poses") -> None:
         """Overwrite the frames `chosen` with other poses, in place."""
         self.root[:, chosen], self.local[..., chosen], self.angles[..., chosen] = other.root, other.local, other.angles
 
-    def copy(self) -> "Poses":
+    def copy_arrays(self) -> "Poses":
         """Return poses with copied arrays."""
         return Poses(self.root.copy(), self.local.copy(), self.angles.copy())
 
 
 @dataclass(frozen=True, eq=False)
-class Placed:
+class WorldPoses:
     """Joints and markers in the world.
 
     Places are relative to the root, so no digits are lost far from the origin of the capture space.
@@ -165,7 +165,7 @@ class Placed:
     markers: np.ndarray
 
 
-def poses(chain: Chain, root: np.ndarray, local: np.ndarray) -> Poses:
+def build_poses(chain: Chain, root: np.ndarray, local: np.ndarray) -> Poses:
     """Build poses from joint rotations; hinges keep their free angles only, within their limits.
 
     Args:
@@ -175,20 +175,20 @@ def poses(chain: Chain, root: np.ndarray, local: np.ndarray) -> Poses:
     Returns:
         The poses.
     """
-    rotations = np.ascontiguousarray(np.moveaxis(quaternion.normalized(local), 0, -1))
+    rotations = np.ascontiguousarray(np.moveaxis(quaternion.normalize(local), 0, -1))
     angles = np.zeros((len(chain.skeleton), 3, len(root)))
     for joint in chain.hinges:
-        angles[joint] = within(chain, joint, angles_of(chain, joint, rotations[joint]))
+        angles[joint] = limit_angles(chain, joint, read_angles(chain, joint, rotations[joint]))
         rotations[joint] = quaternion.from_euler(angles[joint].T, chain.order[joint]).T
     return Poses(np.ascontiguousarray(np.asarray(root, dtype=float).T), rotations, angles)
 
 
-def within(chain: Chain, joint: int, angles: np.ndarray) -> np.ndarray:
+def limit_angles(chain: Chain, joint: int, angles: np.ndarray) -> np.ndarray:
     """Limit a joint's angles (3, F) radians to its range."""
     return np.clip(angles, chain.low[joint][:, None], chain.high[joint][:, None])
 
 
-def angles_of(chain: Chain, joint: int, local: np.ndarray) -> np.ndarray:
+def read_angles(chain: Chain, joint: int, local: np.ndarray) -> np.ndarray:
     """Read the angles (3, F) radians of a joint's rotations (4, F).
 
     Two triples of angles describe each rotation; the one within the limits, or nearer to them, is returned.
@@ -196,25 +196,25 @@ def angles_of(chain: Chain, joint: int, local: np.ndarray) -> np.ndarray:
     one = quaternion.to_euler(local.T, chain.order[joint]).T
     # the second triple of angles of the same rotation
     other = np.stack([one[0] + np.pi, np.pi - one[1], one[2] + np.pi])
-    one, other = (_near_the_middle(chain, joint, angles) for angles in (one, other))
-    better = _offence(chain, joint, other) < _offence(chain, joint, one) - 1e-9
+    one, other = (_unwrap_to_limits(chain, joint, angles) for angles in (one, other))
+    better = _measure_excess(chain, joint, other) < _measure_excess(chain, joint, one) - 1e-9
     return np.where(better, other, one)
 
 
-def _near_the_middle(chain: Chain, joint: int, angles: np.ndarray) -> np.ndarray:
+def _unwrap_to_limits(chain: Chain, joint: int, angles: np.ndarray) -> np.ndarray:
     """Remove full turns, so that the angles lie nearest to the middle of their limits."""
     low, high = chain.low[joint], chain.high[joint]
-    bound = np.isfinite(low) & np.isfinite(high)
-    middle = np.where(bound, 0.5 * (np.where(bound, low, 0.0) + np.where(bound, high, 0.0)), 0.0)[:, None]
-    return middle + quaternion.wrapped(angles - middle)
+    is_limited = np.isfinite(low) & np.isfinite(high)
+    middle = np.where(is_limited, 0.5 * (np.where(is_limited, low, 0.0) + np.where(is_limited, high, 0.0)), 0.0)[:, None]
+    return middle + quaternion.wrap_angle(angles - middle)
 
 
-def _offence(chain: Chain, joint: int, angles: np.ndarray) -> np.ndarray:
+def _measure_excess(chain: Chain, joint: int, angles: np.ndarray) -> np.ndarray:
     """Measure by how many radians (F,) angles (3, F) exceed the limits, in total."""
-    return np.abs(angles - within(chain, joint, angles)).sum(axis=0)
+    return np.abs(angles - limit_angles(chain, joint, angles)).sum(axis=0)
 
 
-def matrices(q: np.ndarray) -> np.ndarray:
+def to_matrices(q: np.ndarray) -> np.ndarray:
     """Convert unit quaternions (..., 4, F) to rotation matrices (..., 3, 3, F)."""
     w, x, y, z = (q[..., component, :] for component in range(4))
     out = np.empty((*q.shape[:-2], 3, 3, q.shape[-1]))
@@ -226,7 +226,7 @@ def matrices(q: np.ndarray) -> np.ndarray:
     return out
 
 
-def place(chain: Chain, at: Poses) -> Placed:
+def compute_world_poses(chain: Chain, poses: Poses) -> WorldPoses:
     """Compute joints and markers in the world: forward kinematics (eq. 3.18).
 
     Args:
@@ -235,21 +235,21 @@ def place(chain: Chain, at: Poses) -> Placed:
     Returns:
         Joints and markers, relative to the root.
     """
-    turns = matrices(at.local)
-    world, joints = np.empty_like(turns), np.zeros((len(turns), 3, turns.shape[-1]))
+    rotations = to_matrices(poses.local)
+    world, joints = np.empty_like(rotations), np.zeros((len(rotations), 3, rotations.shape[-1]))
     for joint, parent in enumerate(chain.skeleton.parents):
         if parent < 0:
-            world[joint] = turns[joint]
+            world[joint] = rotations[joint]
             continue
-        np.einsum("abf,bcf->acf", world[parent], turns[joint], out=world[joint])
+        np.einsum("abf,bcf->acf", world[parent], rotations[joint], out=world[joint])
         joints[joint] = joints[parent] + np.einsum("abf,b->af", world[parent], chain.skeleton.offsets[joint])
-    markers = np.empty((len(chain.joint), 3, turns.shape[-1]))
+    markers = np.empty((len(chain.joint), 3, rotations.shape[-1]))
     for joint, own in chain.clusters:
         markers[own] = np.einsum("abf,nb->naf", world[joint], chain.places[own]) + joints[joint]
-    return Placed(at.root, world, joints, markers)
+    return WorldPoses(poses.root, world, joints, markers)
 
 
-def axes(chain: Chain, at: Poses, placed: Placed) -> np.ndarray:
+def compute_step_axes(chain: Chain, poses: Poses, placed: WorldPoses) -> np.ndarray:
     """Compute the world axes about which a step rotates each joint.
 
     Returns:
@@ -258,15 +258,15 @@ def axes(chain: Chain, at: Poses, placed: Placed) -> np.ndarray:
     out = np.empty_like(placed.world)
     for joint, parent in enumerate(chain.skeleton.parents):
         above = np.eye(3)[:, :, None] if parent < 0 else placed.world[parent]
-        if chain.turning[joint]:
+        if chain.is_fully_free[joint]:
             out[joint] = above
         else:
-            own = own_axes(chain, joint, at.angles[joint])
+            own = compute_hinge_axes(chain, joint, poses.angles[joint])
             np.einsum("abf,bcf->acf", np.broadcast_to(above, own.shape), own, out=out[joint])
     return out
 
 
-def own_axes(chain: Chain, joint: int, angles: np.ndarray) -> np.ndarray:
+def compute_hinge_axes(chain: Chain, joint: int, angles: np.ndarray) -> np.ndarray:
     """Compute the axes of a hinge's angles in its parent's frame.
 
     Args:
@@ -277,18 +277,18 @@ def own_axes(chain: Chain, joint: int, angles: np.ndarray) -> np.ndarray:
         (3 components, 3 angles, F); zero where an angle is not free.
     """
     out = np.zeros((3, 3, angles.shape[-1]))
-    turned = np.broadcast_to(np.eye(3)[:, :, None], out.shape)
+    rotation = np.broadcast_to(np.eye(3)[:, :, None], out.shape)
     for angle, letter in enumerate(chain.order[joint]):
         if chain.free[joint, angle]:
-            out[:, angle] = turned[:, AXES[letter]]
-        one = np.zeros((4, angles.shape[-1]))
-        one[0], one[1 + AXES[letter]] = np.cos(0.5 * angles[angle]), np.sin(0.5 * angles[angle])
+            out[:, angle] = rotation[:, AXES[letter]]
+        quaternion_of_angle = np.zeros((4, angles.shape[-1]))
+        quaternion_of_angle[0], quaternion_of_angle[1 + AXES[letter]] = np.cos(0.5 * angles[angle]), np.sin(0.5 * angles[angle])
         # the axes of later angles are rotated by the earlier angles
-        turned = np.einsum("abf,bcf->acf", turned, matrices(one))
+        rotation = np.einsum("abf,bcf->acf", rotation, to_matrices(quaternion_of_angle))
     return out
 
 
-def moved(chain: Chain, at: Poses, shift: np.ndarray, turns: np.ndarray) -> Poses:
+def apply_step(chain: Chain, poses: Poses, shift: np.ndarray, rotations: np.ndarray) -> Poses:
     """Apply a step to poses.
 
     Args:
@@ -299,15 +299,15 @@ def moved(chain: Chain, at: Poses, shift: np.ndarray, turns: np.ndarray) -> Pose
     Returns:
         The new poses; hinges stay within their limits.
     """
-    local = multiply(exponential(turns), at.local)
-    angles = at.angles.copy()
+    local = multiply(to_quaternions(rotations), poses.local)
+    angles = poses.angles.copy()
     for joint in chain.hinges:
-        angles[joint] = within(chain, joint, at.angles[joint] + turns[joint])
+        angles[joint] = limit_angles(chain, joint, poses.angles[joint] + rotations[joint])
         local[joint] = quaternion.from_euler(angles[joint].T, chain.order[joint]).T
-    return Poses(at.root + shift, local, angles)
+    return Poses(poses.root + shift, local, angles)
 
 
-def exponential(v: np.ndarray) -> np.ndarray:
+def to_quaternions(v: np.ndarray) -> np.ndarray:
     """Convert rotation vectors (..., 3, F) radians to unit quaternions (..., 4, F)."""
     square = np.einsum("...af,...af->...f", v, v)
     angle = np.sqrt(square)
@@ -319,7 +319,7 @@ def exponential(v: np.ndarray) -> np.ndarray:
     return out
 
 
-def logarithm(q: np.ndarray) -> np.ndarray:
+def to_rotation_vectors(q: np.ndarray) -> np.ndarray:
     """Convert unit quaternions (..., 4, F) to rotation vectors (..., 3, F) radians, the shorter ones."""
     return np.moveaxis(quaternion.to_rotation_vector(np.moveaxis(q, -2, -1)), -1, -2)
 
@@ -344,7 +344,7 @@ def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return out
 
 
-def marker_derivative(chain: Chain, at: Poses) -> np.ndarray:
+def compute_marker_derivative(chain: Chain, poses: Poses) -> np.ndarray:
     """Compute the derivative of all markers by the pose, as a whole matrix.
 
     Only `smooth` and tests need it; the frame-wise solver never builds it.
@@ -355,14 +355,14 @@ def marker_derivative(chain: Chain, at: Poses) -> np.ndarray:
     Returns:
         (F, M, 3, 3 + 3 J): by the root's shift and each joint's three rotations.
     """
-    placed = place(chain, at)
-    about = axes(chain, at, placed)
-    count, frames = len(chain.skeleton), at.root.shape[-1]
+    placed = compute_world_poses(chain, poses)
+    step_axes = compute_step_axes(chain, poses, placed)
+    count, frames = len(chain.skeleton), poses.root.shape[-1]
     out = np.zeros((len(chain.joint), 3, 3 + 3 * count, frames))
     out[:, :, :3] = np.eye(3)[:, :, None]
     for marker, joint in enumerate(chain.joint):
         while joint >= 0:
             arm = placed.markers[marker] - placed.joints[joint]
-            out[marker, :, 3 + 3 * joint : 6 + 3 * joint] = cross(about[joint], arm[:, None])
+            out[marker, :, 3 + 3 * joint : 6 + 3 * joint] = cross(step_axes[joint], arm[:, None])
             joint = chain.skeleton.parents[joint]
     return np.moveaxis(out, -1, 0)

@@ -12,14 +12,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from . import elimination, limits
-from .chain import CONJUGATE, Chain, Placed, Poses, axes, cross, logarithm, moved, multiply, place
+from .chain import CONJUGATE, Chain, WorldPoses, Poses, compute_step_axes, cross, to_rotation_vectors, apply_step, multiply, compute_world_poses
 
-MOST_STEPS = 24  # steps at most
-_NEAR = 0.1  # a step that gains a smaller share of the cost is near enough for second derivatives to help
-_STILL = 1e-5  # radians (and metres): a frame with a smaller step has converged
+MAX_STEPS = 24  # steps at most
+_CURVED_GAIN = 0.1  # a step that gains a smaller share of the cost is near enough for second derivatives to help
+_CONVERGED_STEP = 1e-5  # radians (and metres): a frame with a smaller step has converged
 _NO_GAIN = 1e-7  # as has one whose cost falls by a smaller share
-_TRUSTED = 1e-3  # m2: with more damping a small step is no sign of convergence
-_FIRST_DAMPING, _LEAST_DAMPING, _MOST_DAMPING = 1e-5, 1e-9, 1e3  # m2
+_MAX_TRUSTED_DAMPING = 1e-3  # m2: with more damping a small step is no sign of convergence
+_INITIAL_DAMPING, _MIN_DAMPING, _MAX_DAMPING = 1e-5, 1e-9, 1e3  # m2
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -42,13 +42,13 @@ class HeldPoint:
     seen: np.ndarray
     weight: np.ndarray
 
-    def frames(self, chosen) -> "HeldPoint":
+    def select_frames(self, chosen) -> "HeldPoint":
         """Return the point for these frames only."""
         return replace(self, seen=self.seen[:, chosen], weight=self.weight[chosen])
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Task:
+class PoseTask:
     """What F poses should fit.
 
     Attributes:
@@ -65,21 +65,21 @@ class Task:
     chain: Chain
     seen: np.ndarray
     weights: np.ndarray
-    drawn: np.ndarray
-    lean: Poses | None = None
-    leaning: np.ndarray | None = None
+    stiffness: np.ndarray
+    target_poses: Poses | None = None
+    target_strength: np.ndarray | None = None
     point: HeldPoint | None = None
-    even: float = 0.0
+    run_stiffness: float = 0.0
 
-    def frames(self, chosen) -> "Task":
+    def select_frames(self, chosen) -> "PoseTask":
         """Return the task for these frames only."""
         return replace(self, seen=self.seen[..., chosen], weights=self.weights[:, chosen],
-                       lean=self.lean and self.lean.frames(chosen), point=self.point and self.point.frames(chosen),
-                       leaning=None if self.leaning is None else self.leaning[:, chosen])
+                       target_poses=self.target_poses and self.target_poses.select_frames(chosen), point=self.point and self.point.select_frames(chosen),
+                       target_strength=None if self.target_strength is None else self.target_strength[:, chosen])
 
 
 @dataclass(frozen=True, eq=False)
-class Arrived:
+class DescentResult:
     """The result of a descent.
 
     Attributes:
@@ -110,32 +110,32 @@ class State:
     """
 
     poses: Poses
-    placed: Placed
+    placed: WorldPoses
     away: np.ndarray
     bend: np.ndarray
     uneven: np.ndarray
-    gone: np.ndarray
+    from_target: np.ndarray
     cost: np.ndarray
 
-    def take(self, other: "State", where: np.ndarray) -> None:
+    def take_frames(self, other: "State", where: np.ndarray) -> None:
         """Take the other state's frames where (F,) is true, in place."""
-        for mine, its in zip(self._arrays(), other._arrays()):
-            np.copyto(mine, its, where=where)
+        for own, others in zip(self._list_arrays(), other._list_arrays()):
+            np.copyto(own, others, where=where)
 
-    def frames(self, chosen) -> "State":
+    def select_frames(self, chosen) -> "State":
         """Return the state for these frames only."""
-        at, put = self.poses.frames(chosen), self.placed
-        placed = Placed(at.root, *(a[..., chosen] for a in (put.world, put.joints, put.markers)))
-        more = (a[..., chosen] for a in (self.away, self.bend, self.uneven, self.gone, self.cost))
+        at, put = self.poses.select_frames(chosen), self.placed
+        placed = WorldPoses(at.root, *(a[..., chosen] for a in (put.world, put.joints, put.markers)))
+        more = (a[..., chosen] for a in (self.away, self.bend, self.uneven, self.from_target, self.cost))
         return State(at, placed, *more)
 
-    def _arrays(self):
+    def _list_arrays(self):
         at, put = self.poses, self.placed
         placed = at.root, at.local, at.angles, put.world, put.joints, put.markers
-        return *placed, self.away, self.bend, self.uneven, self.gone, self.cost
+        return *placed, self.away, self.bend, self.uneven, self.from_target, self.cost
 
 
-def descend(task: Task, start: Poses, most_steps: int = MOST_STEPS) -> Arrived:
+def descend(task: PoseTask, start: Poses, max_steps: int = MAX_STEPS) -> DescentResult:
     """Find the poses nearest to the recorded markers, downhill from the initial poses.
 
     Args:
@@ -146,78 +146,78 @@ def descend(task: Task, start: Poses, most_steps: int = MOST_STEPS) -> Arrived:
         Poses, costs, steps and held joints.
     """
     total = start.root.shape[-1]
-    stops = limits.limited(task.chain)
-    best = state_of(task, limits.held_back(task.chain, stops, start)[0])
+    limited_joints = limits.find_limited_joints(task.chain)
+    best = compute_state(task, limits.apply_limits(task.chain, limited_joints, start)[0])
     none = np.zeros((len(task.chain.skeleton), total), dtype=bool)
-    out = Arrived(best.poses.copy(), best.cost.copy(), np.zeros(total, dtype=int), none)
-    live, done = np.arange(total), np.zeros(total, dtype=bool)
-    damping, curved = np.full(total, _FIRST_DAMPING), np.zeros(total, dtype=bool)
-    for _ in range(most_steps):
-        size, held, trial = _step(task, best, stops, damping, curved)
+    out = DescentResult(best.poses.copy_arrays(), best.cost.copy(), np.zeros(total, dtype=int), none)
+    active, done = np.arange(total), np.zeros(total, dtype=bool)
+    damping, curved = np.full(total, _INITIAL_DAMPING), np.zeros(total, dtype=bool)
+    for _ in range(max_steps):
+        size, held, trial = _take_step(task, best, limited_joints, damping, curved)
         better = trial.cost <= best.cost * (1.0 + 1e-12) + 1e-18
         gain = best.cost - trial.cost
-        arrived = (size < _STILL) | (gain <= _NO_GAIN * best.cost)
-        done |= better & arrived & (damping < _TRUSTED) | (damping > _MOST_DAMPING)
-        best.take(trial, better)
+        arrived = (size < _CONVERGED_STEP) | (gain <= _NO_GAIN * best.cost)
+        done |= better & arrived & (damping < _MAX_TRUSTED_DAMPING) | (damping > _MAX_DAMPING)
+        best.take_frames(trial, better)
         # a rejected step is repeated with ten times the damping; after a curved one first without second derivatives
-        harder = np.where(curved, damping, np.maximum(10.0 * damping, _FIRST_DAMPING))
-        damping = np.where(better, np.maximum(0.1 * damping, _LEAST_DAMPING), harder)
-        curved = better & (gain < _NEAR * (best.cost + gain))
-        out.steps[live] += 1
+        raised_damping = np.where(curved, damping, np.maximum(10.0 * damping, _INITIAL_DAMPING))
+        damping = np.where(better, np.maximum(0.1 * damping, _MIN_DAMPING), raised_damping)
+        curved = better & (gain < _CURVED_GAIN * (best.cost + gain))
+        out.steps[active] += 1
         # drop converged frames once they are a fifth, so that copies stay rare
         if done.any() and (done.all() or done.mean() > 0.2):
-            _write(out, live[done], best.frames(done), held[:, done])
+            _store_frames(out, active[done], best.select_frames(done), held[:, done])
             if done.all():
                 return out
-            task, best = task.frames(~done), best.frames(~done)
-            live, damping, held, curved = live[~done], damping[~done], held[:, ~done], curved[~done]
+            task, best = task.select_frames(~done), best.select_frames(~done)
+            active, damping, held, curved = active[~done], damping[~done], held[:, ~done], curved[~done]
             done = done[~done]
-    _write(out, live, best, held)
+    _store_frames(out, active, best, held)
     return out
 
 
-def _write(out: Arrived, frames: np.ndarray, state: State, held: np.ndarray) -> None:
+def _store_frames(out: DescentResult, frames: np.ndarray, state: State, held: np.ndarray) -> None:
     """Store finished frames in the result."""
-    out.poses.put(frames, state.poses)
+    out.poses.overwrite_frames(frames, state.poses)
     out.cost[frames], out.held[:, frames] = state.cost, held
 
 
-def state_of(task: Task, at: Poses) -> State:
+def compute_state(task: PoseTask, poses: Poses) -> State:
     """Compute everything that follows from poses, and their cost."""
-    placed = place(task.chain, at)
-    away = placed.markers + (at.root - task.seen)
-    bend, uneven, gone = _bend(task.chain, at), _uneven(task, at), _gone(task, at)
+    placed = compute_world_poses(task.chain, poses)
+    away = placed.markers + (poses.root - task.seen)
+    bend, uneven, from_target = _measure_bend(task.chain, poses), _measure_unevenness(task, poses), _measure_from_target(task, poses)
     cost = np.einsum("mf,maf,maf->f", task.weights, away, away)
-    cost += np.einsum("ja,jaf,jaf->f", task.drawn**2, bend, bend)
-    cost += task.even**2 * np.einsum("jaf,jaf->f", uneven[:, 0], uneven[:, 0])
-    if task.lean is not None:
-        cost += np.einsum("jf,jaf,jaf->f", task.leaning**2, gone, gone)
+    cost += np.einsum("ja,jaf,jaf->f", task.stiffness**2, bend, bend)
+    cost += task.run_stiffness**2 * np.einsum("jaf,jaf->f", uneven[:, 0], uneven[:, 0])
+    if task.target_poses is not None:
+        cost += np.einsum("jf,jaf,jaf->f", task.target_strength**2, from_target, from_target)
     if task.point:
-        cost += task.point.weight * distance(task.point, placed)[2] ** 2
-    return State(at, placed, away, bend=bend, uneven=uneven, gone=gone, cost=0.5 * cost)
+        cost += task.point.weight * measure_distance(task.point, placed)[2] ** 2
+    return State(poses, placed, away, bend=bend, uneven=uneven, from_target=from_target, cost=0.5 * cost)
 
 
-def _bend(chain: Chain, at: Poses) -> np.ndarray:
+def _measure_bend(chain: Chain, poses: Poses) -> np.ndarray:
     """Measure how far (J, 3, F) radians each joint is rotated from rest: as a rotation vector, a hinge as angles."""
-    bend = logarithm(at.local)
+    bend = to_rotation_vectors(poses.local)
     for joint in chain.hinges:
-        bend[joint] = at.angles[joint]
+        bend[joint] = poses.angles[joint]
     return bend
 
 
-def _gone(task: Task, at: Poses) -> np.ndarray:
+def _measure_from_target(task: PoseTask, poses: Poses) -> np.ndarray:
     """Measure how far (J, 3, F) radians each joint is rotated from its target pose, in the same form; empty without
     one.
     """
-    if task.lean is None:
-        return np.zeros((0, 3, at.root.shape[-1]))
-    gone = logarithm(multiply(at.local, task.lean.local * CONJUGATE))
+    if task.target_poses is None:
+        return np.zeros((0, 3, poses.root.shape[-1]))
+    from_target = to_rotation_vectors(multiply(poses.local, task.target_poses.local * CONJUGATE))
     for joint in task.chain.hinges:
-        gone[joint] = at.angles[joint] - task.lean.angles[joint]
-    return gone
+        from_target[joint] = poses.angles[joint] - task.target_poses.angles[joint]
+    return from_target
 
 
-def _uneven(task: Task, at: Poses) -> np.ndarray:
+def _measure_unevenness(task: PoseTask, poses: Poses) -> np.ndarray:
     """Measure how far the joints of runs deviate from their run's mean rotation.
 
     For each joint: the difference of its rotation vector from the run's mean, and the derivative of half its square by
@@ -226,13 +226,13 @@ def _uneven(task: Task, at: Poses) -> np.ndarray:
     """
     out = []
     for run in task.chain.runs:
-        vectors = logarithm(at.local[list(run)])
+        vectors = to_rotation_vectors(poses.local[list(run)])
         for vector, gap in zip(vectors, vectors - vectors.mean(axis=0)):
-            out.append(np.stack([gap, carried_to_turns(vector, gap)]))
-    return np.array(out) if out else np.zeros((0, 2, 3, at.root.shape[-1]))
+            out.append(np.stack([gap, to_rotation_slope(vector, gap)]))
+    return np.array(out) if out else np.zeros((0, 2, 3, poses.root.shape[-1]))
 
 
-def carried_to_turns(vector: np.ndarray, slope: np.ndarray) -> np.ndarray:
+def to_rotation_slope(vector: np.ndarray, slope: np.ndarray) -> np.ndarray:
     """Convert a slope by a rotation vector to a slope by small rotations applied after it.
 
     Args:
@@ -249,7 +249,7 @@ def carried_to_turns(vector: np.ndarray, slope: np.ndarray) -> np.ndarray:
     return slope + 0.5 * once + factor * cross(vector, once)
 
 
-def distance(point: HeldPoint, placed: Placed) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def measure_distance(point: HeldPoint, placed: WorldPoses) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Measure the distance of the held point from the recorded point.
 
     Args:
@@ -265,7 +265,7 @@ def distance(point: HeldPoint, placed: Placed) -> tuple[np.ndarray, np.ndarray, 
     return x, gap / np.maximum(length, 1e-9), length - point.radius
 
 
-def crosswise(away: np.ndarray, radius: float) -> np.ndarray:
+def compute_cross_weight(away: np.ndarray, radius: float) -> np.ndarray:
     """Compute the weight across a distance, as a share of the weight along it (like a rope under tension).
 
     Args:
@@ -277,67 +277,67 @@ def crosswise(away: np.ndarray, radius: float) -> np.ndarray:
     return np.maximum(away, 0.0) / np.maximum(away + radius, 1e-9)
 
 
-def _step(task: Task, best: State, stops: dict, damping: np.ndarray,
+def _take_step(task: PoseTask, best: State, limited_joints: dict, damping: np.ndarray,
           curved: np.ndarray) -> tuple[np.ndarray, np.ndarray, State]:
     """Take one damped step, with second derivatives where `curved` (F,).
 
     Returns its size (F,), the joints held by limits (J, F), and the new state.
     """
-    shift, turns, held = _solved(task, best, stops, damping, curved)
-    further = limits.along(task.chain, held, best.poses, turns, moved(task.chain, best.poses, shift, turns))
-    further, ahead = limits.held_back(task.chain, stops, further)
+    shift, turns, held = _solve_step(task, best, limited_joints, damping, curved)
+    next_poses = limits.move_along_limits(task.chain, held, best.poses, turns, apply_step(task.chain, best.poses, shift, turns))
+    next_poses, ahead = limits.apply_limits(task.chain, limited_joints, next_poses)
     for joint in task.chain.hinges:
         ahead[joint] = best.poses.angles[joint] + turns[joint]
     outside = (ahead > task.chain.high[..., None]) | (ahead < task.chain.low[..., None])
     # frames whose step exceeds a limit are solved again so that the step ends at the limit
-    over = np.flatnonzero(outside.any(axis=(0, 1)))
-    if len(over):
-        part = best.frames(over)
-        again = _solved(task.frames(over), part, stops, damping=damping[over], curved=curved[over],
-                        ahead=ahead[..., over])
-        shift[:, over], turns[..., over], held[:, over] = again
-        onto = limits.along(task.chain, again[2], part.poses, again[1], moved(task.chain, part.poses, *again[:2]))
-        further.put(over, limits.held_back(task.chain, stops, onto)[0])
+    exceeding = np.flatnonzero(outside.any(axis=(0, 1)))
+    if len(exceeding):
+        part = best.select_frames(exceeding)
+        solution = _solve_step(task.select_frames(exceeding), part, limited_joints, damping=damping[exceeding], curved=curved[exceeding],
+                        ahead=ahead[..., exceeding])
+        shift[:, exceeding], turns[..., exceeding], held[:, exceeding] = solution
+        corrected = limits.move_along_limits(task.chain, solution[2], part.poses, solution[1], apply_step(task.chain, part.poses, *solution[:2]))
+        next_poses.overwrite_frames(exceeding, limits.apply_limits(task.chain, limited_joints, corrected)[0])
     size = np.maximum(np.abs(turns).max(axis=(0, 1)), np.abs(shift).max(axis=0))
-    return size, held, state_of(task, further)
+    return size, held, compute_state(task, next_poses)
 
 
-def _solved(task: Task, best: State, stops: dict, damping: np.ndarray, curved: np.ndarray, ahead=None):
+def _solve_step(task: PoseTask, best: State, limited_joints: dict, damping: np.ndarray, curved: np.ndarray, ahead=None):
     """Solve a step: the root's shift (3, F), all rotations (J, 3, F), and the joints held by limits (J, F).
 
     `ahead` is as in `limits.hold_at_limits`.
     """
-    about = axes(task.chain, best.poses, best.placed)
-    asked = elimination.bodies(task.chain, best.placed, best.away, task.weights)
+    step_axes = compute_step_axes(task.chain, best.poses, best.placed)
+    body_terms = elimination.build_body_terms(task.chain, best.placed, best.away, task.weights)
     if task.point:
-        x, along, far = distance(task.point, best.placed)
-        across = task.point.weight * crosswise(far, task.point.radius)
-        elimination.add_distance(asked, task.point.joint, x, along=along, weight=task.point.weight, away=far,
+        x, along, far = measure_distance(task.point, best.placed)
+        across = task.point.weight * compute_cross_weight(far, task.point.radius)
+        elimination.add_distance_terms(body_terms, task.point.joint, x, along=along, weight=task.point.weight, away=far,
                                  across=across)
-    own = wishes(task, best)
-    slope = elimination.gradient(task.chain, best.placed, about, asked, own)
-    held = limits.hold(task.chain, stops, best.poses, slope=slope, own=own, ahead=ahead)
-    bent = None
+    joint_terms = build_joint_terms(task, best)
+    slope = elimination.compute_gradient(task.chain, best.placed, step_axes, body_terms, joint_terms)
+    held = limits.hold_at_limits(task.chain, limited_joints, best.poses, slope=slope, joint_terms=joint_terms, next_angles=ahead)
+    second_derivatives = None
     if curved.any():
-        bent = elimination.bends(task.chain, best.placed, about, away=best.away, weights=task.weights, share=curved)
-    return *elimination.step(task.chain, best.placed, about, asked=asked, own=own, damping=damping, bent=bent), held
+        second_derivatives = elimination.compute_second_derivatives(task.chain, best.placed, step_axes, away=best.away, weights=task.weights, share=curved)
+    return *elimination.solve_step(task.chain, best.placed, step_axes, body_terms=body_terms, joint_terms=joint_terms, damping=damping, second_derivatives=second_derivatives), held
 
 
-def wishes(task: Task, best: State) -> elimination.Own:
+def build_joint_terms(task: PoseTask, best: State) -> elimination.JointTerms:
     """Build the terms of each joint's own rotations: pulls to rest, to even runs and to target poses.
 
     The derivative of half the squared length of a rotation vector by a small rotation is the vector itself.
     """
-    strength = task.drawn**2
+    strength = task.stiffness**2
     curvature = np.zeros((len(strength), 3, 3, best.cost.shape[-1]))
     pull = strength[..., None] * best.bend
     fixed = ~task.chain.free
-    spread = [joint for run in task.chain.runs for joint in run]
-    pull[spread] += task.even**2 * best.uneven[:, 1]
-    if task.lean is not None:
-        pull += task.leaning[:, None] ** 2 * best.gone
+    run_joints = [joint for run in task.chain.runs for joint in run]
+    pull[run_joints] += task.run_stiffness**2 * best.uneven[:, 1]
+    if task.target_poses is not None:
+        pull += task.target_strength[:, None] ** 2 * best.from_target
     for axis in range(3):
-        curvature[:, axis, axis] = strength[:, axis, None] + (0.0 if task.lean is None else task.leaning**2)
-        curvature[spread, axis, axis] += task.even**2
+        curvature[:, axis, axis] = strength[:, axis, None] + (0.0 if task.target_poses is None else task.target_strength**2)
+        curvature[run_joints, axis, axis] += task.run_stiffness**2
     pull[fixed] = 0.0
-    return elimination.Own(curvature, pull)
+    return elimination.JointTerms(curvature, pull)

@@ -19,10 +19,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .chain import Chain, Placed, cross
+from .chain import Chain, WorldPoses, cross
 
 
-class Bodies(NamedTuple):
+class BodyTerms(NamedTuple):
     """The terms of each joint's body: second and first derivative of half the weighted squared distances.
 
     Attributes:
@@ -34,7 +34,7 @@ class Bodies(NamedTuple):
     pull: np.ndarray
 
 
-class Bends(NamedTuple):
+class SecondDerivatives(NamedTuple):
     """The second derivatives of the distances.
 
     Attributes:
@@ -46,7 +46,7 @@ class Bends(NamedTuple):
     above: np.ndarray
 
 
-class Own(NamedTuple):
+class JointTerms(NamedTuple):
     """The terms of each joint's own rotations about its axes.
 
     Attributes:
@@ -58,7 +58,7 @@ class Own(NamedTuple):
     pull: np.ndarray
 
 
-def bodies(chain: Chain, placed: Placed, away: np.ndarray, weights: np.ndarray) -> Bodies:
+def build_body_terms(chain: Chain, placed: WorldPoses, away: np.ndarray, weights: np.ndarray) -> BodyTerms:
     """Build the terms of the markers.
 
     Args:
@@ -73,7 +73,7 @@ def bodies(chain: Chain, placed: Placed, away: np.ndarray, weights: np.ndarray) 
     curvature, pull = np.zeros((count, 6, 6, frames)), np.zeros((count, 6, frames))
     for joint, own in chain.clusters:
         _add_points(curvature[joint], pull[joint], placed.markers[own], weights[own], away[own])
-    return Bodies(curvature, pull)
+    return BodyTerms(curvature, pull)
 
 
 def _add_points(curvature, pull, x, w, r) -> None:
@@ -97,7 +97,7 @@ def _add_points(curvature, pull, x, w, r) -> None:
     pull[3:] += force
 
 
-def add_distance(asked: Bodies, joint: int, x: np.ndarray, along: np.ndarray, weight, away, across) -> None:
+def add_distance_terms(terms: BodyTerms, joint: int, x: np.ndarray, along: np.ndarray, weight, away, across) -> None:
     """Add the terms of a point that should keep a distance, in place.
 
     Args:
@@ -114,12 +114,12 @@ def add_distance(asked: Bodies, joint: int, x: np.ndarray, along: np.ndarray, we
         arm[b, a], arm[a, b] = -x[c], x[c]
         arm[a, 3 + a] = 1.0
     lever = np.einsum("af,acf->cf", along, arm)
-    asked.curvature[joint] += np.einsum("af,bf,f->abf", lever, lever, weight - across)
-    asked.curvature[joint] += np.einsum("caf,cbf,f->abf", arm, arm, across)
-    asked.pull[joint] += lever * (weight * away)
+    terms.curvature[joint] += np.einsum("af,bf,f->abf", lever, lever, weight - across)
+    terms.curvature[joint] += np.einsum("caf,cbf,f->abf", arm, arm, across)
+    terms.pull[joint] += lever * (weight * away)
 
 
-def gradient(chain: Chain, placed: Placed, axes: np.ndarray, asked: Bodies, own: Own) -> np.ndarray:
+def compute_gradient(chain: Chain, placed: WorldPoses, axes: np.ndarray, body_terms: BodyTerms, joint_terms: JointTerms) -> np.ndarray:
     """Compute the derivative of half the cost by each joint's rotations.
 
     Args:
@@ -131,15 +131,15 @@ def gradient(chain: Chain, placed: Placed, axes: np.ndarray, asked: Bodies, own:
     Returns:
         (J, 3, F).
     """
-    total = asked.pull.copy()
+    total = body_terms.pull.copy()
     for joint in range(len(chain.skeleton) - 1, 0, -1):
         total[chain.skeleton.parents[joint]] += total[joint]
     # a rotation about axis a through p: a acts on the moment, p x a on the force
     moment = total[:, :3] - np.moveaxis(cross(np.moveaxis(placed.joints, 1, 0), np.moveaxis(total[:, 3:], 1, 0)), 0, 1)
-    return own.pull + np.einsum("jacf,jaf->jcf", axes, moment)
+    return joint_terms.pull + np.einsum("jacf,jaf->jcf", axes, moment)
 
 
-def bends(chain: Chain, placed: Placed, axes: np.ndarray, away: np.ndarray, weights: np.ndarray, share) -> Bends:
+def compute_second_derivatives(chain: Chain, placed: WorldPoses, axes: np.ndarray, away: np.ndarray, weights: np.ndarray, share) -> SecondDerivatives:
     """Compute the second derivatives of half the weighted squared distances.
 
     Args:
@@ -154,10 +154,10 @@ def bends(chain: Chain, placed: Placed, axes: np.ndarray, away: np.ndarray, weig
     """
     count, frames = len(chain.skeleton), weights.shape[-1]
     moment, force = np.zeros((count, 3, 3, frames)), np.zeros((count, 3, frames))
-    pulled = (weights * share)[:, None] * away
+    weighted = (weights * share)[:, None] * away
     for joint, own in chain.clusters:
-        np.einsum("naf,nbf->abf", placed.markers[own], pulled[own], out=moment[joint])
-        np.sum(pulled[own], axis=0, out=force[joint])
+        np.einsum("naf,nbf->abf", placed.markers[own], weighted[own], out=moment[joint])
+        np.sum(weighted[own], axis=0, out=force[joint])
     for joint in range(count - 1, 0, -1):
         moment[chain.skeleton.parents[joint]] += moment[joint]
         force[chain.skeleton.parents[joint]] += force[joint]
@@ -166,17 +166,17 @@ def bends(chain: Chain, placed: Placed, axes: np.ndarray, away: np.ndarray, weig
     moment -= np.einsum("jaaf->jf", moment)[:, None, None] * np.eye(3)[:, :, None]
     above = np.einsum("jabf,jbcf->jacf", moment, axes)
     inner = np.einsum("jabf,jacf->jbcf", axes, above)
-    for joint, all_ways in enumerate(chain.turning):
+    for joint, all_ways in enumerate(chain.is_fully_free):
         if all_ways:
             inner[joint] = 0.5 * (inner[joint] + inner[joint].swapaxes(0, 1))
         else:  # of two angles of a hinge, the earlier carries the later
             for a, b in ((1, 0), (2, 0), (2, 1)):
                 inner[joint, a, b] = inner[joint, b, a]
-    return Bends(inner, above)
+    return SecondDerivatives(inner, above)
 
 
-def step(chain: Chain, placed: Placed, axes: np.ndarray, asked: Bodies, own: Own, damping: np.ndarray,
-         bent: Bends | None = None) -> tuple[np.ndarray, np.ndarray]:
+def solve_step(chain: Chain, placed: WorldPoses, axes: np.ndarray, body_terms: BodyTerms, joint_terms: JointTerms, damping: np.ndarray,
+         second_derivatives: SecondDerivatives | None = None) -> tuple[np.ndarray, np.ndarray]:
     """Solve one damped step.
 
     Args:
@@ -192,32 +192,32 @@ def step(chain: Chain, placed: Placed, axes: np.ndarray, asked: Bodies, own: Own
     """
     parents = chain.skeleton.parents
     # inward pass, tips to root: eliminate each joint's rotations and add the remainder to its parent
-    passed, rest = {}, {}
+    coupling, solutions = {}, {}
     for joint in range(len(parents) - 1, 0, -1):
         lever = np.concatenate([axes[joint], cross(placed.joints[joint][:, None], axes[joint])])
-        share = np.einsum("abf,bcf->acf", asked.curvature[joint], lever)
-        inner = np.einsum("abf,acf->bcf", lever, share) + own.curvature[joint]
-        if bent is not None:
-            inner += bent.inner[joint]
-            share[:3] += bent.above[joint]
+        share = np.einsum("abf,bcf->acf", body_terms.curvature[joint], lever)
+        inner = np.einsum("abf,acf->bcf", lever, share) + joint_terms.curvature[joint]
+        if second_derivatives is not None:
+            inner += second_derivatives.inner[joint]
+            share[:3] += second_derivatives.above[joint]
         _add_diagonal(inner, damping, chain.free[joint])
-        right = own.pull[joint] + np.einsum("abf,af->bf", lever, asked.pull[joint])
-        inverse = inverse_of(inner)
-        passed[joint] = np.einsum("acf,cbf->abf", share, inverse)
-        rest[joint] = np.einsum("abf,bf->af", inverse, right)
-        asked.curvature[parents[joint]] += asked.curvature[joint] - np.einsum("acf,bcf->abf", passed[joint], share)
-        asked.pull[parents[joint]] += asked.pull[joint] - np.einsum("acf,cf->af", passed[joint], right)
-        rest[joint] = (rest[joint], lever)
-    if bent is not None:
-        asked.curvature[0][:3, :3] += bent.inner[0]
+        right = joint_terms.pull[joint] + np.einsum("abf,af->bf", lever, body_terms.pull[joint])
+        inverse = invert_symmetric(inner)
+        coupling[joint] = np.einsum("acf,cbf->abf", share, inverse)
+        solutions[joint] = np.einsum("abf,bf->af", inverse, right)
+        body_terms.curvature[parents[joint]] += body_terms.curvature[joint] - np.einsum("acf,bcf->abf", coupling[joint], share)
+        body_terms.pull[parents[joint]] += body_terms.pull[joint] - np.einsum("acf,cf->af", coupling[joint], right)
+        solutions[joint] = (solutions[joint], lever)
+    if second_derivatives is not None:
+        body_terms.curvature[0][:3, :3] += second_derivatives.inner[0]
     # outward pass: the root's motion, then each joint's rotations given the motion above it
-    motions = {0: _root_step(asked, own, damping)}
+    motions = {0: _solve_root(body_terms, joint_terms, damping)}
     turns = np.empty((len(parents), 3, damping.shape[-1]))
     turns[0] = motions[0][:3]
     for joint in range(1, len(parents)):
-        alone, lever = rest[joint]
+        solution, lever = solutions[joint]
         above = motions[parents[joint]]
-        turns[joint] = -alone - np.einsum("abf,af->bf", passed[joint], above)
+        turns[joint] = -solution - np.einsum("abf,af->bf", coupling[joint], above)
         motions[joint] = above + np.einsum("abf,bf->af", lever, turns[joint])
     return motions[0][3:], turns
 
@@ -228,17 +228,17 @@ def _add_diagonal(inner: np.ndarray, damping: np.ndarray, free: np.ndarray) -> N
         inner[axis, axis] += damping if free[axis] else 1.0
 
 
-def _root_step(asked: Bodies, own: Own, damping: np.ndarray) -> np.ndarray:
+def _solve_root(body_terms: BodyTerms, joint_terms: JointTerms, damping: np.ndarray) -> np.ndarray:
     """Solve rotation and shift (6, F) of the root."""
-    curvature, pull = asked.curvature[0], asked.pull[0]
-    curvature[:3, :3] += own.curvature[0]
-    pull[:3] += own.pull[0]
+    curvature, pull = body_terms.curvature[0], body_terms.pull[0]
+    curvature[:3, :3] += joint_terms.curvature[0]
+    pull[:3] += joint_terms.pull[0]
     for axis in range(6):
         curvature[axis, axis] += damping
     return -np.linalg.solve(np.moveaxis(curvature, -1, 0), pull.T[..., None])[..., 0].T
 
 
-def inverse_of(m: np.ndarray) -> np.ndarray:
+def invert_symmetric(m: np.ndarray) -> np.ndarray:
     """Invert symmetric positive definite matrices (3, 3, F)."""
     out = np.empty_like(m)
     a, b, c, d, e, f = m[0, 0], m[0, 1], m[0, 2], m[1, 1], m[1, 2], m[2, 2]

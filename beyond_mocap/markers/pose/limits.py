@@ -16,25 +16,25 @@ import numpy as np
 
 from ...base.vectors import arctan2
 from ...motion import quaternion
-from .chain import AXES, Chain, Poses, angles_of, cross, own_axes, within
-from .elimination import Own
+from .chain import AXES, Chain, Poses, read_angles, cross, compute_hinge_axes, limit_angles
+from .elimination import JointTerms
 
 _NEAR_POLE = 0.12  # cosine of the middle angle below which the outer ones are meaningless (7 degrees)
-_AT = 1e-7  # radians from a limit within which an angle is at it
-_HELD = 1e6  # curvature, m2 per radian2, of a rotation that is fixed
+_AT_LIMIT = 1e-7  # radians from a limit within which an angle is at it
+_FIXED_CURVATURE = 1e6  # curvature, m2 per radian2, of a rotation that is fixed
 
 
-def limited(chain: Chain) -> dict[str, np.ndarray]:
+def find_limited_joints(chain: Chain) -> dict[str, np.ndarray]:
     """Find the joints that are free about all axes and have limits, by their axis order; the root has none."""
     bound = np.isfinite(chain.low).any(axis=1) | np.isfinite(chain.high).any(axis=1)
     found: dict[str, list[int]] = {}
     for joint in range(1, len(chain.skeleton)):
-        if bound[joint] and chain.turning[joint]:
+        if bound[joint] and chain.is_fully_free[joint]:
             found.setdefault(chain.order[joint], []).append(joint)
     return {order: np.array(joints) for order, joints in found.items()}
 
 
-def held_back(chain: Chain, joints: dict[str, np.ndarray], at: Poses) -> tuple[Poses, np.ndarray]:
+def apply_limits(chain: Chain, joints: dict[str, np.ndarray], poses: Poses) -> tuple[Poses, np.ndarray]:
     """Limit the angles of these joints.
 
     Args:
@@ -44,28 +44,28 @@ def held_back(chain: Chain, joints: dict[str, np.ndarray], at: Poses) -> tuple[P
     Returns:
         The limited poses with the angles of these joints, and the angles (J, 3, F) before.
     """
-    local, angles = at.local.copy(), at.angles.copy()
+    local, angles = poses.local.copy(), poses.angles.copy()
     before = angles.copy()
     for order, group in joints.items():
-        angles[group] = before[group] = _read(local[group], order)
+        angles[group] = before[group] = _read_euler_angles(local[group], order)
         outside = (angles[group] > chain.high[group][..., None]) | (angles[group] < chain.low[group][..., None])
-        for joint, beyond in zip(group, outside.any(axis=1)):
-            if beyond.any():
-                _bring_back(chain, joint, np.flatnonzero(beyond), local=local, angles=angles, before=before)
-    return Poses(at.root, local, angles), before
+        for joint, exceeding in zip(group, outside.any(axis=1)):
+            if exceeding.any():
+                _limit_joint(chain, joint, np.flatnonzero(exceeding), local=local, angles=angles, before=before)
+    return Poses(poses.root, local, angles), before
 
 
-def _bring_back(chain, joint, frames, local, angles, before) -> None:
+def _limit_joint(chain, joint, frames, local, angles, before) -> None:
     """Limit one joint in these frames, where it really exceeds its limits, in place."""
-    read = angles_of(chain, joint, local[joint][:, frames])
-    kept = np.where(_counts(read), within(chain, joint, read), read)
-    angles[joint][:, frames] = kept
-    before[joint][:, frames] = np.where(_counts(read), read, 0.0)
-    moves = np.any(kept != read, axis=0)
-    local[joint][:, frames[moves]] = quaternion.from_euler(kept[:, moves].T, chain.order[joint]).T
+    angles_now = read_angles(chain, joint, local[joint][:, frames])
+    limited = np.where(_find_valid_angles(angles_now), limit_angles(chain, joint, angles_now), angles_now)
+    angles[joint][:, frames] = limited
+    before[joint][:, frames] = np.where(_find_valid_angles(angles_now), angles_now, 0.0)
+    moves = np.any(limited != angles_now, axis=0)
+    local[joint][:, frames[moves]] = quaternion.from_euler(limited[:, moves].T, chain.order[joint]).T
 
 
-def _read(q: np.ndarray, order: str) -> np.ndarray:
+def _read_euler_angles(q: np.ndarray, order: str) -> np.ndarray:
     """Read angles (..., 3, F) radians of rotations (..., 4, F), the middle one within a quarter turn."""
     i, j, k = (AXES[letter] for letter in order)
     sign = 1.0 if (j - i) % 3 == 1 else -1.0
@@ -77,14 +77,14 @@ def _read(q: np.ndarray, order: str) -> np.ndarray:
     return np.stack([arctan2(-first[0], first[1]), middle, arctan2(-third[0], third[1])], axis=-2)
 
 
-def _counts(angles: np.ndarray) -> np.ndarray:
+def _find_valid_angles(angles: np.ndarray) -> np.ndarray:
     """Return which angles (3, F) are meaningful: all, but near the pole only the middle one."""
     away = np.abs(np.cos(angles[1])) >= _NEAR_POLE
     return np.stack([away, np.ones_like(away), away])
 
 
-def hold(chain: Chain, joints: dict[str, np.ndarray], at: Poses, slope: np.ndarray, own: Own,
-         ahead: np.ndarray | None = None) -> np.ndarray:
+def hold_at_limits(chain: Chain, joints: dict[str, np.ndarray], poses: Poses, slope: np.ndarray, joint_terms: JointTerms,
+         next_angles: np.ndarray | None = None) -> np.ndarray:
     """Fix the angles that are at a limit and pulled beyond it, and let those that exceeded a limit end at it.
 
     Args:
@@ -98,47 +98,47 @@ def hold(chain: Chain, joints: dict[str, np.ndarray], at: Poses, slope: np.ndarr
         (J, F) bool, joints that are fixed.
     """
     low, high = chain.low[..., None], chain.high[..., None]
-    stops = np.zeros(at.angles.shape, dtype=bool)
+    is_fixed = np.zeros(poses.angles.shape, dtype=bool)
     # the nearer limit of each angle; an infinite one counts as beyond any angle (9 rad)
-    bound = np.where(at.angles > 0.5 * (np.maximum(low, -9.0) + np.minimum(high, 9.0)), high, low)
-    touching = ((at.angles >= high - _AT) | (at.angles <= low + _AT)) & chain.free[..., None]
-    if ahead is not None:
-        over, under = ahead > high, ahead < low
-        stops |= over | under
+    bound = np.where(poses.angles > 0.5 * (np.maximum(low, -9.0) + np.minimum(high, 9.0)), high, low)
+    touching = ((poses.angles >= high - _AT_LIMIT) | (poses.angles <= low + _AT_LIMIT)) & chain.free[..., None]
+    if next_angles is not None:
+        over, under = next_angles > high, next_angles < low
+        is_fixed |= over | under
         bound = np.where(over, high, np.where(under, low, bound))
-    able = [*chain.hinges, *(joint for group in joints.values() for joint in group)]
-    for joint in able:
-        if touching[joint].any() or stops[joint].any():
-            _hold_joint(chain, joint, at.angles[joint], touching=touching[joint], bound=bound[joint],
-                        slope=slope[joint], stops=stops[joint], own=own)
-    idle = np.setdiff1d(np.arange(len(stops)), able)
-    stops[idle] = False
-    return stops.any(axis=1)
+    limited_joints = [*chain.hinges, *(joint for group in joints.values() for joint in group)]
+    for joint in limited_joints:
+        if touching[joint].any() or is_fixed[joint].any():
+            _hold_joint_at_limits(chain, joint, poses.angles[joint], touching=touching[joint], bound=bound[joint],
+                        slope=slope[joint], is_fixed=is_fixed[joint], joint_terms=joint_terms)
+    idle = np.setdiff1d(np.arange(len(is_fixed)), limited_joints)
+    is_fixed[idle] = False
+    return is_fixed.any(axis=1)
 
 
-def _hold_joint(chain, joint, angles, touching, bound, slope, stops, own) -> None:
+def _hold_joint_at_limits(chain, joint, angles, touching, bound, slope, is_fixed, joint_terms) -> None:
     """Do `hold_at_limits` for one joint: complete `is_fixed` (3, F) and change `joint_terms`, in place."""
-    frames = np.flatnonzero((touching | stops).any(axis=0))
+    frames = np.flatnonzero((touching | is_fixed).any(axis=0))
     here = angles[:, frames]
-    if chain.turning[joint]:
-        basis = own_axes(chain, joint, here)
-        rates = _inverse(basis)
-        means = _counts(here)
+    if chain.is_fully_free[joint]:
+        basis = compute_hinge_axes(chain, joint, here)
+        rates = _invert_axes(basis)
+        is_valid = _find_valid_angles(here)
     else:
         basis = rates = np.broadcast_to(np.eye(3)[:, :, None], (3, 3, len(frames)))
-        means = np.broadcast_to(chain.free[joint][:, None], here.shape)
+        is_valid = np.broadcast_to(chain.free[joint][:, None], here.shape)
     # derivative of the cost by each angle: pulled outwards if it falls beyond the limit
     along = np.einsum("abf,af->bf", basis, slope[:, frames])
-    outward = np.where(here >= chain.high[joint][:, None] - _AT, along < 0.0, along > 0.0)
-    stops[:, frames] = ((touching[:, frames] & outward) | stops[:, frames]) & means
+    outward = np.where(here >= chain.high[joint][:, None] - _AT_LIMIT, along < 0.0, along > 0.0)
+    is_fixed[:, frames] = ((touching[:, frames] & outward) | is_fixed[:, frames]) & is_valid
     # fix an angle by a very stiff term that moves it onto its limit
-    strength = np.where(stops[:, frames], _HELD, 0.0)
-    short = np.where(stops[:, frames], here - bound[:, frames], 0.0)
-    own.curvature[joint][..., frames] += np.einsum("naf,nbf,nf->abf", rates, rates, strength)
-    own.pull[joint][:, frames] += np.einsum("naf,nf->af", rates, strength * short)
+    strength = np.where(is_fixed[:, frames], _FIXED_CURVATURE, 0.0)
+    excess = np.where(is_fixed[:, frames], here - bound[:, frames], 0.0)
+    joint_terms.curvature[joint][..., frames] += np.einsum("naf,nbf,nf->abf", rates, rates, strength)
+    joint_terms.pull[joint][:, frames] += np.einsum("naf,nf->af", rates, strength * excess)
 
 
-def along(chain: Chain, held: np.ndarray, at: Poses, turns: np.ndarray, further: Poses) -> Poses:
+def move_along_limits(chain: Chain, held: np.ndarray, poses: Poses, rotations: np.ndarray, next_poses: Poses) -> Poses:
     """Move joints that limits fix along their limit, in place.
 
     Their angles change by the solved rotations; a rotation about a fixed axis would leave the limit.
@@ -153,16 +153,16 @@ def along(chain: Chain, held: np.ndarray, at: Poses, turns: np.ndarray, further:
         The poses after the step.
     """
     for joint in np.flatnonzero(held.any(axis=1)):
-        if chain.turning[joint]:
+        if chain.is_fully_free[joint]:
             frames = np.flatnonzero(held[joint])
-            angles = at.angles[joint][:, frames]
-            rates = _inverse(own_axes(chain, joint, angles))
-            there = angles + np.einsum("naf,af->nf", rates, turns[joint][:, frames])
-            further.local[joint][:, frames] = quaternion.from_euler(there.T, chain.order[joint]).T
-    return further
+            angles = poses.angles[joint][:, frames]
+            rates = _invert_axes(compute_hinge_axes(chain, joint, angles))
+            limited_angles = angles + np.einsum("naf,af->nf", rates, rotations[joint][:, frames])
+            next_poses.local[joint][:, frames] = quaternion.from_euler(limited_angles.T, chain.order[joint]).T
+    return next_poses
 
 
-def _inverse(basis: np.ndarray) -> np.ndarray:
+def _invert_axes(basis: np.ndarray) -> np.ndarray:
     """Invert the axes (3 components, 3, F): how each angle grows with a rotation, (3 angles, 3 components, F)."""
     columns = basis[:, 0], basis[:, 1], basis[:, 2]
     # inverse of a 3x3 matrix by cross products of its columns, over their determinant

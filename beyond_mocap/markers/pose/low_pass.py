@@ -22,23 +22,23 @@ import numpy as np
 
 from ...base.banded_least_squares import BandedLeastSquares
 from ...base.errors import InputError
-from ...base.settings import setting
+from ...base.settings import find_setting
 from ...motion import quaternion
 from ...motion.motion import Motion
 
-CUTOFF = setting("markers", "cutoff").default  # hertz; Fredriksson §5.4
-LEAST_RATE = 2.2  # frames per second for each hertz of cutoff; below twice the cutoff there is nothing to remove
+CUTOFF = find_setting("markers", "cutoff").default  # hertz; Fredriksson §5.4
+MIN_RATE = 2.2  # frames per second for each hertz of cutoff; below twice the cutoff there is nothing to remove
 
 _EACH_PASS = (2.0**0.5 - 1.0) ** 0.25  # a pass's cutoff is the requested one divided by this, on the bilinear scale
-_PADDED = 2.0  # periods of the cutoff by which both ends are extended before the passes
-_LEAST_FRAMES = 4  # frames that can be filtered at least
+_PADDING_PERIODS = 2.0  # periods of the cutoff by which both ends are extended before the passes
+_MIN_FRAMES = 4  # frames that can be filtered at least
 
 _ORDER = 3  # of the difference that is noise: the jerk
-_LEAST_WORTH = 1e-4  # weight of an occluded frame: the system stays solvable where few are visible
+_MIN_WEIGHT = 1e-4  # weight of an occluded frame: the system stays solvable where few are visible
 
 
 @dataclass(frozen=True, eq=False)
-class Filtered:
+class FilterResult:
     """A filtered motion.
 
     Attributes:
@@ -50,7 +50,7 @@ class Filtered:
     notes: tuple[str, ...] = ()
 
 
-def butterworth(motion: Motion, cutoff: float = CUTOFF) -> Filtered:
+def filter_butterworth(motion: Motion, cutoff: float = CUTOFF) -> FilterResult:
     """Remove what oscillates faster than a cutoff from the root's place and every joint's rotation.
 
     Rotations are filtered as quaternions of continuous sign and normalized: joints rotate little between two frames, so
@@ -66,27 +66,27 @@ def butterworth(motion: Motion, cutoff: float = CUTOFF) -> Filtered:
         InputError: if the cutoff is not a positive number, or the motion contains NaN or infinite values.
     Source: Fredriksson section 5.4.
     """
-    check_numbers(motion, cutoff)
-    note = unfit(motion, cutoff)
+    check_finite(motion, cutoff)
+    note = describe_unfilterable(motion, cutoff)
     if note:
-        return Filtered(motion, (note,))
-    root = low_pass(motion.root_positions, motion.fps, cutoff)
-    turned = quaternion.normalized(low_pass(quaternion.continuous(motion.rotations), motion.fps, cutoff))
-    return Filtered(replace(motion, root_positions=root, rotations=turned))
+        return FilterResult(motion, (note,))
+    root = filter_values(motion.root_positions, motion.fps, cutoff)
+    rotations = quaternion.normalize(filter_values(quaternion.unify_signs(motion.rotations), motion.fps, cutoff))
+    return FilterResult(replace(motion, root_positions=root, rotations=rotations))
 
 
-def unfit(motion: Motion, cutoff: float) -> str:
+def describe_unfilterable(motion: Motion, cutoff: float) -> str:
     """Return why a motion cannot be filtered at this cutoff, or ""."""
-    if len(motion) < _LEAST_FRAMES:
+    if len(motion) < _MIN_FRAMES:
         return f"not filtered: {len(motion)} frames are too few"
-    if motion.fps < LEAST_RATE * cutoff:
-        most = motion.fps / LEAST_RATE
+    if motion.fps < MIN_RATE * cutoff:
+        most = motion.fps / MIN_RATE
         return (f"not filtered: {motion.fps:g} frames per second contain nothing above {motion.fps / 2:g} Hz; use a "
                 f"cutoff of {most:.3g} Hz or less")
     return ""
 
 
-def check_numbers(motion: Motion, cutoff: float) -> None:
+def check_finite(motion: Motion, cutoff: float) -> None:
     """Raise InputError if the cutoff is not a positive number, or the motion contains NaN or infinite values."""
     if not (np.isfinite(cutoff) and cutoff > 0):
         raise InputError("cutoff", f"{cutoff} hertz", "a positive number")
@@ -94,7 +94,7 @@ def check_numbers(motion: Motion, cutoff: float) -> None:
         raise InputError("motion", "NaN or infinite places or rotations", "finite numbers", "fill its gaps first")
 
 
-def low_pass(values: np.ndarray, fps: float, cutoff: float) -> np.ndarray:
+def filter_values(values: np.ndarray, fps: float, cutoff: float) -> np.ndarray:
     """Filter values with a zero-phase low-pass of fourth order, -3 dB at the cutoff.
 
     Both ends are extended by reflecting them about their last value.
@@ -110,11 +110,11 @@ def low_pass(values: np.ndarray, fps: float, cutoff: float) -> np.ndarray:
 
     half = np.tan(np.pi * cutoff / fps) / _EACH_PASS  # the bilinear scale, on which the correction is exact
     sections = butter(2, np.arctan(half) / np.pi * 2.0, output="sos")
-    padded = min(len(values) - 1, int(np.ceil(_PADDED * fps / cutoff)))
+    padded = min(len(values) - 1, int(np.ceil(_PADDING_PERIODS * fps / cutoff)))
     return sosfiltfilt(sections, values, axis=0, padtype="odd", padlen=padded)
 
 
-def kalman(motion: Motion, worth: np.ndarray | None = None, cutoff: float = CUTOFF) -> Filtered:
+def smooth_kalman(motion: Motion, weights: np.ndarray | None = None, cutoff: float = CUTOFF) -> FilterResult:
     """Estimate the most likely curve of the root's place and of every joint's rotation.
 
     Args:
@@ -130,30 +130,30 @@ def kalman(motion: Motion, worth: np.ndarray | None = None, cutoff: float = CUTO
             contains NaN or infinite values.
     Source: De Groote et al. 2008; Fredriksson section 10.2.
     """
-    check_numbers(motion, cutoff)
-    worth = _checked(worth, motion)
-    note = unfit(motion, cutoff)
+    check_finite(motion, cutoff)
+    weights = _check_weights(weights, motion)
+    note = describe_unfilterable(motion, cutoff)
     if note:
-        return Filtered(motion, (note,))
-    turns = quaternion.continuous(motion.rotations)
-    price = jerk_price(motion.fps, cutoff)
-    root = smoothed(motion.root_positions, worth[:, 0], price)
-    turned = np.stack([smoothed(turns[:, joint], worth[:, joint], price) for joint in range(turns.shape[1])], axis=1)
-    return Filtered(replace(motion, root_positions=root, rotations=quaternion.normalized(turned)))
+        return FilterResult(motion, (note,))
+    quaternions = quaternion.unify_signs(motion.rotations)
+    jerk_cost = compute_jerk_cost(motion.fps, cutoff)
+    root = smooth_values(motion.root_positions, weights[:, 0], jerk_cost)
+    rotations = np.stack([smooth_values(quaternions[:, joint], weights[:, joint], jerk_cost) for joint in range(quaternions.shape[1])], axis=1)
+    return FilterResult(replace(motion, root_positions=root, rotations=quaternion.normalize(rotations)))
 
 
-def _checked(worth: np.ndarray | None, motion: Motion) -> np.ndarray:
+def _check_weights(weights: np.ndarray | None, motion: Motion) -> np.ndarray:
     """Return the weights (T, J), all positive; raise InputError where they are not valid."""
     shape = motion.rotations.shape[:2]
-    if worth is None:
+    if weights is None:
         return np.ones(shape)
-    worth = np.asarray(worth, dtype=float)
-    if worth.shape != shape or not np.isfinite(worth).all() or (worth < 0).any():
-        raise InputError("weights", f"shape {worth.shape}", f"{shape}, finite and not below 0")
-    return np.maximum(worth, _LEAST_WORTH)
+    weights = np.asarray(weights, dtype=float)
+    if weights.shape != shape or not np.isfinite(weights).all() or (weights < 0).any():
+        raise InputError("weights", f"shape {weights.shape}", f"{shape}, finite and not below 0")
+    return np.maximum(weights, _MIN_WEIGHT)
 
 
-def jerk_price(fps: float, cutoff: float) -> float:
+def compute_jerk_cost(fps: float, cutoff: float) -> float:
     """Compute the cost of the jerk for which half of the power passes at the cutoff.
 
     It is q, the variance of the observations over that of the jerk: a wave of w radians per frame passes with the
@@ -167,7 +167,7 @@ def jerk_price(fps: float, cutoff: float) -> float:
     return (2.0**0.5 - 1.0) / wave ** (2 * _ORDER)
 
 
-def smoothed(seen: np.ndarray, worth: np.ndarray, price: float) -> np.ndarray:
+def smooth_values(seen: np.ndarray, weights: np.ndarray, jerk_cost: float) -> np.ndarray:
     """Minimise sum weight |x - seen|^2 + cost |third difference of x|^2.
 
     Args:
@@ -179,6 +179,6 @@ def smoothed(seen: np.ndarray, worth: np.ndarray, price: float) -> np.ndarray:
     """
     origin = seen.mean(axis=0)  # centred, so that no digits are lost far from the origin
     squares = BandedLeastSquares(len(seen), reach=_ORDER, columns=seen.shape[1])
-    squares.add_value(worth, goal=seen - origin)
-    squares.add_difference(_ORDER, price)
+    squares.add_value(weights, goal=seen - origin)
+    squares.add_difference(_ORDER, jerk_cost)
     return squares.solve() + origin

@@ -18,21 +18,21 @@ import numpy as np
 
 from ...base.easing import smoothstep
 from ...base.errors import InputError
-from ...base.time_series import runs
+from ...base.time_series import find_runs
 from ...motion import quaternion
-from ...motion.humanoid import Limb, identify
-from ...motion.limb import bent_limb
-from ...motion.motion import Motion, pose_kinematics
+from ...motion.humanoid import Limb, identify_joints
+from ...motion.limb import solve_posed_limb
+from ...motion.motion import Motion, compute_pose
 
 WINDOW, STILL, EASE, APART = 0.5, 0.0015, 0.1, 0.01
 """Seconds of the window (100 frames at 200 per second in the source), metres between the halves' means, seconds of
 easing in and out, and metres from the held place beyond which a point is not in contact."""
 
-_SOFT = 0.002  # metres below full length at which a leg with a held foot begins to ease
+_SOFT_LENGTH = 0.002  # metres below full length at which a leg with a held foot begins to ease
 
 
 @dataclass(frozen=True, eq=False)
-class PlantFiltered:
+class PlantFilterResult:
     """The result of the foot-plant filter.
 
     Attributes:
@@ -44,12 +44,12 @@ class PlantFiltered:
 
     motion: Motion
     held: np.ndarray
-    moved: np.ndarray
+    ankle_shift: np.ndarray
     miss: np.ndarray
 
 
-def plant_filter(motion: Motion, window: float = WINDOW, still: float = STILL, ease: float = EASE,
-                 apart: float = APART) -> PlantFiltered:
+def filter_foot_plants(motion: Motion, window: float = WINDOW, max_drift: float = STILL, ease: float = EASE,
+                 max_distance: float = APART) -> PlantFilterResult:
     """Hold ankles and toes in place where they are in contact.
 
     Only leg joints change, in frames in which something is held or released.
@@ -66,30 +66,30 @@ def plant_filter(motion: Motion, window: float = WINDOW, still: float = STILL, e
         InputError: if the skeleton has no two legs, or a number is not positive.
     Source: Fredriksson section 5.4.
     """
-    if min(window, still, ease, apart) <= 0:
-        raise InputError("foot plant", f"{window} s, {still} m, {ease} s, {apart} m", "positive numbers")
-    body = identify(motion.skeleton)
-    places, world = pose_kinematics(motion.skeleton, motion.root_positions, motion.rotations)
+    if min(window, max_drift, ease, max_distance) <= 0:
+        raise InputError("foot plant", f"{window} s, {max_drift} m, {ease} s, {max_distance} m", "positive numbers")
+    body = identify_joints(motion.skeleton)
+    places, world = compute_pose(motion.skeleton, motion.root_positions, motion.rotations)
     rotations = np.array(motion.rotations)
     held = np.zeros((len(motion), 2, 2), bool)
     moved, miss = np.zeros((len(motion), 2)), np.zeros((len(motion), 2))
-    sizes = max(2, round(window * motion.fps / 2.0)), still, apart
+    sizes = max(2, round(window * motion.fps / 2.0)), max_drift, max_distance
     for side, limb in enumerate((body.left, body.right)):
         points = [places[:, limb.foot], places[:, limb.toe_or_foot]]
-        stands = [stances(point, *sizes) for point in points]
-        held[:, side] = np.stack([_covered(spans, len(motion)) for spans in stands], axis=1)
-        shifts = [hold(point, spans, max(1, round(ease * motion.fps))) for point, spans in zip(points, stands)]
+        contacts = [detect_contacts(point, *sizes) for point in points]
+        held[:, side] = np.stack([_build_mask(spans, len(motion)) for spans in contacts], axis=1)
+        shifts = [compute_hold_shift(point, spans, max(1, round(ease * motion.fps))) for point, spans in zip(points, contacts)]
         foot = _Foot(limb, places, world, *shifts)
-        now = np.flatnonzero(foot.weight > 0)
-        if len(now):
-            found, short = foot.reached(motion.skeleton, now)
-            for joint, local in found.items():
-                rotations[now, joint] = quaternion.signed_like(local, rotations[now, joint])
-            moved[now, side], miss[now, side] = np.linalg.norm(foot.ankle_shift[now], axis=1), short
-    return PlantFiltered(replace(motion, rotations=rotations), held, moved, miss)
+        active = np.flatnonzero(foot.weight > 0)
+        if len(active):
+            leg_rotations, missed = foot.solve_leg(motion.skeleton, active)
+            for joint, local in leg_rotations.items():
+                rotations[active, joint] = quaternion.match_signs(local, rotations[active, joint])
+            moved[active, side], miss[active, side] = np.linalg.norm(foot.ankle_shift[active], axis=1), missed
+    return PlantFilterResult(replace(motion, rotations=rotations), held, moved, miss)
 
 
-def stances(place: np.ndarray, half: int, still: float, apart: float) -> list[tuple[int, int]]:
+def detect_contacts(place: np.ndarray, half: int, max_drift: float, max_distance: float) -> list[tuple[int, int]]:
     """Detect the contacts of a point.
 
     Args:
@@ -106,28 +106,28 @@ def stances(place: np.ndarray, half: int, still: float, apart: float) -> list[tu
     # cumulative sums give the mean over any half window: `mean[i]` is that of frames i to i + half
     total = np.concatenate([np.zeros((1, 3)), np.cumsum(place - place[0], axis=0)])
     mean = (total[half:] - total[:-half]) / half
-    begins = np.flatnonzero(np.linalg.norm(mean[half:] - mean[:-half], axis=1) <= still)
+    begins = np.flatnonzero(np.linalg.norm(mean[half:] - mean[:-half], axis=1) <= max_drift)
     marked = np.zeros(count, bool)
     for begin in begins:
         middle = 0.5 * (mean[begin] + mean[begin + half]) + place[0]
         inside = place[begin : begin + 2 * half]
-        if np.linalg.norm(inside - middle, axis=1).max() <= apart:
+        if np.linalg.norm(inside - middle, axis=1).max() <= max_distance:
             marked[begin : begin + 2 * half] = True
-    pieces = [piece for span in runs(marked) for piece in _near_one_place(place, *span, apart)]
+    pieces = [piece for span in find_runs(marked) for piece in _split_drifting(place, *span, max_distance)]
     return [(first, end) for first, end in pieces if end - first >= half]
 
 
-def _near_one_place(place: np.ndarray, first: int, end: int, apart: float) -> list[tuple[int, int]]:
+def _split_drifting(place: np.ndarray, first: int, end: int, max_distance: float) -> list[tuple[int, int]]:
     """Halve a stretch that drifts until no frame of a piece is further than `max_distance` from the piece's mean."""
     inside = place[first:end]
     off = np.linalg.norm(inside - inside.mean(axis=0), axis=1).max()
-    if off <= apart or end - first < 2:
+    if off <= max_distance or end - first < 2:
         return [(first, end)]
     middle = (first + end) // 2
-    return [*_near_one_place(place, first, middle, apart), *_near_one_place(place, middle, end, apart)]
+    return [*_split_drifting(place, first, middle, max_distance), *_split_drifting(place, middle, end, max_distance)]
 
 
-def hold(place: np.ndarray, spans: list[tuple[int, int]], ease: int) -> tuple[np.ndarray, np.ndarray]:
+def compute_hold_shift(place: np.ndarray, spans: list[tuple[int, int]], ease: int) -> tuple[np.ndarray, np.ndarray]:
     """Compute the shift that brings a point to its mean place in every contact.
 
     Args:
@@ -141,15 +141,15 @@ def hold(place: np.ndarray, spans: list[tuple[int, int]], ease: int) -> tuple[np
     shift, weight = np.zeros_like(place), np.zeros(len(place))
     share, frames = np.zeros(len(place)), np.arange(len(place))
     for first, end in spans:
-        gone = np.maximum(np.maximum(first - frames, frames - (end - 1)), 0) / (ease + 1)
-        own = smoothstep(1.0 - np.minimum(gone, 1.0))
+        distance = np.maximum(np.maximum(first - frames, frames - (end - 1)), 0) / (ease + 1)
+        own = smoothstep(1.0 - np.minimum(distance, 1.0))
         shift += own[:, None] * (place[first:end].mean(axis=0) - place)
         share += own
         weight = np.maximum(weight, own)
     return shift / np.maximum(share, 1.0)[:, None], weight
 
 
-def _covered(spans: list[tuple[int, int]], count: int) -> np.ndarray:
+def _build_mask(spans: list[tuple[int, int]], count: int) -> np.ndarray:
     out = np.zeros(count, bool)
     for first, end in spans:
         out[first:end] = True
@@ -170,7 +170,7 @@ class _Foot:
         self.toe_shift = toe_shift + (1.0 - toe_weight)[:, None] * ankle_shift
         self.weight = np.maximum(ankle_weight, toe_weight)
 
-    def reached(self, skeleton, now: np.ndarray) -> tuple[dict[int, np.ndarray], np.ndarray]:
+    def solve_leg(self, skeleton, frames: np.ndarray) -> tuple[dict[int, np.ndarray], np.ndarray]:
         """Solve the leg for its targets.
 
         Args:
@@ -179,13 +179,13 @@ class _Foot:
         Returns:
             Local rotations (N, 4) by joint, and metres (N,) by which the ankle was missed.
         """
-        limb, places, world = self.limb, self.places[now], self.world[now]
+        limb, places, world = self.limb, self.places[frames], self.world[frames]
         ankle = places[:, limb.foot]
-        turned = world[:, limb.foot]
+        foot_rotation = world[:, limb.foot]
         if limb.toe is not None:
             along = places[:, limb.toe] - ankle
-            new = along + self.toe_shift[now] - self.ankle_shift[now]
-            turned = quaternion.multiply(quaternion.between(along, new), turned)
+            held_direction = along + self.toe_shift[frames] - self.ankle_shift[frames]
+            foot_rotation = quaternion.multiply(quaternion.rotation_between(along, held_direction), foot_rotation)
         chain = (limb.upper_leg, limb.lower_leg, limb.foot)
-        soft = 1e-6 + _SOFT * self.weight[now]
-        return bent_limb(skeleton, places, world, chain, ankle + self.ankle_shift[now], end_rotation=turned, soft=soft)
+        soft = 1e-6 + _SOFT_LENGTH * self.weight[frames]
+        return solve_posed_limb(skeleton, places, world, chain, ankle + self.ankle_shift[frames], end_rotation=foot_rotation, soft=soft)

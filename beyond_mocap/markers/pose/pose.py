@@ -11,30 +11,30 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...base.errors import Cancelled, InputError
+from ...base.errors import UserCancelledError, InputError
 from ...motion import quaternion
 from ...motion.motion import Motion
-from ..frames import placed as carried
-from ..frames import rigid_fit
-from .chain import Chain, Poses, chain, place, poses
-from .descent import HeldPoint, Task, descend
-from .residuals import marker_weights, seen_markers
-from .smooth import smooth
-from .start import first_poses
+from ..frames import place_points as carried
+from ..frames import fit_rigid
+from .chain import Chain, Poses, build_chain, compute_world_poses, build_poses
+from .descent import HeldPoint, PoseTask, descend
+from .residuals import compute_marker_weights, collect_markers
+from .smooth import smooth_poses
+from .start import estimate_initial_poses
 
 _CHUNK = 512  # frames solved together
 _COARSE_SECONDS = 1.0 / 60.0  # spacing of the frames that are solved first
-_ENOUGH = 0.3  # share of the markers that a frame must show to be solved
-_FEWEST = 4  # markers that it must show at least
-_DEAR, _FAR = 1.5, np.radians(40.0)  # a solution is doubtful at so many times its neighbour's cost, or rotation
+_MIN_MARKER_SHARE = 0.3  # share of the markers that a frame must show to be solved
+_MIN_MARKERS = 4  # markers that it must show at least
+_DOUBTFUL_COST, _DOUBTFUL_ROTATION = 1.5, np.radians(40.0)  # a solution is doubtful at so many times its neighbour's cost, or rotation
 _FLIP, _FLIP_SECONDS = np.radians(45.0), 0.1  # rotation of a jump in one frame; longest stretch between two jumps
-_EVEN = 0.05  # metres per radian: how strongly joints without a marker between them should turn alike
-_LEANING = 0.02  # metres per radian: pull of a joint with occluded markers to its poses before and after
-_LEAST_STIFFNESS = 1e-3  # metres per radian: keeps angles that no marker determines at rest
-_NEAR = 2  # a joint is determined by its own markers and by those of so many joints below it
+_RUN_STIFFNESS = 0.05  # metres per radian: how strongly joints without a marker between them should turn alike
+_TARGET_STRENGTH = 0.02  # metres per radian: pull of a joint with occluded markers to its poses before and after
+_MIN_STIFFNESS = 1e-3  # metres per radian: keeps angles that no marker determines at rest
+_JOINTS_BELOW = 2  # a joint is determined by its own markers and by those of so many joints below it
 
 
-def missing(chain: Chain, there: np.ndarray) -> np.ndarray:
+def find_occluded_joints(chain: Chain, visible: np.ndarray) -> np.ndarray:
     """Find the joints with occluded markers that the recording shows elsewhere.
 
     These joints follow the poses before and after, not the rest pose.
@@ -45,11 +45,11 @@ def missing(chain: Chain, there: np.ndarray) -> np.ndarray:
     Returns:
         (T, J) bool.
     """
-    usual = there.any(axis=0)
-    out = np.zeros((len(there), len(chain.skeleton)), dtype=bool)
+    ever_visible = visible.any(axis=0)
+    out = np.zeros((len(visible), len(chain.skeleton)), dtype=bool)
     for marker, joint in enumerate(chain.joint):
-        hidden = usual[marker] & ~there[:, marker]
-        for _ in range(_NEAR + 1):
+        hidden = ever_visible[marker] & ~visible[:, marker]
+        for _ in range(_JOINTS_BELOW + 1):
             if joint <= 0:
                 break
             out[:, joint] |= hidden
@@ -57,7 +57,7 @@ def missing(chain: Chain, there: np.ndarray) -> np.ndarray:
     return out
 
 
-def between(chain: Chain, solved: Poses, known: np.ndarray, told: np.ndarray,
+def interpolate_poses(chain: Chain, solved: Poses, known: np.ndarray, determined: np.ndarray,
             frames: np.ndarray) -> tuple[Poses, np.ndarray]:
     """Interpolate poses between solved frames, each joint between the frames that determine it.
 
@@ -72,18 +72,18 @@ def between(chain: Chain, solved: Poses, known: np.ndarray, told: np.ndarray,
     Returns:
         N poses, and (J,) bool, joints that any frame determines.
     """
-    places, (before, after, part) = solved.root[:, known].T, _around(known, frames)
-    root = places[before] + part[:, None] * (places[after] - places[before])
+    places, (before, after, share) = solved.root[:, known].T, _find_neighbours(known, frames)
+    root = places[before] + share[:, None] * (places[after] - places[before])
     local = np.empty((len(frames), len(chain.skeleton), 4))
-    some = told.any(axis=0)
+    is_determined = determined.any(axis=0)
     for joint in range(len(chain.skeleton)):
-        use = known[told[:, joint]] if some[joint] else known
-        turns, (before, after, part) = solved.local[joint][:, use].T, _around(use, frames)
-        local[:, joint] = quaternion.slerp(turns[before], turns[after], part)
-    return poses(chain, root, local), some
+        use = known[determined[:, joint]] if is_determined[joint] else known
+        rotations, (before, after, share) = solved.local[joint][:, use].T, _find_neighbours(use, frames)
+        local[:, joint] = quaternion.slerp(rotations[before], rotations[after], share)
+    return build_poses(chain, root, local), is_determined
 
 
-def _around(known: np.ndarray, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _find_neighbours(known: np.ndarray, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Find the known frames before and after each frame (indices), and its relative position between them (0 to 1)."""
     after = np.clip(np.searchsorted(known, frames), min(1, len(known) - 1), len(known) - 1)
     before = np.maximum(after - 1, 0)
@@ -130,7 +130,7 @@ class PoseSettings:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Solved:
+class PoseSolution:
     """The solved poses of T frames, for the model's M markers and J joints.
 
     Attributes:
@@ -154,7 +154,7 @@ class Solved:
     notes: tuple[str, ...] = ()
 
 
-def solve(model, trial, settings: PoseSettings = PoseSettings(), progress=None, cancelled=None) -> Solved:
+def solve_poses(model, trial, settings: PoseSettings = PoseSettings(), progress=None, cancelled=None) -> PoseSolution:
     """Solve the model's poses for a trial's markers.
 
     Args:
@@ -170,85 +170,85 @@ def solve(model, trial, settings: PoseSettings = PoseSettings(), progress=None, 
         Cancelled: if the user stops the job.
     """
     began = time.perf_counter()
-    seen = _positions(model, trial)
-    solving = _Solving(_chain(model, settings.limits), seen, settings, fps=trial.fps, usual=model.edge_sigma,
+    seen = _collect_positions(model, trial)
+    solver = _PoseSolver(_build_chain(model, settings.limits), seen, settings, fps=trial.fps, usual=model.edge_sigma,
                        progress=progress, cancelled=cancelled)
-    solving.run()
-    return solving.result(time.perf_counter() - began)
+    solver.solve_frames()
+    return solver.build_solution(time.perf_counter() - began)
 
 
-def _chain(model, limited: bool) -> Chain:
+def _build_chain(model, has_limits: bool) -> Chain:
     """Build the chain of a model, with or without joint limits."""
     freedom = model.freedom
-    made = chain(model.skeleton, model.joint, model.places, order=freedom.order, free=freedom.free, low=freedom.low,
+    limited_chain = build_chain(model.skeleton, model.joint, model.places, order=freedom.order, free=freedom.free, low=freedom.low,
                  high=freedom.high, stiffness=model.stiffness)
-    return made if limited else made.without_limits()
+    return limited_chain if has_limits else limited_chain.without_limits()
 
 
-def _positions(model, trial) -> np.ndarray:
+def _collect_positions(model, trial) -> np.ndarray:
     """Return the model's markers as recorded, (T, M, 3) metres; raise InputError if there are fewer than four."""
-    out = seen_markers(model, trial)
+    out = collect_markers(model, trial)
     seen = int(np.isfinite(out).any(axis=(0, 2)).sum())
-    if seen < _FEWEST:
-        raise InputError(trial.name, f"{seen} of the model's {len(model.markers)} markers", f"at least {_FEWEST}",
+    if seen < _MIN_MARKERS:
+        raise InputError(trial.name, f"{seen} of the model's {len(model.markers)} markers", f"at least {_MIN_MARKERS}",
                          "choose the model or marker set of this recording")
     return out
 
 
-class _Solving:
+class _PoseSolver:
     """One run of the solver: the arrays (frames last) and the solutions so far."""
 
     def __init__(self, chain, seen, settings, fps, usual, progress, cancelled):
         self.chain, self.settings, self.fps = chain, settings, fps
         self.positions = seen
-        self.there = np.isfinite(seen).all(axis=-1)
-        self.weights = self.there.astype(float)
+        self.visible = np.isfinite(seen).all(axis=-1)
+        self.weights = self.visible.astype(float)
         if settings.weights:
-            self.weights = marker_weights(chain.joint, chain.places, seen, usual)
-        self.seen = np.ascontiguousarray(np.where(self.there[..., None], seen, 0.0).transpose(1, 2, 0))
+            self.weights = compute_marker_weights(chain.joint, chain.places, seen, usual)
+        self.seen = np.ascontiguousarray(np.where(self.visible[..., None], seen, 0.0).transpose(1, 2, 0))
         self.progress, self.cancelled = progress or (lambda part, text: None), cancelled or (lambda: False)
         count = len(chain.skeleton)
         self.poses = Poses(np.zeros((3, len(seen))), np.zeros((count, 4, len(seen))), np.zeros((count, 3, len(seen))))
         self.poses.local[:, 0] = 1.0
         self.cost, self.steps = np.full(len(seen), np.inf), np.zeros(len(seen), dtype=int)
         self.held = np.zeros((count, len(seen)), dtype=bool)
-        self.drawn = np.maximum(chain.stiffness, _LEAST_STIFFNESS)
-        self.drawn[0] = 0.0
-        self.missing = missing(chain, self.there)
+        self.stiffness = np.maximum(chain.stiffness, _MIN_STIFFNESS)
+        self.stiffness[0] = 0.0
+        self.occluded = find_occluded_joints(chain, self.visible)
         self.notes: list[str] = []
-        self.work_done, self.work = 0, 1
-        self.alone = 0.5 if settings.smoothness > 0.0 else 1.0  # share of the progress before all frames are smoothed
+        self.work_done, self.total_work = 0, 1
+        self.frame_share = 0.5 if settings.smoothness > 0.0 else 1.0  # share of the progress before all frames are smoothed
 
-    def run(self) -> None:
+    def solve_frames(self) -> None:
         """Solve the frames that show enough markers, and interpolate the others."""
-        ever = self.there.any(axis=0).sum()
-        known = np.flatnonzero(self.there.sum(axis=1) >= max(_FEWEST, int(np.ceil(_ENOUGH * ever))))
+        marker_count = self.visible.any(axis=0).sum()
+        known = np.flatnonzero(self.visible.sum(axis=1) >= max(_MIN_MARKERS, int(np.ceil(_MIN_MARKER_SHARE * marker_count))))
         if not len(known):
-            raise InputError("trial", "no frame shows enough markers", f"{_ENOUGH:.0%} of {ever}", "clean it first")
+            raise InputError("trial", "no frame shows enough markers", f"{_MIN_MARKER_SHARE:.0%} of {marker_count}", "clean it first")
         # frames solved first: every sixtieth of a second, and the last one
         spacing = max(1, int(round(self.fps * _COARSE_SECONDS)))
         coarse = np.unique(np.append(known[::spacing], known[-1]))
-        self.work = len(known)
-        start = first_poses(self.chain, self.seen[..., coarse], self.weights[coarse].T)
-        for part in self._chunks(coarse):
-            self._keep(coarse[part], descend(self._task(coarse[part]), start.frames(part)))
+        self.total_work = len(known)
+        start = estimate_initial_poses(self.chain, self.seen[..., coarse], self.weights[coarse].T)
+        for part in self._iter_chunks(coarse):
+            self._store_result(coarse[part], descend(self._build_task(coarse[part]), start.select_frames(part)))
         # retry doubtful frames from the neighbour before, then from the neighbour after
         for source, frames in ((coarse[:-1], coarse[1:]), (coarse[1:], coarse[:-1])):
-            doubtful = self._doubtful(frames, source)
-            self._better_from(source[doubtful], frames[doubtful])
-        unsure = np.flatnonzero(self.missing[coarse].any(axis=1))
-        if len(unsure):
-            self._solve_between(coarse[unsure], coarse)
+            doubtful = self._find_doubtful(frames, source)
+            self._retry_from(source[doubtful], frames[doubtful])
+        occluded_frames = np.flatnonzero(self.occluded[coarse].any(axis=1))
+        if len(occluded_frames):
+            self._solve_between(coarse[occluded_frames], coarse)
         # then all frames between, from both solved neighbours
         others = np.setdiff1d(known, coarse)
         if len(others):
             self._solve_between(others, coarse)
-        self._unflip(known)
-        self._fill(known)
+        self._resolve_flips(known)
+        self._fill_blind_frames(known)
         if self.settings.smoothness > 0.0:
-            self._smooth()
+            self._smooth_all()
 
-    def _unflip(self, known: np.ndarray) -> None:
+    def _resolve_flips(self, known: np.ndarray) -> None:
         """Solve short stretches again that jump away and back, from the frames around them.
 
         A straight elbow, for example, can be rotated in two ways. The new solution is kept if it costs about as little.
@@ -265,102 +265,102 @@ class _Solving:
             return
         frames, around = known[suspect], known[~suspect]
         every = np.ones((len(around), len(self.chain.skeleton)), dtype=bool)
-        start = between(self.chain, self.poses, around, every, frames)[0]
-        leaning = np.full((len(self.chain.skeleton), len(frames)), _LEANING)
-        leaning[0] = 0.0
-        for part in self._chunks(frames):
+        start = interpolate_poses(self.chain, self.poses, around, every, frames)[0]
+        strength = np.full((len(self.chain.skeleton), len(frames)), _TARGET_STRENGTH)
+        strength[0] = 0.0
+        for part in self._iter_chunks(frames):
             here = frames[part]
-            task = self._task(here, start.frames(part), leaning[:, part])
-            self._accept(here, descend(task, start.frames(part)), 1.5, 1e-5)
+            task = self._build_task(here, start.select_frames(part), strength[:, part])
+            self._accept_better(here, descend(task, start.select_frames(part)), 1.5, 1e-5)
 
-    def _smooth(self) -> None:
+    def _smooth_all(self) -> None:
         """Smooth all frames together."""
         def watch(part):
             if self.cancelled():
-                raise Cancelled("reconstruction cancelled")
-            self.progress(self.alone + (1.0 - self.alone) * part, "smoothing poses")
+                raise UserCancelledError("reconstruction cancelled")
+            self.progress(self.frame_share + (1.0 - self.frame_share) * part, "smoothing poses")
 
         everything = np.arange(len(self.cost))
-        at, self.held = smooth(self._task(everything), self.poses, self.settings.smoothness, self.fps, watch)
-        self.poses.put(everything, at)
+        at, self.held = smooth_poses(self._build_task(everything), self.poses, self.settings.smoothness, self.fps, watch)
+        self.poses.overwrite_frames(everything, at)
 
     def _solve_between(self, frames: np.ndarray, known: np.ndarray) -> None:
         """Solve frames from interpolated neighbours; joints with occluded markers are pulled to the interpolation."""
-        start, some = between(self.chain, self.poses, known, ~self.missing[known], frames)
-        leaning = np.where(self.missing[frames].T & some[:, None], _LEANING, 0.0)
-        for part in self._chunks(frames):
+        start, is_determined = interpolate_poses(self.chain, self.poses, known, ~self.occluded[known], frames)
+        strength = np.where(self.occluded[frames].T & is_determined[:, None], _TARGET_STRENGTH, 0.0)
+        for part in self._iter_chunks(frames):
             here = frames[part]
-            lean = start.frames(part) if leaning[:, part].any() else None
-            self._keep(here, descend(self._task(here, lean, leaning[:, part]), start.frames(part)))
+            target = start.select_frames(part) if strength[:, part].any() else None
+            self._store_result(here, descend(self._build_task(here, target, strength[:, part]), start.select_frames(part)))
 
-    def _task(self, frames: np.ndarray, lean: Poses | None = None, leaning: np.ndarray | None = None) -> Task:
+    def _build_task(self, frames: np.ndarray, target: Poses | None = None, strength: np.ndarray | None = None) -> PoseTask:
         """Build the task of these frames."""
         point, ball = None, self.settings.ball
         if ball is not None:
-            there = np.isfinite(ball.seen).all(axis=-1) & ball.held
+            visible = np.isfinite(ball.seen).all(axis=-1) & ball.held
             point = HeldPoint(joint=self.chain.skeleton.index(ball.joint), place=np.asarray(ball.centre, dtype=float),
-                              radius=ball.radius, seen=np.where(there[:, None], ball.seen, 0.0)[frames].T,
-                              weight=ball.weight * there[frames])
-        return Task(chain=self.chain, seen=self.seen[..., frames], weights=self.weights[frames].T, drawn=self.drawn,
-                    lean=lean, leaning=leaning, point=point, even=_EVEN)
+                              radius=ball.radius, seen=np.where(visible[:, None], ball.seen, 0.0)[frames].T,
+                              weight=ball.weight * visible[frames])
+        return PoseTask(chain=self.chain, seen=self.seen[..., frames], weights=self.weights[frames].T, stiffness=self.stiffness,
+                    target_poses=target, target_strength=strength, point=point, run_stiffness=_RUN_STIFFNESS)
 
-    def _chunks(self, frames: np.ndarray):
+    def _iter_chunks(self, frames: np.ndarray):
         """Iterate over slices of a list of frames; report progress and check for cancellation between them."""
         for first in range(0, len(frames), _CHUNK):
             if self.cancelled():
-                raise Cancelled("reconstruction cancelled")
-            self.progress(self.alone * min(self.work_done / self.work, 1.0), "solving poses")
+                raise UserCancelledError("reconstruction cancelled")
+            self.progress(self.frame_share * min(self.work_done / self.total_work, 1.0), "solving poses")
             yield slice(first, first + _CHUNK)
             self.work_done += min(_CHUNK, len(frames) - first)
 
-    def _keep(self, frames: np.ndarray, arrived) -> None:
-        self.poses.put(frames, arrived.poses)
-        self.cost[frames], self.steps[frames] = arrived.cost, arrived.steps
-        self.held[:, frames] = arrived.held
+    def _store_result(self, frames: np.ndarray, result) -> None:
+        self.poses.overwrite_frames(frames, result.poses)
+        self.cost[frames], self.steps[frames] = result.cost, result.steps
+        self.held[:, frames] = result.held
 
-    def _doubtful(self, frames: np.ndarray, source: np.ndarray) -> np.ndarray:
+    def _find_doubtful(self, frames: np.ndarray, source: np.ndarray) -> np.ndarray:
         """Find frames that may have reached another local minimum than their neighbours: higher cost, or large
         rotations.
         """
-        turned = np.abs(np.einsum("jaf,jaf->jf", self.poses.local[..., frames], self.poses.local[..., source]))
-        dear = self.cost[frames] > _DEAR * self.cost[source] + 1e-6
-        return np.flatnonzero(dear | np.any(turned < np.cos(0.5 * _FAR), axis=0))
+        cosine = np.abs(np.einsum("jaf,jaf->jf", self.poses.local[..., frames], self.poses.local[..., source]))
+        is_costly = self.cost[frames] > _DOUBTFUL_COST * self.cost[source] + 1e-6
+        return np.flatnonzero(is_costly | np.any(cosine < np.cos(0.5 * _DOUBTFUL_ROTATION), axis=0))
 
-    def _better_from(self, source: np.ndarray, frames: np.ndarray) -> None:
+    def _retry_from(self, source: np.ndarray, frames: np.ndarray) -> None:
         """Solve frames again from other frames' solutions, and keep those that cost clearly less."""
-        for part in self._chunks(frames):
-            arrived = descend(self._task(frames[part]), self.poses.frames(source[part]))
-            self._accept(frames[part], arrived, 0.999, -1e-9)
+        for part in self._iter_chunks(frames):
+            result = descend(self._build_task(frames[part]), self.poses.select_frames(source[part]))
+            self._accept_better(frames[part], result, 0.999, -1e-9)
 
-    def _accept(self, frames: np.ndarray, arrived, share: float, more: float) -> None:
+    def _accept_better(self, frames: np.ndarray, result, share: float, margin: float) -> None:
         """Store solutions that cost less than this share of the present cost, plus `margin`."""
-        better = arrived.cost < share * self.cost[frames] + more
+        better = result.cost < share * self.cost[frames] + margin
         if better.any():
             chosen = frames[better]
-            self.poses.put(chosen, arrived.poses.frames(better))
-            self.cost[chosen], self.held[:, chosen] = arrived.cost[better], arrived.held[:, better]
-        self.steps[frames] += arrived.steps
+            self.poses.overwrite_frames(chosen, result.poses.select_frames(better))
+            self.cost[chosen], self.held[:, chosen] = result.cost[better], result.held[:, better]
+        self.steps[frames] += result.steps
 
-    def _fill(self, known: np.ndarray) -> None:
+    def _fill_blind_frames(self, known: np.ndarray) -> None:
         """Interpolate the frames with too few markers."""
         blind = np.setdiff1d(np.arange(len(self.cost)), known)
         if len(blind):
-            told = np.ones((len(known), len(self.chain.skeleton)), dtype=bool)
-            self.poses.put(blind, between(self.chain, self.poses, known, told, blind)[0])
+            determined = np.ones((len(known), len(self.chain.skeleton)), dtype=bool)
+            self.poses.overwrite_frames(blind, interpolate_poses(self.chain, self.poses, known, determined, blind)[0])
             self.notes.append(f"{len(blind)} of {len(self.cost)} frames show too few markers and are interpolated")
 
-    def result(self, seconds: float) -> Solved:
+    def build_solution(self, seconds: float) -> PoseSolution:
         """Return the solution of all frames."""
         motion = Motion(self.chain.skeleton, self.poses.root.T, np.moveaxis(self.poses.local, -1, 0), self.fps)
-        put = place(self.chain, self.poses)
-        away = (put.markers + put.origin).transpose(2, 0, 1) - self.positions
+        world_poses = compute_world_poses(self.chain, self.poses)
+        away = (world_poses.markers + world_poses.origin).transpose(2, 0, 1) - self.positions
         residual = np.sqrt(np.sum(away**2, axis=-1))
-        return Solved(motion=motion, residual=residual, weights=self.weights,
-                      single=single_residual(self.chain, self.positions), iterations=self.steps,
+        return PoseSolution(motion=motion, residual=residual, weights=self.weights,
+                      single=measure_single_residuals(self.chain, self.positions), iterations=self.steps,
                       at_limit=self.held.T.copy(), seconds=seconds, notes=tuple(self.notes))
 
 
-def single_residual(chain: Chain, seen: np.ndarray) -> np.ndarray:
+def measure_single_residuals(chain: Chain, seen: np.ndarray) -> np.ndarray:
     """Measure residuals when every segment is fitted to its own markers alone (section 3.4.2).
 
     Args:
@@ -374,7 +374,7 @@ def single_residual(chain: Chain, seen: np.ndarray) -> np.ndarray:
         own = np.flatnonzero(chain.joint == joint)
         enough = np.isfinite(seen[:, own]).all(axis=-1).sum(axis=1) > 2
         if enough.any():
-            fit = rigid_fit(chain.places[own], seen[np.ix_(enough, own)])
+            fit = fit_rigid(chain.places[own], seen[np.ix_(enough, own)])
             away = carried(fit, chain.places[own]) - seen[np.ix_(enough, own)]
             out[np.ix_(enough, own)] = np.sqrt(np.sum(away**2, axis=-1))
     return out

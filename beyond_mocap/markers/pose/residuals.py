@@ -19,10 +19,10 @@ AT_ZERO = (0.01, 0.09)
 a higher one needs thicker soles than boots and skates have."""
 _FEET = ("Foot", "ToeBase")
 
-_SHORTEST = 5e-3  # metres; shorter edges between markers say nothing about the shape
+_MIN_EDGE = 5e-3  # metres; shorter edges between markers say nothing about the shape
 
 
-def model_markers(model: MarkerModel, motion: Motion) -> np.ndarray:
+def compute_model_markers(model: MarkerModel, motion: Motion) -> np.ndarray:
     """Compute the places of the model's markers on its moving skeleton.
 
     Args:
@@ -35,7 +35,7 @@ def model_markers(model: MarkerModel, motion: Motion) -> np.ndarray:
     return places[:, model.joint] + quaternion.rotate(world[:, model.joint], model.places)
 
 
-def seen_markers(model: MarkerModel, trial: MarkerTrial) -> np.ndarray:
+def collect_markers(model: MarkerModel, trial: MarkerTrial) -> np.ndarray:
     """Collect the model's markers from a trial.
 
     Args:
@@ -45,12 +45,12 @@ def seen_markers(model: MarkerModel, trial: MarkerTrial) -> np.ndarray:
         (T, M, 3) metres, NaN where a marker is not visible or not in the trial.
     """
     out = np.full((len(trial), len(model.markers), 3), np.nan)
-    there = [i for i, label in enumerate(model.markers) if label in trial.labels]
-    out[:, there] = trial.positions[:, [trial.index(model.markers[i]) for i in there]]
+    known = [i for i, label in enumerate(model.markers) if label in trial.labels]
+    out[:, known] = trial.positions[:, [trial.index_of(model.markers[i]) for i in known]]
     return out
 
 
-def residuals(model: MarkerModel, motion: Motion, trial: MarkerTrial) -> np.ndarray:
+def measure_residuals(model: MarkerModel, motion: Motion, trial: MarkerTrial) -> np.ndarray:
     """Measure the distances between the model's markers and those of a trial.
 
     Args:
@@ -60,10 +60,10 @@ def residuals(model: MarkerModel, motion: Motion, trial: MarkerTrial) -> np.ndar
     Returns:
         (T, M) metres, NaN where not visible.
     """
-    return np.linalg.norm(model_markers(model, motion) - seen_markers(model, trial), axis=-1)
+    return np.linalg.norm(compute_model_markers(model, motion) - collect_markers(model, trial), axis=-1)
 
 
-def floor_under(model: MarkerModel, trial: MarkerTrial) -> float:
+def measure_floor(model: MarkerModel, trial: MarkerTrial) -> float:
     """Measure the height of the floor under the feet, the lowest where it is uneven.
 
     Args:
@@ -74,7 +74,7 @@ def floor_under(model: MarkerModel, trial: MarkerTrial) -> float:
     """
     names = model.skeleton.names
     feet = [i for i, joint in enumerate(model.joint) if names[joint].endswith(_FEET)]
-    heights = seen_markers(model, trial)[:, feet, 2]
+    heights = collect_markers(model, trial)[:, feet, 2]
     heights = heights[np.isfinite(heights).any(axis=1)]
     if not heights.size:
         return 0.0
@@ -82,7 +82,7 @@ def floor_under(model: MarkerModel, trial: MarkerTrial) -> float:
     return 0.0 if AT_ZERO[0] <= lowest <= AT_ZERO[1] else lowest - OVER_SOLE
 
 
-def edge_deviation(joint: np.ndarray, places: np.ndarray, seen: np.ndarray) -> np.ndarray:
+def measure_edge_deviation(joint: np.ndarray, places: np.ndarray, seen: np.ndarray) -> np.ndarray:
     """Measure how far the edges between a marker and the others of its cluster deviate from the model (sigma_i).
 
     Args:
@@ -98,24 +98,24 @@ def edge_deviation(joint: np.ndarray, places: np.ndarray, seen: np.ndarray) -> n
     for cluster in np.unique(joint):
         own = np.flatnonzero(joint == cluster)
         if len(own) > 2:
-            out[:, own] = _of_cluster(places[own], seen[:, own])
+            out[:, own] = _measure_cluster(places[own], seen[:, own])
     return out
 
 
-def _of_cluster(places: np.ndarray, seen: np.ndarray) -> np.ndarray:
+def _measure_cluster(places: np.ndarray, seen: np.ndarray) -> np.ndarray:
     """Measure the edge deviation (T, N) of one cluster of N markers."""
     length = np.linalg.norm(places[:, None] - places, axis=-1)
-    between = np.sqrt(np.sum((seen[:, :, None] - seen[:, None]) ** 2, axis=-1))
+    distance = np.sqrt(np.sum((seen[:, :, None] - seen[:, None]) ** 2, axis=-1))
     with np.errstate(invalid="ignore", divide="ignore"):
-        square = (between / length - 1.0) ** 2
-    known = np.isfinite(square) & (length > _SHORTEST)
+        square = (distance / length - 1.0) ** 2
+    known = np.isfinite(square) & (length > _MIN_EDGE)
     edges = known.sum(axis=-1)
     # n - 1 of eq. 5.3 is the number of a marker's edges; here only visible ones count
     mean = np.where(known, square, 0.0).sum(axis=-1) / np.maximum(edges, 1)
     return np.where(edges >= 2, np.sqrt(mean), np.nan)
 
 
-def cluster_deviation(joint: np.ndarray, deviation: np.ndarray) -> np.ndarray:
+def compute_cluster_deviation(joint: np.ndarray, deviation: np.ndarray) -> np.ndarray:
     """Compute for every marker the deviation of its whole cluster over all frames (sigma_s).
 
     The sum runs over the cluster's markers and is divided by the frames, as printed: with n markers in a cluster, a
@@ -138,7 +138,7 @@ def cluster_deviation(joint: np.ndarray, deviation: np.ndarray) -> np.ndarray:
     return out
 
 
-def marker_weights(joint: np.ndarray, places: np.ndarray, seen: np.ndarray,
+def compute_marker_weights(joint: np.ndarray, places: np.ndarray, seen: np.ndarray,
                    usual: np.ndarray | None = None) -> np.ndarray:
     """Compute the weight of every marker in every frame (w_i): min(1, sigma_s / sigma_i).
 
@@ -154,8 +154,8 @@ def marker_weights(joint: np.ndarray, places: np.ndarray, seen: np.ndarray,
         (T, M); 0 where not visible, 1 where sigma_i is unknown.
     Source: Fredriksson section 5.3.2, equations (5.1) and (5.2).
     """
-    deviation = edge_deviation(joint, places, seen)
-    own = cluster_deviation(joint, deviation)
+    deviation = measure_edge_deviation(joint, places, seen)
+    own = compute_cluster_deviation(joint, deviation)
     if usual is not None:
         own = np.where(np.isfinite(usual), usual, own)
     with np.errstate(invalid="ignore", divide="ignore"):

@@ -10,13 +10,13 @@ from __future__ import annotations
 import numpy as np
 
 from ...motion import quaternion
-from .chain import CONJUGATE, Chain, Poses, angles_of, matrices, multiply, within
+from .chain import CONJUGATE, Chain, Poses, read_angles, to_matrices, multiply, limit_angles
 
-_BEYOND = 0.01  # weight of the next joint's markers relative to a joint's own; again this factor for each joint below
-_FAITH = 4e-4  # m2, weight of the parent's direction, for angles that markers do not determine
+_BELOW_FACTOR = 0.01  # weight of the next joint's markers relative to a joint's own; again this factor for each joint below
+_PARENT_WEIGHT = 4e-4  # m2, weight of the parent's direction, for angles that markers do not determine
 
 
-def first_poses(chain: Chain, seen: np.ndarray, weights: np.ndarray, guess: Poses | None = None) -> Poses:
+def estimate_initial_poses(chain: Chain, seen: np.ndarray, weights: np.ndarray, guess: Poses | None = None) -> Poses:
     """Estimate poses of frames, each from its own markers.
 
     Args:
@@ -28,34 +28,34 @@ def first_poses(chain: Chain, seen: np.ndarray, weights: np.ndarray, guess: Pose
         F poses.
     """
     skeleton, frames = chain.skeleton, weights.shape[-1]
-    rest, distance = _rest(chain)
+    rest, distance = _place_at_rest(chain)
     local = np.zeros((len(skeleton), 4, frames))
     local[:, 0] = 1.0
-    lean = local.copy() if guess is None else guess.local
+    default_rotations = local.copy() if guess is None else guess.local
     angles = np.zeros((len(skeleton), 3, frames))
     # markers have less weight the more joints they lie below
-    share = weights * _BEYOND ** distance[0][:, None]
-    world = [_whole(rest, seen, share)]
-    middle = _mean(rest, share), _mean(seen, share)
-    root = middle[1] - np.einsum("abf,bf->af", matrices(world[0]), middle[0])
+    share = weights * _BELOW_FACTOR ** distance[0][:, None]
+    world = [_fit_whole_body(rest, seen, share)]
+    centres = _compute_mean(rest, share), _compute_mean(seen, share)
+    root = centres[1] - np.einsum("abf,bf->af", to_matrices(world[0]), centres[0])
     local[0], joints = world[0], [root]
     for joint in range(1, len(skeleton)):
         parent = skeleton.parents[joint]
-        joints.append(joints[parent] + np.einsum("abf,b->af", matrices(world[parent]), skeleton.offsets[joint]))
-        before = multiply(world[parent], lean[joint])
+        joints.append(joints[parent] + np.einsum("abf,b->af", to_matrices(world[parent]), skeleton.offsets[joint]))
+        before = multiply(world[parent], default_rotations[joint])
         near = np.flatnonzero(np.isfinite(distance[joint]))
-        share = weights[near] * _BEYOND ** distance[joint][near][:, None]
+        share = weights[near] * _BELOW_FACTOR ** distance[joint][near][:, None]
         arms = rest[near] - chain.skeleton.rest_positions[joint]
-        world.append(_about(arms, seen[near] - joints[joint], share, before))
+        world.append(_fit_joint(arms, seen[near] - joints[joint], share, before))
         local[joint] = multiply(world[parent] * CONJUGATE, world[joint])
-        if not chain.turning[joint]:
-            angles[joint] = within(chain, joint, angles_of(chain, joint, local[joint]))
+        if not chain.is_fully_free[joint]:
+            angles[joint] = limit_angles(chain, joint, read_angles(chain, joint, local[joint]))
             local[joint] = quaternion.from_euler(angles[joint].T, chain.order[joint]).T
             world[joint] = multiply(world[parent], local[joint])
     return Poses(root, local, angles)
 
 
-def _rest(chain: Chain) -> tuple[np.ndarray, np.ndarray]:
+def _place_at_rest(chain: Chain) -> tuple[np.ndarray, np.ndarray]:
     """Return the markers in the rest pose (M, 3) metres, and how many joints (J, M) they lie below each joint, else
     inf.
     """
@@ -68,26 +68,26 @@ def _rest(chain: Chain) -> tuple[np.ndarray, np.ndarray]:
     return chain.skeleton.rest_positions[chain.joint] + chain.places, distance
 
 
-def _mean(points: np.ndarray, share: np.ndarray) -> np.ndarray:
+def _compute_mean(points: np.ndarray, share: np.ndarray) -> np.ndarray:
     """Compute the weighted mean (3, F) of points (M, 3) or (M, 3, F) by shares (M, F)."""
     points = points[..., None] if points.ndim == 2 else points
     return (share[:, None] * points).sum(axis=0) / np.maximum(share.sum(axis=0), 1e-12)
 
 
-def _whole(rest: np.ndarray, seen: np.ndarray, share: np.ndarray) -> np.ndarray:
+def _fit_whole_body(rest: np.ndarray, seen: np.ndarray, share: np.ndarray) -> np.ndarray:
     """Fit the rotations (4, F) of the resting markers (M, 3) about their mean to the recorded ones (M, 3, F)."""
-    arms = rest[..., None] - _mean(rest, share)
-    return _best(np.einsum("mf,maf,mbf->abf", share, seen - _mean(seen, share), arms))
+    arms = rest[..., None] - _compute_mean(rest, share)
+    return _find_best_rotations(np.einsum("mf,maf,mbf->abf", share, seen - _compute_mean(seen, share), arms))
 
 
-def _about(arms: np.ndarray, seen: np.ndarray, share: np.ndarray, before: np.ndarray) -> np.ndarray:
+def _fit_joint(arms: np.ndarray, seen: np.ndarray, share: np.ndarray, prior: np.ndarray) -> np.ndarray:
     """Fit the rotations (4, F) about a joint of arms (N, 3) to recorded ones (N, 3, F), with a pull to `prior`
     (4, F).
     """
-    return _best(np.einsum("mf,maf,mb->abf", share, seen, arms) + _FAITH * matrices(before))
+    return _find_best_rotations(np.einsum("mf,maf,mb->abf", share, seen, arms) + _PARENT_WEIGHT * to_matrices(prior))
 
 
-def _best(profile: np.ndarray) -> np.ndarray:
+def _find_best_rotations(profile: np.ndarray) -> np.ndarray:
     """Find the rotations (4, F) with the largest sum of products with these matrices (3, 3, F).
 
     Davenport's q-method: the dominant eigenvector of a symmetric 4x4 matrix, which cannot be a reflection.

@@ -17,24 +17,24 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...ball.physics import Ball, in_air
-from ...base.time_series import interpolate
+from ...ball.physics import Ball, compute_air_acceleration
+from ...base.time_series import interpolate_columns
 
-FASTEST_SPIN = 2.0 * np.pi * 50.0  # rad/s: 3000 revolutions per minute, the maximum of pitched baseballs
-_RATES = 60  # spin rates that are tried
-_LEAST = 2  # frames of flight that must be visible
-_FIRST = 0.11  # s of flight with which release and spin are searched
-_MORE = (0.17, 0.25, 0.35)  # s of flight that are used next, as long as the ball still flies
-_FURTHER = 0.03  # metres by which a flight may deviate a moment later, before air and spin are known
-_HELD = 0.12  # s before the release in which the marker is fixed in the hand
-_HAND_SPEED = 0.2  # uncertainty of the hand's speed as the ball's, as a share of it
+MAX_SPIN = 2.0 * np.pi * 50.0  # rad/s: 3000 revolutions per minute, the maximum of pitched baseballs
+_RATE_COUNT = 60  # spin rates that are tried
+_MIN_FRAMES = 2  # frames of flight that must be visible
+_FIRST_SECONDS = 0.11  # s of flight with which release and spin are searched
+_LONGER_SECONDS = (0.17, 0.25, 0.35)  # s of flight that are used next, as long as the ball still flies
+_LATER_SIGMA = 0.03  # metres by which a flight may deviate a moment later, before air and spin are known
+_HELD_SECONDS = 0.12  # s before the release in which the marker is fixed in the hand
+_HAND_SPEED_UNCERTAINTY = 0.2  # uncertainty of the hand's speed as the ball's, as a share of it
 _NOISE = 0.0015  # metres, noise of a marker
-_FAR = 5.0  # multiples of the noise beyond which a marker has less weight
-_FINE = 0.125  # frames, the finest step of the release time
+_ROBUST_LIMIT = 5.0  # multiples of the noise beyond which a marker has less weight
+_FINE_STEP = 0.125  # frames, the finest step of the release time
 
 
 @dataclass(frozen=True, eq=False)
-class Held:
+class HeldMarker:
     """The evidence of the hand over T frames.
 
     Attributes:
@@ -81,7 +81,7 @@ class LaunchFit:
     seconds: float
 
 
-def fit_launch(marker: np.ndarray, held: Held, fps: float, guess: float, ball: Ball, radius: float,
+def fit_launch(marker: np.ndarray, held: HeldMarker, fps: float, guess: float, ball: Ball, radius: float,
                window: float = 0.12) -> LaunchFit | None:
     """Fit the launch that explains the ball's marker.
 
@@ -97,23 +97,23 @@ def fit_launch(marker: np.ndarray, held: Held, fps: float, guess: float, ball: B
         The launch; None where the marker is not visible away from the hand in at least two frames.
     Source: Fredriksson section 6.2, equations (6.2) to (6.4).
     """
-    search = _Search(marker, held, fps, ball, radius)
+    search = _LaunchSearch(marker, held, fps, ball, radius)
     first, last = max(guess - window, search.times[1]), min(guess + window, search.times[-2])
-    tried = np.arange(np.ceil(first * fps), np.floor(last * fps) + 1) / fps
-    rates = np.arange(1, _RATES + 1) * (min(FASTEST_SPIN, 0.9 * np.pi * fps) / _RATES)
-    flights = [(flight, t) for t in tried if (flight := search.flight(t, t + _FIRST, rates)) is not None]
-    if not flights or not search.leaves(last):
+    release_times = np.arange(np.ceil(first * fps), np.floor(last * fps) + 1) / fps
+    rates = np.arange(1, _RATE_COUNT + 1) * (min(MAX_SPIN, 0.9 * np.pi * fps) / _RATE_COUNT)
+    flights = [(flight, t) for t in release_times if (flight := search.fit_flight(t, t + _FIRST_SECONDS, rates)) is not None]
+    if not flights or not search.has_left_hand(last):
         return None
-    best, at = min(flights, key=lambda found: found[0].cost + search.further_on(*found))
-    best, at = search.refined(best, at, rates[1] - rates[0], _FIRST)
-    seconds = _FIRST
+    best, release_time = min(flights, key=lambda found: found[0].cost + search.compute_later_cost(*found))
+    best, release_time = search.refine_flight(best, release_time, rates[1] - rates[0], _FIRST_SECONDS)
+    seconds = _FIRST_SECONDS
     # use more of the flight as long as it brings more frames and the residual stays small
-    for longer in _MORE:
-        further, when = search.refined(best, at, 2.0 / longer, longer)
-        if further.frames == best.frames or further.residual > max(1.5 * best.residual, 2.0 * _NOISE):
+    for longer in _LONGER_SECONDS:
+        longer_fit, longer_time = search.refine_flight(best, release_time, 2.0 / longer, longer)
+        if longer_fit.frames == best.frames or longer_fit.residual > max(1.5 * best.residual, 2.0 * _NOISE):
             break
-        best, at, seconds = further, when, longer
-    return search.told(best, at, seconds)
+        best, release_time, seconds = longer_fit, longer_time, longer
+    return search.build_result(best, release_time, seconds)
 
 
 @dataclass(eq=False, kw_only=True)
@@ -141,16 +141,16 @@ class _Flight:
     frames: int
 
 
-class _Search:
+class _LaunchSearch:
     """Flights for one throw. `air` is the effect of drag and lift on the marker, once a launch is known."""
 
-    def __init__(self, marker, held: Held, fps: float, ball: Ball, radius: float):
+    def __init__(self, marker, held: HeldMarker, fps: float, ball: Ball, radius: float):
         self.marker, self.held, self.fps, self.ball, self.radius = marker, held, fps, ball, radius
         self.times = np.arange(len(marker)) / fps
         self.seen = np.isfinite(marker).all(axis=-1)
         self.air = np.zeros_like(marker)
 
-    def flight(self, t0: float, end: float, rates: np.ndarray) -> _Flight | None:
+    def fit_flight(self, t0: float, end: float, rates: np.ndarray) -> _Flight | None:
         """Solve the flight from `t0` to `end` for the best of `rates` (R,) rad/s; None without frames.
 
         For each rate a linear least-squares problem in p, v, a and b (4 x 3 unknowns), with the prior as four more
@@ -158,84 +158,84 @@ class _Search:
         """
         used = self.seen & (self.times > t0) & (self.times <= end)
         count = int(np.count_nonzero(used))
-        if count < _LEAST:
+        if count < _MIN_FRAMES:
             return None
         tau = self.times[used] - t0
-        wanted = self.marker[used] - self.air[used]
-        wanted[:, 2] += 0.5 * self.ball.gravity * tau**2
+        target = self.marker[used] - self.air[used]
+        target[:, 2] += 0.5 * self.ball.gravity * tau**2
         # columns 1, t, cos(w t) and sin(w t) of eq. 6.3 for each spin rate w
         basis = np.empty((len(rates), count, 4))
         basis[..., 0], basis[..., 1] = 1.0, tau
         basis[..., 2], basis[..., 3] = np.cos(rates[:, None] * tau), np.sin(rates[:, None] * tau)
-        known, values = self._known(t0)
-        basis, wanted = basis / _NOISE, wanted / _NOISE
-        normal = np.einsum("rni,rnj->rij", basis, basis) + np.einsum("ki,kj->ij", known, known)
-        right = np.einsum("rni,nc->ric", basis, wanted) + np.einsum("ki,kc->ic", known, values)
+        prior_rows, prior_values = self._build_prior(t0)
+        basis, target = basis / _NOISE, target / _NOISE
+        normal = np.einsum("rni,rnj->rij", basis, basis) + np.einsum("ki,kj->ij", prior_rows, prior_rows)
+        right = np.einsum("rni,nc->ric", basis, target) + np.einsum("ki,kc->ic", prior_rows, prior_values)
         solved = np.linalg.solve(normal, right)
-        miss = np.sum((np.einsum("rni,ric->rnc", basis, solved) - wanted) ** 2, axis=-1)
-        prior = np.einsum("ki,ric->rkc", known, solved) - values
-        cost = _robust(miss).sum(axis=-1) + np.sum(prior**2, axis=(-1, -2))
+        miss = np.sum((np.einsum("rni,ric->rnc", basis, solved) - target) ** 2, axis=-1)
+        prior_misses = np.einsum("ki,ric->rkc", prior_rows, solved) - prior_values
+        cost = _limit_squares(miss).sum(axis=-1) + np.sum(prior_misses**2, axis=(-1, -2))
         k = int(np.argmin(cost))
         # degrees of freedom: 3 coordinates a frame minus 12 unknowns
         excess = max(float(miss[k].sum()) / max(3 * count - 12, 1), 1.0)
         sigma = float(np.sqrt(np.linalg.inv(normal[k])[1, 1] * excess))
         residual = float(np.sqrt(miss[k].mean())) * _NOISE
         place, velocity, a, b = solved[k]
-        total = float(cost[k]) + self._held_cost(t0)
+        total = float(cost[k]) + self._compute_held_cost(t0)
         return _Flight(cost=total, velocity=velocity, place=place, circle=(a, b), rate=float(rates[k]),
                        residual=residual, speed_sigma=sigma, frames=count)
 
-    def leaves(self, last: float) -> bool:
+    def has_left_hand(self, last: float) -> bool:
         """Return whether the marker is seen away from its held place, up to a first flight after `last`."""
-        used = self.seen & (self.times <= last + _FIRST)
+        used = self.seen & (self.times <= last + _FIRST_SECONDS)
         away = np.linalg.norm(self.marker[used] - self.held.marker[used], axis=-1)
-        return np.count_nonzero(away[-_LEAST:] > 3.0 * self.held.sigma) >= _LEAST
+        return np.count_nonzero(away[-_MIN_FRAMES:] > 3.0 * self.held.sigma) >= _MIN_FRAMES
 
-    def further_on(self, flight: _Flight, t0: float) -> float:
+    def compute_later_cost(self, flight: _Flight, t0: float) -> float:
         """Compute the cost of the marker's deviation from this flight in the next stretch.
 
         A hand that hardly moves yet also looks like a flight, but does not continue as one.
         """
-        end = t0 + _FIRST
-        used = self.seen & (self.times > end) & (self.times <= end + _FIRST)
+        end = t0 + _FIRST_SECONDS
+        used = self.seen & (self.times > end) & (self.times <= end + _FIRST_SECONDS)
         tau = (self.times[used] - t0)[:, None]
-        course = flight.place + flight.velocity * tau - [0.0, 0.0, 0.5 * self.ball.gravity] * tau**2
-        away = np.sum((self.marker[used] - course) ** 2, axis=-1) / _FURTHER**2
-        return float(np.sum(_robust(away)))
+        trajectory = flight.place + flight.velocity * tau - [0.0, 0.0, 0.5 * self.ball.gravity] * tau**2
+        away = np.sum((self.marker[used] - trajectory) ** 2, axis=-1) / _LATER_SIGMA**2
+        return float(np.sum(_limit_squares(away)))
 
-    def _known(self, t0: float) -> tuple[np.ndarray, np.ndarray]:
+    def _build_prior(self, t0: float) -> tuple[np.ndarray, np.ndarray]:
         """Build the prior as four rows: where the marker leaves, the hand's speed, and the size of the circle."""
-        there, velocity = _at(self.held.marker, self.fps, t0), _at(self.held.velocity, self.fps, t0)
-        hand = max(_HAND_SPEED * float(np.linalg.norm(velocity)), 1.0)
-        sure = 1.0 / self.held.sigma
-        known = np.diag([sure, 1.0 / hand, 1.0 / self.radius, 1.0 / self.radius])
-        known[0, 2] = sure
-        return known, np.stack([there * sure, velocity / hand, np.zeros(3), np.zeros(3)])
+        place, velocity = _interpolate_at(self.held.marker, self.fps, t0), _interpolate_at(self.held.velocity, self.fps, t0)
+        speed_sigma = max(_HAND_SPEED_UNCERTAINTY * float(np.linalg.norm(velocity)), 1.0)
+        weight = 1.0 / self.held.sigma
+        known = np.diag([weight, 1.0 / speed_sigma, 1.0 / self.radius, 1.0 / self.radius])
+        known[0, 2] = weight
+        return known, np.stack([place * weight, velocity / speed_sigma, np.zeros(3), np.zeros(3)])
 
-    def _held_cost(self, t0: float) -> float:
+    def _compute_held_cost(self, t0: float) -> float:
         """Compute the cost of the marker's deviation from its held place, up to `t0`."""
-        used = self.seen & (self.times > t0 - _HELD) & (self.times <= t0)
+        used = self.seen & (self.times > t0 - _HELD_SECONDS) & (self.times <= t0)
         away = np.sum((self.marker[used] - self.held.marker[used]) ** 2, axis=-1) / (0.5 * self.held.sigma) ** 2
-        return float(np.sum(_robust(away)))
+        return float(np.sum(_limit_squares(away)))
 
-    def refined(self, flight: _Flight, t0: float, width: float, seconds: float) -> tuple[_Flight, float]:
+    def refine_flight(self, flight: _Flight, t0: float, width: float, seconds: float) -> tuple[_Flight, float]:
         """Refine a flight with `seconds` of samples: spin rate, release time and the effect of air.
 
         Returns the flight and its release time.
         """
         end = t0 + seconds
-        for turn in range(4):
-            self.air = _air(self.times, t0, flight.velocity, self._turning(flight, t0)[0], self.ball)
+        for iteration in range(4):
+            self.air = _simulate_air(self.times, t0, flight.velocity, self._compute_spin(flight, t0)[0], self.ball)
             rates = np.maximum(flight.rate + np.linspace(-width, width, 21), 1e-3)
-            flight = self.flight(t0, end, rates) or flight
+            flight = self.fit_flight(t0, end, rates) or flight
             width = max(width / 5.0, 0.05)
             # release times are refined in ever smaller steps around the best
-            step = (1.0, 0.5, 0.25, _FINE)[turn] / self.fps
-            tried = [(self.flight(t, end, np.array([flight.rate])), t) for t in t0 + step * np.arange(-3, 4)]
-            flight, t0 = min(((f, t) for f, t in [*tried, (flight, t0)] if f is not None), key=lambda ft: ft[0].cost)
+            step = (1.0, 0.5, 0.25, _FINE_STEP)[iteration] / self.fps
+            candidates = [(self.fit_flight(t, end, np.array([flight.rate])), t) for t in t0 + step * np.arange(-3, 4)]
+            flight, t0 = min(((f, t) for f, t in [*candidates, (flight, t0)] if f is not None), key=lambda ft: ft[0].cost)
         return flight, t0
 
-    def _turning(self, flight: _Flight, t0: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _compute_spin(self, flight: _Flight, t0: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Compute spin (3,) rad/s, offset (3,) metres of the marker from the centre, and the centre (3,) metres at the
         release.
 
@@ -243,40 +243,40 @@ class _Search:
         centre nearer to where the hand has it.
         """
         a, b = flight.circle
-        there, usual, radius = flight.place + a, _at(self.held.centre, self.fps, t0), self.radius
+        marker, held_centre, radius = flight.place + a, _interpolate_at(self.held.centre, self.fps, t0), self.radius
         axis = np.cross(a, b)
         size = float(np.linalg.norm(axis))
         if size < (0.2 * radius) ** 2 or flight.frames < 5:
-            toward = there - usual
-            offset = toward * (radius / max(float(np.linalg.norm(toward)), 1e-9))
-            return np.zeros(3), offset, there - offset
+            direction = marker - held_centre
+            offset = direction * (radius / max(float(np.linalg.norm(direction)), 1e-9))
+            return np.zeros(3), offset, marker - offset
         axis = axis / size
         along = np.sqrt(max(radius**2 - float(a @ a), 0.0)) * axis
-        offset = min((a + along, a - along), key=lambda o: float(np.linalg.norm(there - o - usual)))
-        return axis * flight.rate, offset, there - offset
+        offset = min((a + along, a - along), key=lambda o: float(np.linalg.norm(marker - o - held_centre)))
+        return axis * flight.rate, offset, marker - offset
 
-    def told(self, flight: _Flight, t0: float, seconds: float) -> LaunchFit:
+    def build_result(self, flight: _Flight, t0: float, seconds: float) -> LaunchFit:
         """Build the final launch; the uncertainty of its time is the shift at which the cost grows by one."""
         rate, end = np.array([flight.rate]), t0 + seconds
         sides = []
         for sign in (-1.0, 1.0):
-            shifts = sign * np.arange(1, 41) * _FINE / self.fps
-            worse = [f is None or f.cost > flight.cost + 1.0 for f in (self.flight(t0 + s, end, rate) for s in shifts)]
+            shifts = sign * np.arange(1, 41) * _FINE_STEP / self.fps
+            worse = [f is None or f.cost > flight.cost + 1.0 for f in (self.fit_flight(t0 + s, end, rate) for s in shifts)]
             sides.append(abs(shifts[worse.index(True)]) if True in worse else abs(shifts[-1]))
-        spin, offset, centre = self._turning(flight, t0)
+        spin, offset, centre = self._compute_spin(flight, t0)
         sigma = float(np.hypot(np.mean(sides), 0.2 / self.fps))
         return LaunchFit(time=float(t0), position=centre, velocity=flight.velocity, spin=spin, offset=offset,
                          circle=float(np.linalg.norm(flight.circle[0])), residual=flight.residual, time_sigma=sigma,
                          speed_sigma=flight.speed_sigma, frames=flight.frames, seconds=seconds)  # fmt: skip
 
 
-def _robust(squares: np.ndarray) -> np.ndarray:
+def _limit_squares(squares: np.ndarray) -> np.ndarray:
     """Reduce the weight of large squared misses (in units of noise)."""
-    limit = _FAR**2
+    limit = _ROBUST_LIMIT**2
     return np.where(squares < limit, squares, limit * (1.0 + np.log(np.maximum(squares, limit) / limit)))
 
 
-def _at(values: np.ndarray, fps: float, t: float) -> np.ndarray:
+def _interpolate_at(values: np.ndarray, fps: float, t: float) -> np.ndarray:
     """Interpolate values (T, 3) at one time, by the parabola through the three nearest frames."""
     k = int(np.clip(round(t * fps), 1, len(values) - 2))
     x = t * fps - k
@@ -284,17 +284,17 @@ def _at(values: np.ndarray, fps: float, t: float) -> np.ndarray:
     return mid + 0.5 * x * (high - low) + 0.5 * x * x * (high - 2.0 * mid + low)
 
 
-def _air(times: np.ndarray, t0: float, velocity: np.ndarray, spin: np.ndarray, ball: Ball) -> np.ndarray:
+def _simulate_air(times: np.ndarray, t0: float, velocity: np.ndarray, spin: np.ndarray, ball: Ball) -> np.ndarray:
     """Simulate by how much air moves a ball off the parabola, (T, 3) metres, launched at `t0` with `velocity` and
     `spin`.
     """
     step = 0.002
-    count = int(min(max(times[-1] - t0, step), 2.0 * _MORE[-1]) / step) + 2
-    v, off, drift = np.array(velocity, float), np.zeros((count, 3)), np.zeros(3)
+    count = int(min(max(times[-1] - t0, step), 2.0 * _LONGER_SECONDS[-1]) / step) + 2
+    v, offsets, drift = np.array(velocity, float), np.zeros((count, 3)), np.zeros(3)
     for k in range(1, count):
-        push = in_air(v[None], spin[None], ball)[0]
+        push = compute_air_acceleration(v[None], spin[None], ball)[0]
         extra = push + [0.0, 0.0, ball.gravity]
-        off[k] = off[k - 1] + drift * step + 0.5 * extra * step**2
+        offsets[k] = offsets[k - 1] + drift * step + 0.5 * extra * step**2
         drift, v = drift + extra * step, v + push * step
     at = np.clip(times - t0, 0.0, (count - 1) * step)
-    return interpolate(at, np.arange(count) * step, off)
+    return interpolate_columns(at, np.arange(count) * step, offsets)

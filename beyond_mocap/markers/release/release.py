@@ -12,37 +12,37 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...ball.flight import Launch, fly
-from ...ball.physics import THROWN, Ball
+from ...ball.flight import Launch, simulate_flight
+from ...ball.physics import THROWN_BALLS, Ball
 from ...base.errors import InputError
-from ...base.settings import setting
-from ...motion.contacts import ground_height
-from ...motion.hand import Hand, hand_of, usual_centre
-from ...motion.humanoid import identify
+from ...base.settings import find_setting
+from ...motion.contacts import measure_ground_height
+from ...motion.hand import Hand, build_hand, estimate_ball_centre
+from ...motion.humanoid import identify_joints
 from ...motion.motion import Motion, forward_kinematics, resample
 from ...motion.track.ball_path import BallPath
-from ..trial import MarkerTrial, evenly
-from .launch_fit import Held, fit_launch
-from .throwing_hand import HandBall, ball_in_hand, by_distance, fastest, place_ball, sharpened, speeds, steady_speeds
-from .without_ball import HOLD, release_by_hand
+from ..trial import MarkerTrial, resample_evenly
+from .launch_fit import HeldMarker, fit_launch
+from .throwing_hand import HandBall, fit_hand_ball, find_release_by_distance, find_fastest_frame, place_ball, refine_hand, compute_speeds, compute_steady_speeds
+from .without_ball import HOLD, estimate_hand_release
 
-FEWEST = 12  # frames that a trial with a throw must have
-SLOWEST = 1.5  # m/s that a throwing hand must reach
+MIN_FRAMES = 12  # frames that a trial with a throw must have
+MIN_HAND_SPEED = 1.5  # m/s that a throwing hand must reach
 _BALL_LABEL = re.compile(r"^(base|tennis|hand|foot|soft)?[ _-]?ball[ _-]?\d*$", re.I)
-_HELD = (0.15, 0.015)  # s before the first guess, between which the marker is fixed in the hand
-_NEARBY = 0.3  # s before a hand is fastest in which it holds the ball
+_HELD_SECONDS = (0.15, 0.015)  # s before the first guess, between which the marker is fixed in the hand
+_NEARBY_SECONDS = 0.3  # s before a hand is fastest in which it holds the ball
 # Frames of flight that determine the marker's circle, and radii from which on it is another ball's.
-_TELLS, _LARGER = 10, 1.25
-_AIR = 0.25  # uncertainty of the effect of air, as a share of it
-_REACHES = 0.35  # metres from the palm, within which a marker may be on a held ball
-_BESIDE = 1.5  # metres between the middle of the markers and that of the joints, at most
-_LONGEST = 8.0  # s of flight until the ground
+_MIN_CIRCLE_FRAMES, _MAX_CIRCLE_RATIO = 10, 1.25
+_AIR_UNCERTAINTY = 0.25  # uncertainty of the effect of air, as a share of it
+_MAX_BALL_DISTANCE = 0.35  # metres from the palm, within which a marker may be on a held ball
+_MAX_OFFSET = 1.5  # metres between the middle of the markers and that of the joints, at most
+_MAX_FLIGHT = 8.0  # s of flight until the ground
 # Uncertainty in metres of where the marker leaves: visible in the hand, or never visible there.
-_SURE, _UNSURE = 0.006, 0.05
+_HELD_SIGMA, _HIDDEN_SIGMA = 0.006, 0.05
 
 MPH, KMH = 0.44704, 1.0 / 3.6
 # m/s that a thrown ball can have; a number outside is no speed.
-SLOWEST_THROW, FASTEST_THROW = 2.0, 55.0
+MIN_THROW_SPEED, MAX_THROW_SPEED = 2.0, 55.0
 
 # pitcher_session_height(in)_weight(lb)_number_kind_speed(tenths of mph), as in the OpenBiomechanics Project
 _PITCH = re.compile(r"^\d{5,6}_\d{5,6}_\d{2,3}_\d{2,3}_\d{1,3}_[A-Za-z]{2}_(\d{3,4})$")
@@ -66,7 +66,7 @@ class ReleaseSettings:
     ball_marker: str | None = None
     radius: float | None = None
     hand: str | None = None
-    ball: str = setting("release", "ball").default
+    ball: str = find_setting("release", "ball").default
     window: float = 0.12
     centre: tuple[float, float, float] | None = None
 
@@ -106,9 +106,9 @@ class Release:
     spin: np.ndarray
     time_sigma: float
     speed_sigma: float
-    way_sigma: float
+    direction_sigma: float
     side: str
-    how: str
+    method: str
     residual: float
     flight_frames: int
     radar: float | None
@@ -133,17 +133,17 @@ class Release:
         """Return the figures of the release, as values for JSON."""
         return {"release_time_s": self.time, "release_frame": self.frame, "speed_m_s": self.speed,
                 "direction": self.direction.tolist(), "uncertainty_s": self.time_sigma,
-                "uncertainty_m_s": self.speed_sigma, "uncertainty_deg": float(np.degrees(self.way_sigma)),
+                "uncertainty_m_s": self.speed_sigma, "uncertainty_deg": float(np.degrees(self.direction_sigma)),
                 "radar_speed_m_s": self.radar,
                 "against_radar": None if self.radar is None else self.speed / self.radar - 1.0,
                 "position_m": self.position.tolist(), "spin_rad_s": self.spin.tolist(), "hand": self.side,
-                "how": self.how, "residual_m": None if np.isnan(self.residual) else self.residual,
+                "how": self.method, "residual_m": None if np.isnan(self.residual) else self.residual,
                 "flight_frames": self.flight_frames, "impact_m": None if self.impact is None else self.impact.tolist(),
                 "hips_m": self.hips.tolist(), "ball_radius_m": self.radius,
                 "ball_centre_in_hand_m": self.centre.tolist(), "warnings": list(self.notes)}
 
 
-def release(trial: MarkerTrial, motion: Motion, settings: ReleaseSettings = ReleaseSettings()) -> Release:
+def estimate_release(trial: MarkerTrial, motion: Motion, settings: ReleaseSettings = ReleaseSettings()) -> Release:
     """Estimate when and how the ball left the hand.
 
     Args:
@@ -156,64 +156,64 @@ def release(trial: MarkerTrial, motion: Motion, settings: ReleaseSettings = Rele
         InputError: if the motion has another length, the skeleton has no hands, the ball's marker does not exist, the
             kind of ball is unknown, or no throw is found.
     """
-    ball = THROWN.get(settings.ball)
+    ball = THROWN_BALLS.get(settings.ball)
     if ball is None:
-        raise InputError("release", f"ball {settings.ball!r}", f"one of {', '.join(THROWN)}")
-    motion = _frame_for_frame(trial, motion)
-    if len(trial) < FEWEST:
-        raise InputError(trial.name, f"{len(trial)} frames", f"at least {FEWEST}", "take a longer stretch")
-    even = evenly(trial)
-    _check_near(even, motion)
-    label = _ball_label(even, settings.ball_marker)
-    marker = None if label is None else even.positions[:, even.index(label)]
+        raise InputError("release", f"ball {settings.ball!r}", f"one of {', '.join(THROWN_BALLS)}")
+    motion = _match_frames(trial, motion)
+    if len(trial) < MIN_FRAMES:
+        raise InputError(trial.name, f"{len(trial)} frames", f"at least {MIN_FRAMES}", "take a longer stretch")
+    even_trial = resample_evenly(trial)
+    _check_same_place(even_trial, motion)
+    label = _find_ball_label(even_trial, settings.ball_marker)
+    marker = None if label is None else even_trial.positions[:, even_trial.index_of(label)]
     sides = (settings.hand,) if settings.hand else ("left", "right")
-    balls = tuple(name for name in even.labels if name == label or _BALL_LABEL.match(name))
-    hands = [sharpened(hand_of(motion, side), even, balls) for side in sides]
-    hand = _throwing(hands, marker)
-    _check_throws(hand, even.name)
-    lies, notes = _in_hand(hand, marker, settings, ball)
-    notes += even.notes[len(trial.notes) :]
-    found = None
+    balls = tuple(name for name in even_trial.labels if name == label or _BALL_LABEL.match(name))
+    hands = [refine_hand(build_hand(motion, side), even_trial, balls) for side in sides]
+    hand = _choose_hand(hands, marker)
+    _check_hand_speed(hand, even_trial.name)
+    hand_ball, notes = _locate_ball(hand, marker, settings, ball)
+    notes += even_trial.notes[len(trial.notes) :]
+    launch = None
     if marker is not None:
-        found = _by_ball(hand, marker, lies, ball=ball, settings=settings, notes=notes)
-        found = _believed(found, hand, marker, label=label, radius=lies.radius, settings=settings, name=even.name,
+        launch = _fit_ball_launch(hand, marker, hand_ball, ball=ball, settings=settings, notes=notes)
+        launch = _check_launch(launch, hand, marker, label=label, radius=hand_ball.radius, settings=settings, name=even_trial.name,
                           notes=notes)
-    found = found or _by_hand(hand, motion, lies, ball, notes)
+    launch = launch or _estimate_hand_launch(hand, motion, hand_ball, ball, notes)
     seen = np.zeros(len(hand), bool) if marker is None else np.isfinite(marker).all(axis=-1)
-    return _result(found, hand, motion, lies=lies, seen=seen, name=even.name, notes=notes)
+    return _build_release(launch, hand, motion, hand_ball=hand_ball, seen=seen, name=even_trial.name, notes=notes)
 
 
-def _believed(found: _Found | None, hand: Hand, marker, label, radius, settings: ReleaseSettings, name: str, notes):
+def _check_launch(launch: _FittedLaunch | None, hand: Hand, marker, label, radius, settings: ReleaseSettings, name: str, notes):
     """Return the launch fitted to the marker; None where the marker was on no ball in this hand.
 
     Raises InputError where the user chose that marker or hand.
     """
-    away = _away(hand, marker, found)
-    if away <= _REACHES:
-        if found is None:
+    away = _measure_ball_distance(hand, marker, launch)
+    if away <= _MAX_BALL_DISTANCE:
+        if launch is None:
             notes.append(f"{label} is not visible in flight: the release is estimated from the hand alone")
-        elif found.frames >= _TELLS and found.circle > _LARGER * radius:
+        elif launch.frames >= _MIN_CIRCLE_FRAMES and launch.circle > _MAX_CIRCLE_RATIO * radius:
             notes.append(
-                f"{label} circles {1000.0 * found.circle:.0f} mm from the ball's centre, but a {settings.ball} is "
+                f"{label} circles {1000.0 * launch.circle:.0f} mm from the ball's centre, but a {settings.ball} is "
                 "smaller: set its radius or kind"
             )
-        return found
-    said = f"{label} is {away:.2f} m from the {hand.side} hand"
+        return launch
+    finding = f"{label} is {away:.2f} m from the {hand.side} hand"
     if settings.ball_marker or settings.hand:
-        raise InputError(name, said, "a marker on the ball in that hand", "check the marker and the hand")
-    notes.append(f"{said}: the release is estimated from the hand alone")
+        raise InputError(name, finding, "a marker on the ball in that hand", "check the marker and the hand")
+    notes.append(f"{finding}: the release is estimated from the hand alone")
     return None
 
 
-def _check_throws(hand: Hand, name: str) -> None:
+def _check_hand_speed(hand: Hand, name: str) -> None:
     """Raise InputError if the hand is never fast enough for a throw."""
-    pace = float(np.max(steady_speeds(hand.origin, hand.fps)))
-    if pace < SLOWEST:
-        raise InputError(name, f"a {hand.side} hand of at most {pace:.1f} m/s", "a throw",
+    speed = float(np.max(compute_steady_speeds(hand.origin, hand.fps)))
+    if speed < MIN_HAND_SPEED:
+        raise InputError(name, f"a {hand.side} hand of at most {speed:.1f} m/s", "a throw",
                          "choose another trial, or the other hand")
 
 
-def _check_near(trial: MarkerTrial, motion: Motion) -> None:
+def _check_same_place(trial: MarkerTrial, motion: Motion) -> None:
     """Raise InputError if the markers are elsewhere than the motion's body."""
     places, _ = forward_kinematics(motion)
     often = trial.seen.mean(axis=0) > 0.5
@@ -221,58 +221,58 @@ def _check_near(trial: MarkerTrial, motion: Motion) -> None:
     if not often.any():
         return
     away = np.linalg.norm(np.nanmedian(markers, axis=(0, 1)) - np.median(places, axis=(0, 1)))
-    if away > _BESIDE:
+    if away > _MAX_OFFSET:
         raise InputError(trial.name, f"markers {away:.1f} m away from the motion",
                          "the motion of this trial", "reconstruct the trial first")
 
 
-def _away(hand: Hand, marker: np.ndarray, found: _Found | None) -> float:
+def _measure_ball_distance(hand: Hand, marker: np.ndarray, launch: _FittedLaunch | None) -> float:
     """Measure the distance in metres from hand to ball marker: while held if visible then, else at the start of the
     flight.
     """
-    held = _held_frames(hand, marker)
-    palm = hand.carried(HOLD * hand.reach * hand.finger)
+    held = _find_held_frames(hand, marker)
+    palm = hand.to_world(HOLD * hand.reach * hand.finger)
     if held.sum() >= 3:
         return float(np.median(np.linalg.norm(marker[held] - palm[held], axis=-1)))
-    if found is None:
+    if launch is None:
         return 0.0
-    k = int(np.clip(round(found.launch.time * hand.fps), 0, len(hand) - 1))
-    return float(np.linalg.norm(found.launch.position - palm[k]))
+    k = int(np.clip(round(launch.launch.time * hand.fps), 0, len(hand) - 1))
+    return float(np.linalg.norm(launch.launch.position - palm[k]))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class _Found:
+class _FittedLaunch:
     """A launch in the markers' space, with its uncertainties."""
 
     launch: Launch
     ball: Ball
-    how: str
+    method: str
     time_sigma: float
     speed_sigma: float
-    way_sigma: float
+    direction_sigma: float
     residual: float = float("nan")
     frames: int = 0
     circle: float = 0.0
 
 
-def _result(found: _Found, hand: Hand, motion: Motion, lies: HandBall, seen, name: str, notes) -> Release:
+def _build_release(fitted: _FittedLaunch, hand: Hand, motion: Motion, hand_ball: HandBall, seen, name: str, notes) -> Release:
     """Build the release: the launch in the motion's space, with ball path and impact."""
-    launch = replace(found.launch, position=found.launch.position - hand.shift)
-    home = replace(hand, origin=hand.origin - hand.shift)
-    ground = ground_height(motion)
-    places = place_ball(home, lies.centre, launch, found.ball, ground)
-    way = fly(launch, found.ball, _LONGEST, ground)
-    impact = way.at(way.bounces[:1])[0] - [0.0, 0.0, found.ball.radius] if len(way.bounces) else None
-    hips = forward_kinematics(motion.frames(0, 1))[0][0, identify(motion.skeleton).hips]
+    launch = replace(fitted.launch, position=fitted.launch.position - hand.shift)
+    shifted_hand = replace(hand, origin=hand.origin - hand.shift)
+    ground = measure_ground_height(motion)
+    places = place_ball(shifted_hand, hand_ball.centre, launch, fitted.ball, ground)
+    flight = simulate_flight(launch, fitted.ball, _MAX_FLIGHT, ground)
+    impact = flight.at(flight.bounces[:1])[0] - [0.0, 0.0, fitted.ball.radius] if len(flight.bounces) else None
+    hips = forward_kinematics(motion.frames(0, 1))[0][0, identify_joints(motion.skeleton).hips]
     return Release(time=launch.time, frame=int(np.clip(round(launch.time * hand.fps), 0, len(hand) - 1)),
                    position=launch.position, velocity=launch.velocity, spin=np.asarray(launch.spin, float),
-                   time_sigma=found.time_sigma, speed_sigma=found.speed_sigma, way_sigma=found.way_sigma,
-                   side=hand.side, how=found.how, residual=found.residual, flight_frames=found.frames,
-                   radar=radar_speed(name), centre=lies.centre, radius=lies.radius,
+                   time_sigma=fitted.time_sigma, speed_sigma=fitted.speed_sigma, direction_sigma=fitted.direction_sigma,
+                   side=hand.side, method=fitted.method, residual=fitted.residual, flight_frames=fitted.frames,
+                   radar=parse_radar_speed(name), centre=hand_ball.centre, radius=hand_ball.radius,
                    path=BallPath(hand.times, places, seen), impact=impact, hips=hips, notes=tuple(notes))  # fmt: skip
 
 
-def _frame_for_frame(trial: MarkerTrial, motion: Motion) -> Motion:
+def _match_frames(trial: MarkerTrial, motion: Motion) -> Motion:
     """Return the motion with one frame for each frame of the trial; raise InputError where the lengths do not match."""
     if len(motion) == len(trial):
         return Motion(motion.skeleton, motion.root_positions, motion.rotations, trial.fps)
@@ -287,112 +287,112 @@ def _frame_for_frame(trial: MarkerTrial, motion: Motion) -> Motion:
     )  # fmt: skip
 
 
-def _ball_label(trial: MarkerTrial, asked: str | None) -> str | None:
+def _find_ball_label(trial: MarkerTrial, requested: str | None) -> str | None:
     """Return the ball's marker: the requested one, else the most often visible one with the name of a ball, or None."""
-    if asked:
-        trial.index(asked)
-        return asked
-    named = [label for label in trial.labels if _BALL_LABEL.match(label)]
-    if asked == "" or not named:
+    if requested:
+        trial.index_of(requested)
+        return requested
+    candidates = [label for label in trial.labels if _BALL_LABEL.match(label)]
+    if requested == "" or not candidates:
         return None
-    return max(named, key=lambda label: np.count_nonzero(trial.seen[:, trial.index(label)]))
+    return max(candidates, key=lambda label: np.count_nonzero(trial.seen[:, trial.index_of(label)]))
 
 
-def _throwing(hands: list[Hand], marker: np.ndarray | None) -> Hand:
+def _choose_hand(hands: list[Hand], marker: np.ndarray | None) -> Hand:
     """Choose the hand in which the ball's marker is before the flight; without a marker the faster one."""
-    peaks = [fastest(hand.origin, hand.fps) for hand in hands]
-    fast = max(range(len(hands)), key=lambda i: speeds(hands[i].origin, hands[i].fps)[peaks[i]])
+    peaks = [find_fastest_frame(hand.origin, hand.fps) for hand in hands]
+    fast = max(range(len(hands)), key=lambda i: compute_speeds(hands[i].origin, hands[i].fps)[peaks[i]])
     if marker is None or len(hands) == 1:
         return hands[fast]
-    nearest = [_distance(hand, marker, peaks[fast]) for hand in hands]
-    return hands[int(np.argmin(nearest))] if min(nearest) < 2.0 * _REACHES else hands[fast]
+    nearest = [_measure_distance(hand, marker, peaks[fast]) for hand in hands]
+    return hands[int(np.argmin(nearest))] if min(nearest) < 2.0 * _MAX_BALL_DISTANCE else hands[fast]
 
 
-def _distance(hand: Hand, marker: np.ndarray, peak: int) -> float:
+def _measure_distance(hand: Hand, marker: np.ndarray, peak: int) -> float:
     """Measure the distance in metres between hand and marker shortly before the hand is fastest; inf where hardly
     visible.
     """
-    away = np.linalg.norm(marker - hand.carried(HOLD * hand.reach * hand.finger), axis=-1)
-    away = away[max(peak - int(_NEARBY * hand.fps), 0) : peak + 1]
+    away = np.linalg.norm(marker - hand.to_world(HOLD * hand.reach * hand.finger), axis=-1)
+    away = away[max(peak - int(_NEARBY_SECONDS * hand.fps), 0) : peak + 1]
     away = away[np.isfinite(away)]
     return float(np.median(away)) if len(away) >= 3 else np.inf
 
 
-def _in_hand(hand: Hand, marker, settings: ReleaseSettings, ball: Ball) -> tuple[HandBall, list[str]]:
+def _locate_ball(hand: Hand, marker, settings: ReleaseSettings, ball: Ball) -> tuple[HandBall, list[str]]:
     """Estimate where the ball lies in the hand; return it with messages."""
     # direction out of the palm at rest: downwards if the rest pose spreads the arms, else unknown
     palm = np.array([0.0, 0.0, -1.0]) if abs(hand.finger[1]) > 0.9 else None
-    usual = usual_centre(hand.finger, hand.reach, palm)
+    usual_place = estimate_ball_centre(hand.finger, hand.reach, palm)
     radius = settings.radius or ball.radius
     if settings.centre is not None:
         return HandBall(np.array(settings.centre, float), radius, 0.005), []
     if marker is None:
-        return HandBall(usual, radius, 0.03), []
-    held = _held_frames(hand, marker)
-    lies = ball_in_hand(hand.taken_back(marker)[held], radius, usual, fit_radius=settings.radius is None)
-    told = [f"the ball's radius is {1000.0 * lies.radius:.0f} mm, fitted to its marker"] if lies.fitted else []
-    return lies, told
+        return HandBall(usual_place, radius, 0.03), []
+    held = _find_held_frames(hand, marker)
+    hand_ball = fit_hand_ball(hand.to_hand(marker)[held], radius, usual_place, fit_radius=settings.radius is None)
+    notes = [f"the ball's radius is {1000.0 * hand_ball.radius:.0f} mm, fitted to its marker"] if hand_ball.is_radius_fitted else []
+    return hand_ball, notes
 
 
-def _held_frames(hand: Hand, marker: np.ndarray) -> np.ndarray:
+def _find_held_frames(hand: Hand, marker: np.ndarray) -> np.ndarray:
     """Return (T,) bool: the frames shortly before the first guess in which the marker is visible."""
-    last = _guess(hand, marker)
+    last = _guess_release(hand, marker)
     times = hand.times
-    return np.isfinite(marker).all(axis=-1) & (times > last - _HELD[0]) & (times < last - _HELD[1])
+    return np.isfinite(marker).all(axis=-1) & (times > last - _HELD_SECONDS[0]) & (times < last - _HELD_SECONDS[1])
 
 
-def _guess(hand: Hand, marker: np.ndarray) -> float:
+def _guess_release(hand: Hand, marker: np.ndarray) -> float:
     """Guess the release time in s, from the marker's distance, else from the hand's speed."""
-    knuckles = hand.carried(HOLD * hand.reach * hand.finger)
-    frame = by_distance(knuckles, marker, hand.fps)
-    return (fastest(knuckles, hand.fps) if frame is None else frame) / hand.fps
+    knuckles = hand.to_world(HOLD * hand.reach * hand.finger)
+    frame = find_release_by_distance(knuckles, marker, hand.fps)
+    return (find_fastest_frame(knuckles, hand.fps) if frame is None else frame) / hand.fps
 
 
-def _by_ball(hand: Hand, marker, lies: HandBall, ball: Ball, settings: ReleaseSettings, notes) -> _Found | None:
+def _fit_ball_launch(hand: Hand, marker, hand_ball: HandBall, ball: Ball, settings: ReleaseSettings, notes) -> _FittedLaunch | None:
     """Fit the launch to the marker on the ball; None where it is not visible in flight."""
-    held = _held_frames(hand, marker)
-    sure = bool(held.sum() >= 3)
-    place = np.nanmedian(hand.taken_back(marker)[held], axis=0) if sure else lies.centre
-    centre = hand.carried(lies.centre)
+    held = _find_held_frames(hand, marker)
+    is_held_visible = bool(held.sum() >= 3)
+    place = np.nanmedian(hand.to_hand(marker)[held], axis=0) if is_held_visible else hand_ball.centre
+    centre = hand.to_world(hand_ball.centre)
     velocity = np.gradient(centre, 1.0 / hand.fps, axis=0)
-    course = Held(hand.carried(place), centre, velocity, _SURE if sure else _UNSURE)
-    guess = _guess(hand, marker)
+    hand_evidence = HeldMarker(hand.to_world(place), centre, velocity, _HELD_SIGMA if is_held_visible else _HIDDEN_SIGMA)
+    guess = _guess_release(hand, marker)
     # also without air, as in eq. 6.2; the fit with the smaller residual is taken
     without_air = replace(ball, drag=0.0, lift=(0.0, *ball.lift[1:]))
-    fits = [(fit_launch(marker, course, hand.fps, guess=guess, ball=air, radius=lies.radius,
+    fits = [(fit_launch(marker, hand_evidence, hand.fps, guess=guess, ball=air, radius=hand_ball.radius,
                         window=settings.window), air)
             for air in (ball, without_air)]
     if fits[0][0] is None or fits[1][0] is None:
         return None
     fit, ball = min(fits, key=lambda found: (-round(found[0].seconds, 3), found[0].residual))
-    if not sure:
+    if not is_held_visible:
         notes.append("the ball's marker is not visible in the hand: the release is where the flight meets the hand")
     launch = Launch(fit.time, fit.position, fit.velocity, fit.spin)
     air = float(np.linalg.norm(fits[0][0].velocity - fits[1][0].velocity))
-    speed_sigma = float(np.hypot(fit.speed_sigma, _AIR * air))
+    speed_sigma = float(np.hypot(fit.speed_sigma, _AIR_UNCERTAINTY * air))
     way_sigma = speed_sigma / max(float(np.linalg.norm(fit.velocity)), 1e-9)
-    return _Found(launch=launch, ball=ball, how="ball", time_sigma=fit.time_sigma, speed_sigma=speed_sigma,
-                  way_sigma=way_sigma, residual=fit.residual, frames=fit.frames, circle=fit.circle)
+    return _FittedLaunch(launch=launch, ball=ball, method="ball", time_sigma=fit.time_sigma, speed_sigma=speed_sigma,
+                  direction_sigma=way_sigma, residual=fit.residual, frames=fit.frames, circle=fit.circle)
 
 
-def _by_hand(hand: Hand, motion: Motion, lies: HandBall, ball: Ball, notes) -> _Found:
+def _estimate_hand_launch(hand: Hand, motion: Motion, hand_ball: HandBall, ball: Ball, notes) -> _FittedLaunch:
     """Estimate the launch from the hand alone."""
-    found = release_by_hand(hand, lies.radius, _stride(motion))
+    hand_release = estimate_hand_release(hand, hand_ball.radius, _compute_stride(motion))
     if not hand.markers:
         notes.append("no markers near the hand: only the filtered motion is used, so the speed comes out too low")
-    launch = Launch(found.time, found.position, found.velocity)
-    return _Found(launch=launch, ball=ball, how="hand", time_sigma=found.time_sigma, speed_sigma=found.speed_sigma,
-                  way_sigma=found.way_sigma)
+    launch = Launch(hand_release.time, hand_release.position, hand_release.velocity)
+    return _FittedLaunch(launch=launch, ball=ball, method="hand", time_sigma=hand_release.time_sigma, speed_sigma=hand_release.speed_sigma,
+                  direction_sigma=hand_release.direction_sigma)
 
 
-def _stride(motion: Motion) -> np.ndarray:
+def _compute_stride(motion: Motion) -> np.ndarray:
     """Compute the level vector from the right foot to the left, (T, 2) metres."""
-    body = identify(motion.skeleton)
+    body = identify_joints(motion.skeleton)
     places, _ = forward_kinematics(motion)
     return places[:, body.left.foot, :2] - places[:, body.right.foot, :2]
 
 
-def radar_speed(name: str) -> float | None:
+def parse_radar_speed(name: str) -> float | None:
     """Parse a measured speed from a file name.
 
     `000000_000000_74_195_002_FF_808` is a pitch of 80.8 mph; `throw_130kmh`, `throw-36.1mps`, `ff_81mph` contain a
@@ -405,11 +405,11 @@ def radar_speed(name: str) -> float | None:
     """
     pitch = _PITCH.match(name)
     if pitch:
-        return _possible_speed(int(pitch[1]) / 10.0 * MPH)
-    told = {round(float(re.sub("[,p]", ".", number.lower())) * _UNITS[unit.lower().replace("-", "_")], 6) for number,
+        return _limit_to_throws(int(pitch[1]) / 10.0 * MPH)
+    speeds = {round(float(re.sub("[,p]", ".", number.lower())) * _UNITS[unit.lower().replace("-", "_")], 6) for number,
             unit in _WITH_UNIT.findall(name)}
-    return _possible_speed(told.pop()) if len(told) == 1 else None
+    return _limit_to_throws(speeds.pop()) if len(speeds) == 1 else None
 
 
-def _possible_speed(speed: float) -> float | None:
-    return speed if SLOWEST_THROW <= speed <= FASTEST_THROW else None
+def _limit_to_throws(speed: float) -> float | None:
+    return speed if MIN_THROW_SPEED <= speed <= MAX_THROW_SPEED else None

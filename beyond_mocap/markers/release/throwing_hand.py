@@ -12,38 +12,38 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...ball.flight import Launch, fly
+from ...ball.flight import Launch, simulate_flight
 from ...ball.physics import Ball
 from ...base.easing import smoothstep
-from ...base.time_series import runs
+from ...base.time_series import find_runs
 from ...motion.hand import Hand
-from ..frames import rigid_fit
+from ..frames import fit_rigid
 from ..trial import MarkerTrial
 
-NEAR = 0.14  # metres from the wrist within which a marker belongs to the hand
-_PASSES = 4  # iterations of places and shift
+MAX_WRIST_DISTANCE = 0.14  # metres from the wrist within which a marker belongs to the hand
+_ITERATIONS = 4  # iterations of places and shift
 _LIFTS = sorted(np.arange(-40, 41) / 100.0, key=abs)  # metres, vertical shifts that are tried, small ones first
-_BEHIND = 0.02  # metres nearer to the elbow than the wrist; from there on markers belong to the forearm
+_FOREARM_MARGIN = 0.02  # metres nearer to the elbow than the wrist; from there on markers belong to the forearm
 _KNUCKLES = (0.055, 0.115)  # metres from the wrist, where a marker is on the heads of the metacarpals
 _REACH_OF_KNUCKLES = 2.22  # fingers are 1.22 times the third metacarpal, Buchholz et al. 1992 (see `without_ball`)
-_TORN = 4.0  # multiples of the usual misfit of the hand's markers, above which one of them is misplaced
-_STEADY = 0.012  # metres of spread in the hand's frame, below which a marker belongs to the hand
+_MAX_MISFIT_RATIO = 4.0  # multiples of the usual misfit of the hand's markers, above which one of them is misplaced
+_MAX_SPREAD = 0.012  # metres of spread in the hand's frame, below which a marker belongs to the hand
 
 _USUAL_SIGMA = 0.03  # metres, uncertainty of the usual place of a ball's centre
 _SIGMA = 0.003  # metres, deviation of a marker's distance from the centre from the radius
-_LEAST_SPREAD = 0.5  # spread of the marker's places, as a share of the radius, from which on it is fitted
-_SIZES = (0.5, 2.0)  # range of a fitted radius, as shares of the expected one
-_ROUNDS = 40  # Gauss-Newton steps at most
+_MIN_SPREAD_SHARE = 0.5  # spread of the marker's places, as a share of the radius, from which on it is fitted
+_RADIUS_RANGE = (0.5, 2.0)  # range of a fitted radius, as shares of the expected one
+_MAX_STEPS = 40  # Gauss-Newton steps at most
 
-_SETTLES = 0.10  # s before the release in which the ball moves from its usual place to where it leaves
-_FOLLOWED = 10.0  # s of flight, bounces and rolling at most
+_SETTLING_SECONDS = 0.10  # s before the release in which the ball moves from its usual place to where it leaves
+_MAX_FLIGHT = 10.0  # s of flight, bounces and rolling at most
 
-GROWS = 1.1  # distance from hand to marker, relative to the held one, at which the ball has left (section 6.2)
-_BEFORE = (0.30, 0.05)  # s before the hand is fastest, between which the ball is held
-_STAYS = 3  # frames for which the distance must stay larger
+RELEASE_DISTANCE_RATIO = 1.1  # distance from hand to marker, relative to the held one, at which the ball has left (section 6.2)
+_HELD_SECONDS = (0.30, 0.05)  # s before the hand is fastest, between which the ball is held
+_MIN_RELEASED_FRAMES = 3  # frames for which the distance must stay larger
 
 
-def sharpened(hand: Hand, trial: MarkerTrial, never: tuple[str, ...] = ()) -> Hand:
+def refine_hand(hand: Hand, trial: MarkerTrial, excluded: tuple[str, ...] = ()) -> Hand:
     """Replace the hand's motion by that of its own markers, in every frame in which they determine it.
 
     A constant shift of the motion against the markers, as from placing feet on the floor, is found and removed.
@@ -55,53 +55,53 @@ def sharpened(hand: Hand, trial: MarkerTrial, never: tuple[str, ...] = ()) -> Ha
     Returns:
         The hand with origin, rotation and reach from its markers.
     """
-    lift = _lift(hand, trial, never)
-    names, seen = _near(replace(hand, origin=hand.origin + lift, elbow=hand.elbow + lift), trial, never)
+    lift = _find_vertical_shift(hand, trial, excluded)
+    names, seen = _select_hand_markers(replace(hand, origin=hand.origin + lift, elbow=hand.elbow + lift), trial, excluded)
     if not names:
         return hand
     shift = lift
-    for _ in range(_PASSES):
+    for _ in range(_ITERATIONS):
         local = np.einsum("tji,tmj->tmi", hand.rotation, seen - (hand.origin + shift)[:, None, :])
         places = np.nanmedian(local, axis=0)
-        shift = shift + np.nanmedian(seen - _placed(hand, shift, places), axis=(0, 1))
+        shift = shift + np.nanmedian(seen - _place_markers(hand, shift, places), axis=(0, 1))
     moved = replace(hand, origin=hand.origin + shift, elbow=hand.elbow + shift, shift=shift)
-    fit = rigid_fit(places, seen)
-    tells = fit.sound & (fit.rms < max(_TORN * _usual(fit.rms), _STEADY))
-    known = np.isfinite(seen).all(axis=-1) & ~(fit.sound & ~tells)[:, None]
-    off = np.where(known[..., None], seen - _placed(hand, shift, places), 0.0).sum(axis=1)
-    off = off / np.maximum(known.sum(axis=1), 1)[:, None]  # one or two markers can move the hand, but not rotate it
-    return replace(moved, reach=_reach(hand, places), origin=np.where(tells[:, None], fit.shift, moved.origin + off),
-                   rotation=np.where(tells[:, None, None], fit.rotation, moved.rotation), markers=names)
+    fit = fit_rigid(places, seen)
+    is_reliable = fit.is_determined & (fit.rms < max(_MAX_MISFIT_RATIO * _compute_median(fit.rms), _MAX_SPREAD))
+    known = np.isfinite(seen).all(axis=-1) & ~(fit.is_determined & ~is_reliable)[:, None]
+    offset = np.where(known[..., None], seen - _place_markers(hand, shift, places), 0.0).sum(axis=1)
+    offset = offset / np.maximum(known.sum(axis=1), 1)[:, None]  # one or two markers can move the hand, but not rotate it
+    return replace(moved, reach=_estimate_reach(hand, places), origin=np.where(is_reliable[:, None], fit.shift, moved.origin + offset),
+                   rotation=np.where(is_reliable[:, None, None], fit.rotation, moved.rotation), markers=names)
 
 
-def _usual(values: np.ndarray) -> float:
+def _compute_median(values: np.ndarray) -> float:
     known = values[np.isfinite(values)]
     return float(np.median(known)) if len(known) else 0.0
 
 
-def _reach(hand: Hand, places: np.ndarray) -> float:
+def _estimate_reach(hand: Hand, places: np.ndarray) -> float:
     """Estimate the length in metres from wrist to fingertip: mean of the skeleton's and that from a knuckle marker."""
     along = places @ hand.finger
     knuckles = along[(along > _KNUCKLES[0]) & (along < _KNUCKLES[1])]
     return hand.reach if not len(knuckles) else 0.5 * (hand.reach + _REACH_OF_KNUCKLES * float(np.median(knuckles)))
 
 
-def _placed(hand: Hand, shift: np.ndarray, places: np.ndarray) -> np.ndarray:
+def _place_markers(hand: Hand, shift: np.ndarray, places: np.ndarray) -> np.ndarray:
     return (hand.origin + shift)[:, None, :] + np.einsum("tij,mj->tmi", hand.rotation, places)
 
 
-def _lift(hand: Hand, trial: MarkerTrial, never: tuple[str, ...]) -> np.ndarray:
+def _find_vertical_shift(hand: Hand, trial: MarkerTrial, excluded: tuple[str, ...]) -> np.ndarray:
     """Find the vertical shift (3,) metres between motion and markers.
 
     With the right shift, the distances of the hand's own markers from the wrist do not change over time.
     """
-    often = np.count_nonzero(trial.seen[:: max(len(trial) // 300, 1)], axis=0) > 2
-    kept = [number for number, label in enumerate(trial.labels) if label not in never and often[number]]
-    few = trial.positions[:: max(len(trial) // 300, 1), kept]
-    if not kept:
+    is_frequent = np.count_nonzero(trial.seen[:: max(len(trial) // 300, 1)], axis=0) > 2
+    candidates = [number for number, label in enumerate(trial.labels) if label not in excluded and is_frequent[number]]
+    few = trial.positions[:: max(len(trial) // 300, 1), candidates]
+    if not candidates:
         return np.zeros(3)
     origin = hand.origin[:: max(len(trial) // 300, 1), None, :]
-    near = np.flatnonzero(np.nanmedian(np.linalg.norm(few[..., :2] - origin[..., :2], axis=-1), axis=0) < NEAR)
+    near = np.flatnonzero(np.nanmedian(np.linalg.norm(few[..., :2] - origin[..., :2], axis=-1), axis=0) < MAX_WRIST_DISTANCE)
     best, found = np.inf, 0.0
     for height in _LIFTS if len(near) >= 3 else ():
         away = np.linalg.norm(few[:, near] - origin - [0.0, 0.0, height], axis=-1)
@@ -111,21 +111,21 @@ def _lift(hand: Hand, trial: MarkerTrial, never: tuple[str, ...]) -> np.ndarray:
     return np.array([0.0, 0.0, found])
 
 
-def _near(hand: Hand, trial: MarkerTrial, never: tuple[str, ...]) -> tuple[tuple[str, ...], np.ndarray]:
+def _select_hand_markers(hand: Hand, trial: MarkerTrial, excluded: tuple[str, ...]) -> tuple[tuple[str, ...], np.ndarray]:
     """Select the markers that stay with the hand: labels and places (T, M, 3) metres."""
     away = np.linalg.norm(trial.positions - hand.origin[:, None, :], axis=-1)
     forearm = float(np.median(np.linalg.norm(hand.origin - hand.elbow, axis=-1)))
-    kept = []
+    selected = []
     for number, label in enumerate(trial.labels):
         known = np.isfinite(away[:, number])
-        if label in never or np.count_nonzero(known) < max(0.3 * len(trial), 1):
+        if label in excluded or np.count_nonzero(known) < max(0.3 * len(trial), 1):
             continue
         distance = away[known, number]
         spread = np.subtract(*np.percentile(distance, [90, 10]))
         arm = np.median(np.linalg.norm(trial.positions[known, number] - hand.elbow[known], axis=-1))
-        if np.median(distance) < NEAR and spread < 3.0 * _STEADY and arm > forearm - _BEHIND:
-            kept.append(number)
-    return tuple(trial.labels[number] for number in kept), trial.positions[:, kept]
+        if np.median(distance) < MAX_WRIST_DISTANCE and spread < 3.0 * _MAX_SPREAD and arm > forearm - _FOREARM_MARGIN:
+            selected.append(number)
+    return tuple(trial.labels[number] for number in selected), trial.positions[:, selected]
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,10 +142,10 @@ class HandBall:
     centre: np.ndarray
     radius: float
     sigma: float
-    fitted: bool = False
+    is_radius_fitted: bool = False
 
 
-def ball_in_hand(points: np.ndarray, radius: float, usual: np.ndarray, fit_radius: bool = False) -> HandBall:
+def fit_hand_ball(points: np.ndarray, radius: float, usual_centre: np.ndarray, fit_radius: bool = False) -> HandBall:
     """Fit the centre of a sphere that has all points on its surface.
 
     Args:
@@ -161,39 +161,39 @@ def ball_in_hand(points: np.ndarray, radius: float, usual: np.ndarray, fit_radiu
     points = np.asarray(points, float).reshape(-1, 3)
     points = points[np.isfinite(points).all(axis=-1)]
     if not len(points):
-        return HandBall(np.asarray(usual, float), radius, _USUAL_SIGMA)
+        return HandBall(np.asarray(usual_centre, float), radius, _USUAL_SIGMA)
     places = points[:: max(len(points) // 400, 1)]  # neighbours in time add no information
     spread = float(np.median(np.linalg.norm(places - np.median(places, axis=0), axis=-1)))
-    found = None
-    if fit_radius and len(places) >= 4 and spread > _LEAST_SPREAD * radius:
-        found = _fitted(places, radius, usual, True)
-        off = np.abs(np.linalg.norm(places - found.centre, axis=-1) - found.radius)
-        if not (_SIZES[0] * radius < found.radius < _SIZES[1] * radius and np.median(off) < _SIGMA):
-            found = None  # the points do not fit a ball of this kind
-    return found or _fitted(places, radius, usual, False)
+    fit = None
+    if fit_radius and len(places) >= 4 and spread > _MIN_SPREAD_SHARE * radius:
+        fit = _fit_sphere(places, radius, usual_centre, True)
+        off = np.abs(np.linalg.norm(places - fit.centre, axis=-1) - fit.radius)
+        if not (_RADIUS_RANGE[0] * radius < fit.radius < _RADIUS_RANGE[1] * radius and np.median(off) < _SIGMA):
+            fit = None  # the points do not fit a ball of this kind
+    return fit or _fit_sphere(places, radius, usual_centre, False)
 
 
-def _fitted(places: np.ndarray, radius: float, usual: np.ndarray, fitted: bool) -> HandBall:
+def _fit_sphere(places: np.ndarray, radius: float, usual_centre: np.ndarray, fit_radius: bool) -> HandBall:
     """Fit the sphere by Gauss-Newton, started on the usual side of the markers."""
     mean = places.mean(axis=0)
-    toward = np.asarray(usual, float) - mean  # from the markers' mean to the usual centre
+    toward = np.asarray(usual_centre, float) - mean  # from the markers' mean to the usual centre
     # unknowns: centre (3) and radius
-    value = np.append(mean + toward * (radius / max(np.linalg.norm(toward), 1e-9)), radius)
+    unknowns = np.append(mean + toward * (radius / max(np.linalg.norm(toward), 1e-9)), radius)
     pull = np.append(np.full(3, 1.0 / _USUAL_SIGMA**2), 0.0)
-    for _ in range(_ROUNDS):
-        arms = value[:3] - places
+    for _ in range(_MAX_STEPS):
+        arms = unknowns[:3] - places
         length = np.maximum(np.linalg.norm(arms, axis=-1), 1e-9)
-        miss = length - value[3]
+        miss = length - unknowns[3]
         weight = 1.0 / (_SIGMA**2 * (1.0 + (miss / (3.0 * _SIGMA)) ** 2))  # outliers have less weight
-        slope = np.column_stack([arms / length[:, None], np.full(len(places), -1.0 if fitted else 0.0)])
-        normal = np.einsum("n,ni,nj->ij", weight, slope, slope) + np.diag(pull) + np.diag([1.0, 1.0, 1.0, 1e-3])
-        toward = np.einsum("n,ni,n->i", weight, slope, miss) + pull * (value - np.append(usual, 0.0))
+        jacobian = np.column_stack([arms / length[:, None], np.full(len(places), -1.0 if fit_radius else 0.0)])
+        normal = np.einsum("n,ni,nj->ij", weight, jacobian, jacobian) + np.diag(pull) + np.diag([1.0, 1.0, 1.0, 1e-3])
+        toward = np.einsum("n,ni,n->i", weight, jacobian, miss) + pull * (unknowns - np.append(usual_centre, 0.0))
         step = np.linalg.solve(normal, toward)
-        value = value - step
+        unknowns = unknowns - step
         if np.abs(step).max() < 1e-8:
             break
     sigma = float(np.sqrt(np.trace(np.linalg.inv(normal)[:3, :3])))
-    return HandBall(value[:3], float(value[3]), sigma, fitted)
+    return HandBall(unknowns[:3], float(unknowns[3]), sigma, fit_radius)
 
 
 def place_ball(hand: Hand, centre: np.ndarray, launch: Launch, ball: Ball, ground: float = 0.0) -> np.ndarray:
@@ -212,28 +212,28 @@ def place_ball(hand: Hand, centre: np.ndarray, launch: Launch, ball: Ball, groun
         (T, 3) metres, the ball's centre.
     """
     times = hand.times
-    held = hand.carried(centre)
-    leaves = _held_at(held, hand.fps, launch.time)
-    gap = np.asarray(launch.position, float) - leaves
+    held = hand.to_world(centre)
+    release_place = _interpolate_at(held, hand.fps, launch.time)
+    gap = np.asarray(launch.position, float) - release_place
     k = int(np.clip(round(launch.time * hand.fps), 0, len(hand) - 1))
     gap_in_hand = hand.rotation[k].T @ gap
-    share = smoothstep(1.0 - (launch.time - times) / _SETTLES)
+    share = smoothstep(1.0 - (launch.time - times) / _SETTLING_SECONDS)
     places = held + share[:, None] * np.einsum("tij,j->ti", hand.rotation, gap_in_hand)
-    gone = times > launch.time
-    if gone.any():
-        seconds = min(float(times[-1] - launch.time), _FOLLOWED) + 1.0 / hand.fps
-        places[gone] = fly(launch, ball, seconds, ground).at(times[gone])
+    in_flight = times > launch.time
+    if in_flight.any():
+        seconds = min(float(times[-1] - launch.time), _MAX_FLIGHT) + 1.0 / hand.fps
+        places[in_flight] = simulate_flight(launch, ball, seconds, ground).at(times[in_flight])
     return places
 
 
-def _held_at(held: np.ndarray, fps: float, time: float) -> np.ndarray:
+def _interpolate_at(held: np.ndarray, fps: float, time: float) -> np.ndarray:
     """Interpolate a place (3,) at a time between two frames."""
     at = np.clip(time * fps, 0.0, len(held) - 1.0)
     low = min(int(at), len(held) - 2)
     return held[low] + (at - low) * (held[low + 1] - held[low])
 
 
-def speeds(places: np.ndarray, fps: float) -> np.ndarray:
+def compute_speeds(places: np.ndarray, fps: float) -> np.ndarray:
     """Compute the speed of a point by differences over two frames.
 
     Args:
@@ -247,7 +247,7 @@ def speeds(places: np.ndarray, fps: float) -> np.ndarray:
     return np.linalg.norm(np.gradient(places, 1.0 / fps, axis=0), axis=-1)
 
 
-def steady_speeds(places: np.ndarray, fps: float) -> np.ndarray:
+def compute_steady_speeds(places: np.ndarray, fps: float) -> np.ndarray:
     """Compute speeds like `compute_speeds`, with single outlier frames removed by a median filter.
 
     Returns:
@@ -255,15 +255,15 @@ def steady_speeds(places: np.ndarray, fps: float) -> np.ndarray:
     """
     from scipy.signal import medfilt
 
-    return medfilt(speeds(places, fps), 5)
+    return medfilt(compute_speeds(places, fps), 5)
 
 
-def fastest(places: np.ndarray, fps: float) -> int:
+def find_fastest_frame(places: np.ndarray, fps: float) -> int:
     """Find the frame in which a point (T, 3) metres is fastest, ignoring single outliers."""
-    return int(np.argmax(steady_speeds(places, fps)))
+    return int(np.argmax(compute_steady_speeds(places, fps)))
 
 
-def by_distance(hand: np.ndarray, marker: np.ndarray, fps: float) -> int | None:
+def find_release_by_distance(hand: np.ndarray, marker: np.ndarray, fps: float) -> int | None:
     """Find the frame from which on the ball's marker is 10 % further from the hand than while held.
 
     Args:
@@ -276,14 +276,14 @@ def by_distance(hand: np.ndarray, marker: np.ndarray, fps: float) -> int | None:
     """
     away = np.linalg.norm(marker - hand, axis=-1)
     seen = np.flatnonzero(np.isfinite(away))
-    if len(seen) < 2 * _STAYS:
+    if len(seen) < 2 * _MIN_RELEASED_FRAMES:
         return None
-    peak = fastest(hand, fps)
-    first, last = (max(peak - int(round(seconds * fps)), 0) for seconds in _BEFORE)
+    peak = find_fastest_frame(hand, fps)
+    first, last = (max(peak - int(round(seconds * fps)), 0) for seconds in _HELD_SECONDS)
     held = away[first : max(last, first + 1)]
     held = held[np.isfinite(held)]
     if not len(held):  # hidden by the fingers: the smallest distances are used instead
         held = np.sort(away[seen])[: max(len(seen) // 20, 3)]
-    further = away[seen] > GROWS * np.median(held)
-    left = [a for a, b in runs(further) if b - a >= _STAYS and seen[a] >= first]
-    return int(seen[left[0]]) if left else None
+    is_further = away[seen] > RELEASE_DISTANCE_RATIO * np.median(held)
+    releases = [a for a, b in find_runs(is_further) if b - a >= _MIN_RELEASED_FRAMES and seen[a] >= first]
+    return int(seen[releases[0]]) if releases else None

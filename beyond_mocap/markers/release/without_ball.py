@@ -23,25 +23,25 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...base.time_series import interpolate
+from ...base.time_series import interpolate_columns
 from ...motion.hand import Hand
-from .throwing_hand import fastest
+from .throwing_hand import find_fastest_frame
 
 SPEED_SIGMA = 0.06  # of the speed, one standard deviation
 TIME_SIGMA = 0.004  # seconds, one standard deviation, of a fast throw; slower ones roll longer and have more
 PAD = 0.91  # share of the length from wrist to fingertip where the finger pads push, joints bent by some 25 degrees
 HOLD = 0.70  # share of the length from wrist to fingertip where the centre of a gripped ball is
 ROLLS_WITH = 2.0 / 7.0  # share of a surface's speed that a solid ball rolling on it takes on
-_SMOOTH = 0.014  # s, window of the parabolas from which velocities are computed
-_NEAR = 0.1  # s around the fastest frame of the outlier-free speed, in which the fastest time is searched
-_FINE = 8  # steps per frame
-_LATEST = 2.5  # multiples of the rolling time within which the tips are fastest after the wrist
+_SMOOTHING_SECONDS = 0.014  # s, window of the parabolas from which velocities are computed
+_SEARCH_SECONDS = 0.1  # s around the fastest frame of the outlier-free speed, in which the fastest time is searched
+_STEPS_PER_FRAME = 8  # steps per frame
+_MAX_TIP_DELAY = 2.5  # multiples of the rolling time within which the tips are fastest after the wrist
 # The wrist is fastest between so many rolling times before, and so many s after, the fastest time of the ball.
-_EARLIER, _AFTER = 4.0, 0.005
-_NEARLY = 0.95  # share of the wrist's maximum speed there, from which on a local maximum is its peak
-_ACCELERATES = 0.8  # share of the tips' maximum speed, from which on their path gives the direction
-_ARC = 0.35  # rad by which an overarm hand may rise or fall without the ball doing so
-_LEAST_STEP = 0.25  # metres between the feet, from which on the stride contributes to the direction
+_MAX_WRIST_LEAD, _MAX_WRIST_LAG = 4.0, 0.005
+_PEAK_SHARE = 0.95  # share of the wrist's maximum speed there, from which on a local maximum is its peak
+_FAST_SHARE = 0.8  # share of the tips' maximum speed, from which on their path gives the direction
+_IGNORED_RISE = 0.35  # rad by which an overarm hand may rise or fall without the ball doing so
+_MIN_STRIDE = 0.25  # metres between the feet, from which on the stride contributes to the direction
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -63,11 +63,11 @@ class HandRelease:
     velocity: np.ndarray
     time_sigma: float
     speed_sigma: float
-    way_sigma: float
-    rolled: float
+    direction_sigma: float
+    roll_time: float
 
 
-def release_by_hand(hand: Hand, radius: float, stride: np.ndarray | None = None) -> HandRelease:
+def estimate_hand_release(hand: Hand, radius: float, stride: np.ndarray | None = None) -> HandRelease:
     """Estimate the release of a ball that has no marker.
 
     Args:
@@ -77,135 +77,135 @@ def release_by_hand(hand: Hand, radius: float, stride: np.ndarray | None = None)
     Returns:
         The release.
     """
-    course = _Course(hand)
-    times, tips, grip = course.times, course.velocity(PAD), course.velocity(HOLD)
-    turning = _length(course.turn)
-    gripped = course.fastest(HOLD, fastest(hand.carried(HOLD * hand.reach * hand.finger), hand.fps))
-    roll = _roll(float(np.median(turning[_about(times, gripped, 0.01)])))
-    wrist = _wrist(course, gripped, roll)
-    last = int(np.searchsorted(times, times[wrist] + max(_LATEST * roll, 2.0 / hand.fps)))
-    aim = _aim(course, tips, wrist, last, stride)
-    forward = tips[wrist : last + 1] @ aim
+    path = _HandPath(hand)
+    times, tips, grip = path.times, path.velocities_at(PAD), path.velocities_at(HOLD)
+    angular_speed = _compute_lengths(path.angular_velocity)
+    gripped = path.find_fastest(HOLD, find_fastest_frame(hand.to_world(HOLD * hand.reach * hand.finger), hand.fps))
+    roll = _compute_roll_time(float(np.median(angular_speed[_select_around(times, gripped, 0.01)])))
+    wrist = _find_wrist_peak(path, gripped, roll)
+    last = int(np.searchsorted(times, times[wrist] + max(_MAX_TIP_DELAY * roll, 2.0 / hand.fps)))
+    direction = _estimate_direction(path, tips, wrist, last, stride)
+    forward = tips[wrist : last + 1] @ direction
     k = wrist + int(np.argmax(forward))
-    rolled = _roll(float(turning[k]))
-    start = max(int(np.searchsorted(times, times[k] - rolled)), 0)
-    push = _push(course, k, aim)
+    roll_time = _compute_roll_time(float(angular_speed[k]))
+    start = max(int(np.searchsorted(times, times[k] - roll_time)), 0)
+    push = _compute_push(path, k, direction)
     velocity = grip[start] + ROLLS_WITH * (tips[k] - tips[start])
     velocity = velocity + push * float((tips[k] - velocity) @ push)
-    position = course.place(PAD)[k] + radius * push
-    time_sigma = float(np.hypot(max(TIME_SIGMA, 0.5 * rolled), 0.3 / hand.fps))
+    position = path.places_at(PAD)[k] + radius * push
+    time_sigma = float(np.hypot(max(TIME_SIGMA, 0.5 * roll_time), 0.3 / hand.fps))
     return HandRelease(time=float(times[k]), position=position, velocity=velocity, time_sigma=time_sigma,
                        speed_sigma=SPEED_SIGMA * float(np.linalg.norm(velocity)),
-                       way_sigma=_swept(grip[_about(times, start, time_sigma)]), rolled=float(rolled))  # fmt: skip
+                       direction_sigma=_compute_sweep(grip[_select_around(times, start, time_sigma)]), roll_time=float(roll_time))  # fmt: skip
 
 
-def _roll(turning: float) -> float:
+def _compute_roll_time(angular_speed: float) -> float:
     """Compute the s that a ball needs along the fingers of a hand that rotates by `angular_speed` rad/s."""
-    return float(np.arccosh(PAD / HOLD)) / max(turning, 5.0)
+    return float(np.arccosh(PAD / HOLD)) / max(angular_speed, 5.0)
 
 
-def _wrist(course: _Course, gripped: int, roll: float) -> int:
+def _find_wrist_peak(path: _HandPath, gripped: int, roll: float) -> int:
     """Find when the wrist is fastest before the ball in the hand is, as an index of the path's times.
 
     The first peak is taken: the arm swings on after a throw, and the wrist may be as fast again.
     """
-    first, end = np.searchsorted(course.times, course.times[gripped] + [-_EARLIER * roll, _AFTER])
+    first, end = np.searchsorted(path.times, path.times[gripped] + [-_MAX_WRIST_LEAD * roll, _MAX_WRIST_LAG])
     first = int(min(first, gripped))
-    speed = _length(course.velocity(0.0)[first : max(int(end), first + 1)])
+    speed = _compute_lengths(path.velocities_at(0.0)[first : max(int(end), first + 1)])
     falls = np.append(np.diff(speed) <= 0.0, True)
-    return first + int(np.argmax(falls & (speed >= _NEARLY * speed.max())))
+    return first + int(np.argmax(falls & (speed >= _PEAK_SHARE * speed.max())))
 
 
-class _Course:
+class _HandPath:
     """Wrist and fingers between the frames: places and velocities of points along the stretched hand."""
 
     def __init__(self, hand: Hand):
         from scipy.interpolate import CubicSpline
         from scipy.signal import savgol_filter
 
-        window = max(2 * int(round(0.5 * _SMOOTH * hand.fps)) + 1, 3)
-        tip = hand.carried(hand.finger * hand.reach)
-        wrist, tip = _filled(hand.origin), _filled(tip)
+        window = max(2 * int(round(0.5 * _SMOOTHING_SECONDS * hand.fps)) + 1, 3)
+        tip = hand.to_world(hand.finger * hand.reach)
+        wrist, tip = _fill_gaps(hand.origin), _fill_gaps(tip)
         if len(hand) > window:
             wrist, tip = (savgol_filter(points, window, 2, axis=0) for points in (wrist, tip))
         frames = np.arange(len(hand)) / hand.fps
-        self.times = np.arange((len(hand) - 1) * _FINE + 1) / (hand.fps * _FINE)
+        self.times = np.arange((len(hand) - 1) * _STEPS_PER_FRAME + 1) / (hand.fps * _STEPS_PER_FRAME)
         self._wrist, self._tip = CubicSpline(frames, wrist), CubicSpline(frames, tip)
         self._at, self._moves = self._wrist(self.times), self._wrist(self.times, 1)
         self._arm, arm_moves = self._tip(self.times) - self._at, self._tip(self.times, 1) - self._moves
-        along = self._arm / np.maximum(_length(self._arm), 1e-9)[:, None]
+        along = self._arm / np.maximum(_compute_lengths(self._arm), 1e-9)[:, None]
         self._swing = arm_moves - along * np.sum(arm_moves * along, axis=-1)[:, None]
-        self.turn = self._swing / np.maximum(_length(self._arm), 1e-9)[:, None]
+        self.angular_velocity = self._swing / np.maximum(_compute_lengths(self._arm), 1e-9)[:, None]
 
-    def fastest(self, share: float, frame: int) -> int:
+    def find_fastest(self, share: float, frame: int) -> int:
         """Find the index of the time at which the point at `share` is fastest, near a frame."""
-        near = _about(self.times, frame * _FINE, _NEAR)
-        return near.start + int(np.argmax(_length(self.velocity(share)[near])))
+        near = _select_around(self.times, frame * _STEPS_PER_FRAME, _SEARCH_SECONDS)
+        return near.start + int(np.argmax(_compute_lengths(self.velocities_at(share)[near])))
 
-    def frame(self, k: int) -> int:
+    def frame_at(self, k: int) -> int:
         """Return the frame nearest to one of the times."""
-        return int(round(k / _FINE))
+        return int(round(k / _STEPS_PER_FRAME))
 
-    def place(self, share: float) -> np.ndarray:
+    def places_at(self, share: float) -> np.ndarray:
         """Return the point at `share` of the length from wrist to fingertip, (N, 3) metres."""
         return self._at + share * self._arm
 
-    def velocity(self, share: float) -> np.ndarray:
+    def velocities_at(self, share: float) -> np.ndarray:
         """Return the velocity of that point for a rigid hand, (N, 3) m/s."""
         return self._moves + share * self._swing
 
 
-def _aim(course: _Course, tips: np.ndarray, wrist: int, last: int, stride: np.ndarray | None) -> np.ndarray:
+def _estimate_direction(path: _HandPath, tips: np.ndarray, wrist: int, last: int, stride: np.ndarray | None) -> np.ndarray:
     """Estimate the direction of the throw, unit (3,): from the fingers' path while they are fast, level also from
     the stride.
     """
-    speed = _length(tips)
+    speed = _compute_lengths(tips)
     peak = wrist + int(np.argmax(speed[wrist : last + 1]))
     first = peak
-    while first > 0 and speed[first - 1] > _ACCELERATES * speed[peak]:
+    while first > 0 and speed[first - 1] > _FAST_SHARE * speed[peak]:
         first -= 1
-    way = course.place(PAD)[peak] - course.place(PAD)[first]
-    way = tips[peak] if np.linalg.norm(way) < 1e-6 else way
-    way = way / np.linalg.norm(way)
-    level, rise = float(np.hypot(way[0], way[1])), float(np.arcsin(np.clip(way[2], -1.0, 1.0)))
-    rise = np.sign(rise) * max(abs(rise) - _ARC, 0.0)
+    direction = path.places_at(PAD)[peak] - path.places_at(PAD)[first]
+    direction = tips[peak] if np.linalg.norm(direction) < 1e-6 else direction
+    direction = direction / np.linalg.norm(direction)
+    level, rise = float(np.hypot(direction[0], direction[1])), float(np.arcsin(np.clip(direction[2], -1.0, 1.0)))
+    rise = np.sign(rise) * max(abs(rise) - _IGNORED_RISE, 0.0)
     if level < 0.3:
-        return way
-    heading = way[:2] / level
-    at = np.zeros(2) if stride is None else stride[course.frame(wrist)]
+        return direction
+    heading = direction[:2] / level
+    at = np.zeros(2) if stride is None else stride[path.frame_at(wrist)]
     size = float(np.linalg.norm(at))
-    if size > _LEAST_STEP and abs(at @ heading) > 0.5 * size:
+    if size > _MIN_STRIDE and abs(at @ heading) > 0.5 * size:
         heading = heading + at * (np.sign(at @ heading) / size)
         heading = heading / np.linalg.norm(heading)
     return np.append(heading * np.cos(rise), np.sin(rise))
 
 
-def _push(course: _Course, k: int, aim: np.ndarray) -> np.ndarray:
+def _compute_push(path: _HandPath, k: int, direction: np.ndarray) -> np.ndarray:
     """Compute the direction of the push, unit (3,): the fingers' swing, or `direction` if they do not swing."""
-    push = course.turn[k]
+    push = path.angular_velocity[k]
     size = np.linalg.norm(push)
-    return aim if size < 1.0 or push @ aim < 0.5 * size else push / size
+    return direction if size < 1.0 or push @ direction < 0.5 * size else push / size
 
 
-def _swept(velocities: np.ndarray) -> float:
+def _compute_sweep(velocities: np.ndarray) -> float:
     """Compute half the angle in rad between the first and the last of velocities (N, 3)."""
     first, last = velocities[0], velocities[-1]
     size = max(float(np.linalg.norm(first) * np.linalg.norm(last)), 1e-9)
     return 0.5 * float(np.arccos(np.clip(first @ last / size, -1.0, 1.0)))
 
 
-def _about(times: np.ndarray, k: int, seconds: float) -> slice:
+def _select_around(times: np.ndarray, k: int, seconds: float) -> slice:
     return slice(*np.searchsorted(times, [times[k] - seconds, times[k] + seconds + 1e-9]).tolist())
 
 
-def _length(vectors: np.ndarray) -> np.ndarray:
+def _compute_lengths(vectors: np.ndarray) -> np.ndarray:
     return np.sqrt(np.einsum("...i,...i->...", vectors, vectors))
 
 
-def _filled(points: np.ndarray) -> np.ndarray:
+def _fill_gaps(points: np.ndarray) -> np.ndarray:
     """Return points (T, 3) with gaps interpolated linearly."""
     known = np.isfinite(points).all(axis=-1)
     if known.all():
         return points
     at = np.arange(len(points))
-    return interpolate(at, at[known], points[known])
+    return interpolate_columns(at, at[known], points[known])

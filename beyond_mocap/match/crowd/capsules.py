@@ -13,14 +13,14 @@ from functools import lru_cache
 
 import numpy as np
 
-from ...motion.humanoid import identify, stature
+from ...motion.humanoid import identify_joints, estimate_stature
 from ...motion.motion import Motion, forward_kinematics
 from ...motion.skeleton import Skeleton
 
-HEAD = 0.10, 0.095
+HEAD_LENGTH_AND_RADIUS = 0.10, 0.095
 """m at a stature of 1.80 m: from the head's joint to the end of its line, and its radius."""
 
-HAND = 0.09
+HAND_LENGTH = 0.09
 """m by which the forearm's line extends into the hand."""
 
 RADII = {
@@ -29,10 +29,10 @@ RADII = {
 }
 """m at a stature of 1.80 m."""
 
-FAR = 2.5
+CONTACT_DISTANCE = 2.5
 """m between the middles of two bodies' hips: farther apart they cannot touch."""
 
-_TALL = 1.80  # m, the stature the radii are given for
+_STATURE = 1.80  # m, the stature the radii are given for
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class Capsule:
     along: tuple[float, float] = (0.0, 0.0)
 
 
-def capsules(skeleton: Skeleton) -> tuple[Capsule, ...]:
+def build_capsules(skeleton: Skeleton) -> tuple[Capsule, ...]:
     """Build the capsules of a body.
 
     Args:
@@ -68,10 +68,10 @@ def capsules(skeleton: Skeleton) -> tuple[Capsule, ...]:
     Raises:
         InputError: if the skeleton has no legs.
     """
-    return _capsules(_Same(skeleton))
+    return _build_cached_capsules(_SkeletonKey(skeleton))
 
 
-class _Same:
+class _SkeletonKey:
     """A skeleton that compares by its fingerprint, so that results can be cached."""
 
     def __init__(self, skeleton: Skeleton):
@@ -85,21 +85,21 @@ class _Same:
 
 
 @lru_cache(maxsize=64)
-def _capsules(same: _Same) -> tuple[Capsule, ...]:
-    body, size = identify(same.skeleton), stature(same.skeleton) / _TALL
+def _build_cached_capsules(key: _SkeletonKey) -> tuple[Capsule, ...]:
+    body, size = identify_joints(key.skeleton), estimate_stature(key.skeleton) / _STATURE
     radius = {part: size * value for part, value in RADII.items()}
     top = body.neck_or_chest
     found = [Capsule(body.left.upper_leg, body.right.upper_leg, radius["hips"])]
     if top != body.hips:
         found.append(Capsule(body.hips, top, radius["spine"]))
     if body.head is not None and top != body.head:
-        found.append(Capsule(top, body.head, size * HEAD[1], size * HEAD[0]))
+        found.append(Capsule(top, body.head, size * HEAD_LENGTH_AND_RADIUS[1], size * HEAD_LENGTH_AND_RADIUS[0]))
     if body.left.upper_arm is not None and body.right.upper_arm is not None:
         found.append(Capsule(body.left.upper_arm, body.right.upper_arm, radius["shoulders"]))
     for side, limb in enumerate((body.left, body.right)):
         if None not in (limb.upper_arm, limb.lower_arm, limb.hand):
             found.append(Capsule(limb.upper_arm, limb.lower_arm, radius["upper_arm"], limb="arm", side=side))
-            found.append(Capsule(limb.lower_arm, limb.hand, radius["lower_arm"], size * HAND, limb="arm", side=side))
+            found.append(Capsule(limb.lower_arm, limb.hand, radius["lower_arm"], size * HAND_LENGTH, limb="arm", side=side))
         leg = [(limb.upper_leg, limb.lower_leg, "upper_leg", (0.0, 0.5)),
                (limb.lower_leg, limb.foot, "lower_leg", (0.5, 1.0)), (limb.foot, limb.toe, "foot", (1.0, 1.0))]
         for start, end, part, along in leg if limb.toe is not None else leg[:2]:
@@ -107,7 +107,7 @@ def _capsules(same: _Same) -> tuple[Capsule, ...]:
     return tuple(found)
 
 
-def lines(motion: Motion) -> np.ndarray:
+def compute_capsule_lines(motion: Motion) -> np.ndarray:
     """Compute both ends of every capsule's line.
 
     Args:
@@ -115,15 +115,15 @@ def lines(motion: Motion) -> np.ndarray:
     Returns:
         (T, C, 2, 3) m, world frame.
     """
-    parts, places = capsules(motion.skeleton), forward_kinematics(motion)[0]
+    parts, places = build_capsules(motion.skeleton), forward_kinematics(motion)[0]
     start, end = (places[:, [getattr(part, name) for part in parts]] for name in ("start", "end"))
-    way = end - start
-    length = np.maximum(np.linalg.norm(way, axis=-1, keepdims=True), 1e-9)
-    return np.stack([start, end + way / length * np.array([part.beyond for part in parts])[:, None]], axis=2)
+    offset = end - start
+    length = np.maximum(np.linalg.norm(offset, axis=-1, keepdims=True), 1e-9)
+    return np.stack([start, end + offset / length * np.array([part.beyond for part in parts])[:, None]], axis=2)
 
 
 @dataclass(frozen=True, eq=False)
-class Touching:
+class CapsuleContacts:
     """K pairs of capsules that overlap or nearly do.
 
     Attributes:
@@ -142,16 +142,16 @@ class Touching:
     other: np.ndarray
     depth: np.ndarray
     radii: np.ndarray
-    away: np.ndarray
-    at_one: np.ndarray
-    at_other: np.ndarray
+    direction: np.ndarray
+    share_one: np.ndarray
+    share_other: np.ndarray
 
-    def rows(self, kept: np.ndarray) -> Touching:
+    def select_rows(self, rows: np.ndarray) -> CapsuleContacts:
         """Select some of the pairs by their indices."""
-        return Touching(*(getattr(self, field.name)[kept] for field in fields(self)))
+        return CapsuleContacts(*(getattr(self, field.name)[rows] for field in fields(self)))
 
 
-def touching(one: np.ndarray, other: np.ndarray, radii: tuple[np.ndarray, ...], least: float = 0.0) -> Touching:
+def find_capsule_contacts(one: np.ndarray, other: np.ndarray, radii: tuple[np.ndarray, ...], min_depth: float = 0.0) -> CapsuleContacts:
     """Find where the capsules of two bodies overlap by at least `min_depth`.
 
     Args:
@@ -162,22 +162,22 @@ def touching(one: np.ndarray, other: np.ndarray, radii: tuple[np.ndarray, ...], 
     Returns:
         The pairs.
     """
-    off = one[:, 0].sum(axis=1) - other[:, 0].sum(axis=1)
-    near = np.flatnonzero(np.einsum("tk,tk->t", off, off) < (2.0 * FAR) ** 2)
+    offset = one[:, 0].sum(axis=1) - other[:, 0].sum(axis=1)
+    near = np.flatnonzero(np.einsum("tk,tk->t", offset, offset) < (2.0 * CONTACT_DISTANCE) ** 2)
     # Two cheap filters before the exact distance: hips far apart, then spheres around the lines.
-    frame, a, b = np.nonzero(_balls_meet(one[near], other[near], radii[0][:, None] + radii[1] - least))
+    frame, a, b = np.nonzero(_has_near_spheres(one[near], other[near], radii[0][:, None] + radii[1] - min_depth))
     frame = near[frame]
-    off, at_a, at_b = nearest(one[frame, a], other[frame, b])
-    far = np.linalg.norm(off, axis=1)
+    offset, at_a, at_b = find_nearest_points(one[frame, a], other[frame, b])
+    distance = np.linalg.norm(offset, axis=1)
     both = radii[0][a] + radii[1][b]
-    depth = both - far
-    keep = np.flatnonzero(depth >= least)
-    away = off[keep] / np.maximum(far[keep], 1e-9)[:, None]
-    return Touching(frame[keep], a[keep], b[keep], depth=depth[keep], radii=both[keep], away=away, at_one=at_a[keep],
-                    at_other=at_b[keep])
+    depth = both - distance
+    keep = np.flatnonzero(depth >= min_depth)
+    direction = offset[keep] / np.maximum(distance[keep], 1e-9)[:, None]
+    return CapsuleContacts(frame[keep], a[keep], b[keep], depth=depth[keep], radii=both[keep], direction=direction, share_one=at_a[keep],
+                    share_other=at_b[keep])
 
 
-def _balls_meet(one: np.ndarray, other: np.ndarray, reach: np.ndarray) -> np.ndarray:
+def _has_near_spheres(one: np.ndarray, other: np.ndarray, reach: np.ndarray) -> np.ndarray:
     """Say (T, C, D) bool whether the spheres around two lines, enlarged by `reach` (C, D) m together, meet."""
     (a, half_a), (b, half_b) = (
         (0.5 * (ends[:, :, 0] + ends[:, :, 1]), 0.5 * np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2))
@@ -187,7 +187,7 @@ def _balls_meet(one: np.ndarray, other: np.ndarray, reach: np.ndarray) -> np.nda
     return square <= (half_a[:, :, None] + half_b[:, None] + reach) ** 2
 
 
-def nearest(one: np.ndarray, other: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def find_nearest_points(one: np.ndarray, other: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Find where straight lines are nearest to each other.
 
     Args:

@@ -23,9 +23,9 @@ from ...base.errors import InputError
 from ...base.vectors import unit_vectors
 from ...motion import limb as two_bones
 from ...motion import quaternion
-from ...motion.humanoid import Limb, identify
-from ...motion.motion import Motion, pose_kinematics
-from ...motion.skeleton import Skeleton, frozen_array
+from ...motion.humanoid import Limb, identify_joints
+from ...motion.motion import Motion, compute_pose
+from ...motion.skeleton import Skeleton, freeze_array
 
 ROOT, FEET, ARMS = slice(0, 2), slice(2, 6), slice(6, 12)
 """Columns: shift (x, y) of the root, m; of the left and the right foot, m; rotation vectors of both arms, rad."""
@@ -35,13 +35,13 @@ UNIT = 1e-4
 """m and rad of a stored 1."""
 
 KNOT_SECONDS = 0.1  # s between the knots of a correction
-_NOTHING = 5e-4  # m and rad: smaller values are not visible and count as 0
+_MIN_VISIBLE = 5e-4  # m and rad: smaller values are not visible and count as 0
 
-SOFT = 0.01
+SOFT_KNEE_MARGIN = 0.01
 """m below full length, where a leg starts to ease out."""
 
-_CLEAR = 0.05  # sine of a knee's bend: below this its axis has less and less weight
-_LEAST = 0.05  # m, the least distance from hip to ankle
+_CLEAR_BEND = 0.05  # sine of a knee's bend: below this its axis has less and less weight
+_MIN_LEG_LENGTH = 0.05  # m, the least distance from hip to ankle
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +63,7 @@ class Correction:
     step: int
 
     def __post_init__(self):
-        knots, values = frozen_array(self.knots, np.int64), frozen_array(self.values, np.int16)
+        knots, values = freeze_array(self.knots, np.int64), freeze_array(self.values, np.int16)
         if knots.ndim != 1 or values.shape != (len(knots), CURVES) or np.any(np.diff(knots) < self.step):
             found = f"knots {knots.shape}, values {values.shape}"
             raise InputError("correction", found, f"(N,) rising and (N, {CURVES})")
@@ -73,12 +73,12 @@ class Correction:
         object.__setattr__(self, "values", values)
 
     @classmethod
-    def none(cls, fps: float) -> Correction:
+    def build_empty(cls, fps: float) -> Correction:
         """Build a correction that changes nothing."""
         return cls(np.zeros(0, int), np.zeros((0, CURVES), int), fps, knot_step(fps))
 
     @classmethod
-    def of(cls, curves: np.ndarray, first: int, fps: float) -> Correction:
+    def from_curves(cls, curves: np.ndarray, first: int, fps: float) -> Correction:
         """Build a correction from sampled curves.
 
         Args:
@@ -91,11 +91,11 @@ class Correction:
         step = knot_step(fps)
         at = np.arange(-(-first // step) * step, first + len(curves), step)
         values = np.round(np.clip(curves[at - first] / UNIT, -32767, 32767)).astype(np.int16)
-        some = np.abs(curves[at - first]).max(axis=1, initial=0.0) > _NOTHING
+        is_visible = np.abs(curves[at - first]).max(axis=1, initial=0.0) > _MIN_VISIBLE
         # A knot next to a visible one is stored as 0: pieces start and end there.
-        kept = some | np.append(some[1:], False) | np.append(False, some[:-1])
-        values[~some] = 0
-        return cls(at[kept], values[kept], fps, step)
+        stored = is_visible | np.append(is_visible[1:], False) | np.append(False, is_visible[:-1])
+        values[~is_visible] = 0
+        return cls(at[stored], values[stored], fps, step)
 
     def pieces(self) -> list[tuple[int, int]]:
         """(first, end) knot indices of each piece."""
@@ -119,7 +119,7 @@ def knot_step(fps: float) -> int:
     return max(1, round(KNOT_SECONDS * fps))
 
 
-def applied(motion: Motion, correction: Correction, first: int = 0) -> Motion:
+def apply_correction(motion: Motion, correction: Correction, first: int = 0) -> Motion:
     """Apply a correction to a motion.
 
     Bone lengths stay, flat feet stay flat, and frames without correction keep every bit. Each frame is corrected on its
@@ -136,31 +136,31 @@ def applied(motion: Motion, correction: Correction, first: int = 0) -> Motion:
     """
     if abs(motion.fps - correction.fps) > 1e-9:
         raise InputError("correction", f"{correction.fps:g} frames per second", f"{motion.fps:g}, the motion's rate")
-    return carried(motion, correction.curves(first, len(motion)))
+    return apply_curves(motion, correction.curves(first, len(motion)))
 
 
-def carried(motion: Motion, curves: np.ndarray) -> Motion:
+def apply_curves(motion: Motion, curves: np.ndarray) -> Motion:
     """Apply correction curves (T, 12), m and rad, to a motion of T frames."""
-    moved = np.flatnonzero(curves.any(axis=1))
-    if not len(moved):
+    affected = np.flatnonzero(curves.any(axis=1))
+    if not len(affected):
         return motion
-    skeleton, body, own = motion.skeleton, identify(motion.skeleton), curves[moved]
+    skeleton, body, values = motion.skeleton, identify_joints(motion.skeleton), curves[affected]
     root, rotations = np.array(motion.root_positions), np.array(motion.rotations)
-    places, world = pose_kinematics(skeleton, root[moved], rotations[moved])
-    root[moved, :2] += own[:, ROOT]
+    places, world = compute_pose(skeleton, root[affected], rotations[affected])
+    root[affected, :2] += values[:, ROOT]
     for side, limb in enumerate((body.left, body.right)):
-        against = own[:, FEET].reshape(-1, 2, 2)[:, side] - own[:, ROOT]
-        turned = leg_moved(skeleton, limb, places, world, np.column_stack([against, np.zeros(len(moved))]))
-        turn = own[:, ARMS].reshape(-1, 2, 3)[:, side]
-        if limb.upper_arm is not None and turn.any():
-            upper = quaternion.multiply(quaternion.from_rotation_vector(turn), world[:, limb.upper_arm])
-            turned[limb.upper_arm] = in_parent(skeleton, world, limb.upper_arm, upper)
-        for joint, local in turned.items():
-            rotations[moved, joint] = quaternion.signed_like(local, rotations[moved, joint])
+        foot_shift = values[:, FEET].reshape(-1, 2, 2)[:, side] - values[:, ROOT]
+        new_rotations = move_leg(skeleton, limb, places, world, np.column_stack([foot_shift, np.zeros(len(affected))]))
+        arm_rotation = values[:, ARMS].reshape(-1, 2, 3)[:, side]
+        if limb.upper_arm is not None and arm_rotation.any():
+            upper = quaternion.multiply(quaternion.from_rotation_vector(arm_rotation), world[:, limb.upper_arm])
+            new_rotations[limb.upper_arm] = convert_to_parent(skeleton, world, limb.upper_arm, upper)
+        for joint, local in new_rotations.items():
+            rotations[affected, joint] = quaternion.match_signs(local, rotations[affected, joint])
     return replace(motion, root_positions=root, rotations=rotations)
 
 
-def joined(parts: Sequence[tuple[Correction, int, int]], reach: int) -> Correction:
+def join_corrections(parts: Sequence[tuple[Correction, int, int]], reach: int) -> Correction:
     """Join the corrections of neighbouring windows.
 
     Around an edge between two cores, one blends into the other within 2 `reach` frames.
@@ -187,7 +187,7 @@ def joined(parts: Sequence[tuple[Correction, int, int]], reach: int) -> Correcti
     return Correction(knots, values, fps, step)
 
 
-def leg_moved(
+def move_leg(
     skeleton: Skeleton, limb: Limb, places: np.ndarray, world: np.ndarray, shift: np.ndarray
 ) -> dict[int, np.ndarray]:
     """Move the ankle relative to the hip; the foot keeps its rotation in the world.
@@ -204,35 +204,35 @@ def leg_moved(
     hip, knee, ankle = (places[:, joint] for joint in (limb.upper_leg, limb.lower_leg, limb.foot))
     thigh, shin, line = knee - hip, ankle - knee, ankle - hip
     lengths, goal = (np.linalg.norm(thigh, axis=1), np.linalg.norm(shin, axis=1)), line + shift
-    own, wanted = np.linalg.norm(line, axis=1), np.linalg.norm(goal, axis=1)
+    distance, goal_distance = np.linalg.norm(line, axis=1), np.linalg.norm(goal, axis=1)
     # Ease near full length, relative to the given pose: no shift changes nothing.
-    eased = [two_bones.soft_distance(length, lengths[0] + lengths[1], SOFT) for length in (own, wanted)]
-    reach = np.clip(own + eased[1] - eased[0], _LEAST, lengths[0] + lengths[1])
-    opened = two_bones.inner_angle(*lengths, reach) - two_bones.inner_angle(*lengths, own)
+    eased = [two_bones.soften_distance(length, lengths[0] + lengths[1], SOFT_KNEE_MARGIN) for length in (distance, goal_distance)]
+    reach = np.clip(distance + eased[1] - eased[0], _MIN_LEG_LENGTH, lengths[0] + lengths[1])
+    knee_change = two_bones.compute_inner_angle(*lengths, reach) - two_bones.compute_inner_angle(*lengths, distance)
     toes = places[:, limb.toe_or_foot] - ankle if limb.toe is not None else np.zeros(line.shape)
-    bend = quaternion.about_axis(_hinge(thigh, shin, line, toes), -opened)
-    swing = quaternion.between(thigh + quaternion.rotate(bend, shin), goal)
+    bend = quaternion.from_axis_angle(_find_knee_axis(thigh, shin, line, toes), -knee_change)
+    swing = quaternion.rotation_between(thigh + quaternion.rotate(bend, shin), goal)
     lower = quaternion.multiply(bend, world[:, limb.lower_leg])
-    carried = quaternion.multiply(swing, quaternion.multiply(bend, world[:, skeleton.parents[limb.foot]]))
+    foot_parent = quaternion.multiply(swing, quaternion.multiply(bend, world[:, skeleton.parents[limb.foot]]))
     upper = quaternion.multiply(swing, world[:, limb.upper_leg])
     return {
-        limb.upper_leg: in_parent(skeleton, world, limb.upper_leg, upper),
-        limb.lower_leg: in_parent(skeleton, world, limb.lower_leg, lower),
-        limb.foot: quaternion.multiply(quaternion.inverse(carried), world[:, limb.foot]),
+        limb.upper_leg: convert_to_parent(skeleton, world, limb.upper_leg, upper),
+        limb.lower_leg: convert_to_parent(skeleton, world, limb.lower_leg, lower),
+        limb.foot: quaternion.multiply(quaternion.inverse(foot_parent), world[:, limb.foot]),
     }
 
 
-def in_parent(skeleton: Skeleton, world: np.ndarray, joint: int, turned: np.ndarray) -> np.ndarray:
+def convert_to_parent(skeleton: Skeleton, world: np.ndarray, joint: int, rotation: np.ndarray) -> np.ndarray:
     """Convert a joint's world rotations (W, 4) to its parent's frame."""
-    return quaternion.multiply(quaternion.inverse(world[:, skeleton.parents[joint]]), turned)
+    return quaternion.multiply(quaternion.inverse(world[:, skeleton.parents[joint]]), rotation)
 
 
-def _hinge(thigh: np.ndarray, shin: np.ndarray, line: np.ndarray, toes: np.ndarray) -> np.ndarray:
+def _find_knee_axis(thigh: np.ndarray, shin: np.ndarray, line: np.ndarray, toes: np.ndarray) -> np.ndarray:
     """Find the axis (W, 3), unit, about which a positive rotation bends the knee further."""
     bones = np.linalg.norm(thigh, axis=1) * np.linalg.norm(shin, axis=1)
-    shows = np.cross(thigh, shin) / bones[:, None]
+    axis = np.cross(thigh, shin) / bones[:, None]
     across = unit_vectors(np.cross(toes, line), np.array([0.0, 1.0, 0.0]))
-    share = np.clip(np.linalg.norm(shows, axis=1, keepdims=True) / _CLEAR, 0.0, 1.0)
-    mixed = share * unit_vectors(shows, across) + (1.0 - share) * across
+    share = np.clip(np.linalg.norm(axis, axis=1, keepdims=True) / _CLEAR_BEND, 0.0, 1.0)
+    mixed = share * unit_vectors(axis, across) + (1.0 - share) * across
     down = unit_vectors(line, across)
     return unit_vectors(mixed - np.sum(mixed * down, axis=1, keepdims=True) * down, across)

@@ -14,27 +14,27 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...base.banded_least_squares import BandedLeastSquares
-from ...base.vectors import cross
+from ...base.vectors import cross_product
 from ...motion import quaternion
 from .capsules import Capsule
 from .correction import ARMS, FEET, ROOT
 
-STAY, SECONDS = 0.003, 0.3
+SHIFT_WEIGHT, SHIFT_SECONDS = 0.003, 0.3
 """Weight of the root's shift, and s in which it fades in and out."""
 
-FOOT_NEAR, FOOT_STANDS, FOOT_SECONDS = 0.01, 300.0, 0.12
+FOOT_ROOT_WEIGHT, FOOT_SPEED_WEIGHT, FOOT_SECONDS = 0.01, 300.0, 0.12
 """Weights of a foot's shift relative to its root's and of its speed in contact (per frame at 30 per second); s in which
 the shift fades in and out."""
 
-ARM_STAY, ARM_SECONDS, MOST_TURN = 5e-4, 0.15, 1.1
+ARM_WEIGHT, ARM_SECONDS, MAX_ARM_ANGLE = 5e-4, 0.15, 1.1
 """Weight of an arm's rotation, s in which it fades in and out, and its largest angle, rad."""
 
-BASE = 30.0
+BASE_FPS = 30.0
 """Frames per second the weights are given for."""
 
-_SHORT_ARM = 0.08  # m from the rotation axis: on a shorter lever, rotating an arm does not separate bodies
-_UPRIGHT = 0.35  # least share of a push that counts as horizontal
-_HELD = 1e6  # weight that fixes a value: far above all others
+_MIN_LEVER = 0.08  # m from the rotation axis: on a shorter lever, rotating an arm does not separate bodies
+_MIN_LEVEL_SHARE = 0.35  # least share of a push that counts as horizontal
+_HOLD_WEIGHT = 1e6  # weight that fixes a value: far above all others
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,9 +51,9 @@ class CrowdBody:
 
     parts: tuple[Capsule, ...]
     lines: np.ndarray
-    bent: np.ndarray
-    stands: np.ndarray
-    firm: np.ndarray
+    bend_offset: np.ndarray
+    foot_contacts: np.ndarray
+    firmness: np.ndarray
 
     @property
     def radii(self) -> np.ndarray:
@@ -61,19 +61,19 @@ class CrowdBody:
         return np.array([part.radius for part in self.parts])
 
     @property
-    def there(self) -> tuple[int, int]:
+    def present_span(self) -> tuple[int, int]:
         """First frame and end of the time the body is present."""
         known = np.flatnonzero(np.isfinite(self.lines[:, 0, 0, 0]))
         return (int(known[0]), int(known[-1]) + 1) if len(known) else (0, 0)
 
-    def frames(self, low: int, high: int) -> CrowdBody:
+    def select_frames(self, low: int, high: int) -> CrowdBody:
         """Select the frames low .. high."""
-        rows = (values[low:high] for values in (self.lines, self.bent, self.stands, self.firm))
+        rows = (values[low:high] for values in (self.lines, self.bend_offset, self.foot_contacts, self.firmness))
         return CrowdBody(self.parts, *rows)
 
 
 @dataclass(frozen=True, eq=False)
-class Contact:
+class BodyContacts:
     """The K contacts of one body.
 
     Attributes:
@@ -88,14 +88,14 @@ class Contact:
 
     frame: np.ndarray
     part: np.ndarray
-    at: np.ndarray
-    place: np.ndarray
-    away: np.ndarray
-    give: np.ndarray
-    arm: np.ndarray
+    line_share: np.ndarray
+    position: np.ndarray
+    direction: np.ndarray
+    distance: np.ndarray
+    arm_distance: np.ndarray
 
 
-def moved(body: CrowdBody, curves: np.ndarray) -> np.ndarray:
+def move_capsules(body: CrowdBody, curves: np.ndarray) -> np.ndarray:
     """Move a body's capsules by curves; bones become as long as they have to be.
 
     Args:
@@ -110,15 +110,15 @@ def moved(body: CrowdBody, curves: np.ndarray) -> np.ndarray:
     for number, part in enumerate(body.parts):
         if part.limb == "arm":
             centre = pivot.setdefault(part.side, body.lines[:, number, 0])
-            turn = quaternion.from_rotation_vector(arms[:, part.side])[:, None]
-            out[:, number] = centre[:, None] + quaternion.rotate(turn, body.lines[:, number] - centre[:, None])
+            rotation = quaternion.from_rotation_vector(arms[:, part.side])[:, None]
+            out[:, number] = centre[:, None] + quaternion.rotate(rotation, body.lines[:, number] - centre[:, None])
         share = np.array(part.along)[:, None] if part.limb == "leg" else np.zeros((2, 1))
         out[:, number, :, :2] += (1.0 - share) * curves[:, None, ROOT] + share * feet[:, None, part.side]
-    return out + body.bent
+    return out + body.bend_offset
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Calm:
+class SmoothnessTerms:
     """The terms that keep a body's curves small and smooth, independent of its contacts.
 
     Attributes:
@@ -136,7 +136,7 @@ class Calm:
     arms: tuple[BandedLeastSquares, ...]
 
     @classmethod
-    def of(cls, body: CrowdBody, curves: np.ndarray, held: tuple[bool, bool], fps: float) -> Calm:
+    def from_body(cls, body: CrowdBody, curves: np.ndarray, held_ends: tuple[bool, bool], fps: float) -> SmoothnessTerms:
         """Build the terms of a body.
 
         Args:
@@ -147,19 +147,19 @@ class Calm:
         Returns:
             The terms.
         """
-        low, high = body.there
-        whole = _calm_root_and_feet(body.frames(low, high), curves[low:high], held, fps)
+        low, high = body.present_span
+        root_and_feet = _build_root_and_feet_smoothness(body.select_frames(low, high), curves[low:high], held_ends, fps)
         arms = []
         for side in (0, 1):
             arms.append(BandedLeastSquares(high - low, 3))
             for axis in range(3):
                 values = curves[low:high, ARMS.start + 3 * side + axis]
-                _calm(arms[side], axis, ARM_STAY, seconds=ARM_SECONDS, firm=body.firm[low:high], fps=fps)
-                _hold(arms[side], axis, values, held)
-        return cls(body=body, low=low, count=high - low, root_and_feet=whole, arms=tuple(arms))
+                _add_smoothness(arms[side], axis, ARM_WEIGHT, seconds=ARM_SECONDS, firmness=body.firmness[low:high], fps=fps)
+                _hold_ends(arms[side], axis, values, held_ends)
+        return cls(body=body, low=low, count=high - low, root_and_feet=root_and_feet, arms=tuple(arms))
 
 
-def solve_curves(calm: Calm, mine: Contact, curves, placed, arms_too: bool, weight: float) -> np.ndarray:
+def solve_curves(smoothness: SmoothnessTerms, contacts: BodyContacts, curves, capsule_lines, arms_too: bool, weight: float) -> np.ndarray:
     """Solve the body's curves for its share of these contacts.
 
     Args:
@@ -172,90 +172,90 @@ def solve_curves(calm: Calm, mine: Contact, curves, placed, arms_too: bool, weig
     Returns:
         (T, 12) m and rad.
     """
-    out, parts = np.array(curves), calm.body.parts
-    there = slice(calm.low, calm.low + calm.count)
-    is_arm = np.array([part.limb == "arm" for part in parts])[mine.part]
-    sides = np.array([part.side for part in parts])[mine.part]
+    out, parts = np.array(curves), smoothness.body.parts
+    span = slice(smoothness.low, smoothness.low + smoothness.count)
+    is_arm = np.array([part.limb == "arm" for part in parts])[contacts.part]
+    sides = np.array([part.side for part in parts])[contacts.part]
     for side in (0, 1):
         rows = np.flatnonzero(is_arm & (sides == side))
         if len(rows):
-            shoulder = placed[:, next(n for n, part in enumerate(parts) if part.limb == "arm" and part.side == side), 0]
+            shoulder = capsule_lines[:, next(n for n, part in enumerate(parts) if part.limb == "arm" and part.side == side), 0]
             columns = slice(ARMS.start + 3 * side, ARMS.start + 3 * side + 3)
-            out[there, columns] = _arm(calm, side, mine, rows=rows, shoulder=shoulder, turns=curves[:, columns],
+            out[span, columns] = _solve_arm(smoothness, side, contacts, rows=rows, shoulder=shoulder, rotations=curves[:, columns],
                                        weight=weight)
     whole = np.flatnonzero(~is_arm | arms_too)
-    if len(whole) or curves[there, : ARMS.start].any():
-        out[there, : ARMS.start] = _root_and_feet(calm, mine, whole, curves, weight)
+    if len(whole) or curves[span, : ARMS.start].any():
+        out[span, : ARMS.start] = _solve_root_and_feet(smoothness, contacts, whole, curves, weight)
     return out
 
 
-def _calm_root_and_feet(body: CrowdBody, curves: np.ndarray, held, fps: float) -> BandedLeastSquares:
+def _build_root_and_feet_smoothness(body: CrowdBody, curves: np.ndarray, held_ends, fps: float) -> BandedLeastSquares:
     """Build the terms of root and feet: small, smooth, feet near the root's shift and slow in contact."""
-    squares, scale = BandedLeastSquares(len(curves), ARMS.start), BASE / fps
+    squares, scale = BandedLeastSquares(len(curves), ARMS.start), BASE_FPS / fps
     for curve in range(ARMS.start):
-        _calm(squares, curve, STAY, seconds=SECONDS if curve < FEET.start else FOOT_SECONDS, firm=body.firm, fps=fps)
-        _hold(squares, curve, curves[:, curve], held)
+        _add_smoothness(squares, curve, SHIFT_WEIGHT, seconds=SHIFT_SECONDS if curve < FEET.start else FOOT_SECONDS, firmness=body.firmness, fps=fps)
+        _hold_ends(squares, curve, curves[:, curve], held_ends)
     # Unknown number of curve c at frame t: t * 6 + c. Each row couples the unknowns in its index columns.
     frames = np.arange(len(curves)) * ARMS.start
     for side in (0, 1):
-        both = (body.stands[:-1, side] & body.stands[1:, side]).astype(float)
+        both = (body.foot_contacts[:-1, side] & body.foot_contacts[1:, side]).astype(float)
         for axis in (0, 1):
             foot = FEET.start + 2 * side + axis
             near = frames[:, None] + np.array([foot, axis])
-            squares.add_rows(near, np.array([1.0, -1.0]), FOOT_NEAR * scale * body.firm)
+            squares.add_rows(near, np.array([1.0, -1.0]), FOOT_ROOT_WEIGHT * scale * body.firmness)
             step = frames[:-1, None] + np.array([foot + ARMS.start, foot])
-            squares.add_rows(step, np.array([1.0, -1.0]), FOOT_STANDS / scale * both)
+            squares.add_rows(step, np.array([1.0, -1.0]), FOOT_SPEED_WEIGHT / scale * both)
     return squares
 
 
-def _calm(squares: BandedLeastSquares, curve: int, stay: float, seconds: float, firm: np.ndarray, fps: float) -> None:
+def _add_smoothness(squares: BandedLeastSquares, curve: int, value_weight: float, seconds: float, firmness: np.ndarray, fps: float) -> None:
     """Add terms that keep a curve small, and smooth over so many seconds."""
-    squares.add_value(stay * BASE / fps * firm, curve)
-    squares.add_smoothness(stay * BASE / fps * (seconds * fps) ** 6 * firm, curve)
+    squares.add_value(value_weight * BASE_FPS / fps * firmness, curve)
+    squares.add_smoothness(value_weight * BASE_FPS / fps * (seconds * fps) ** 6 * firmness, curve)
 
 
-def _hold(squares: BandedLeastSquares, curve: int, values: np.ndarray, held) -> None:
+def _hold_ends(squares: BandedLeastSquares, curve: int, values: np.ndarray, held_ends) -> None:
     """Hold a curve's first and last two frames at their values, where `held_ends` is set."""
-    for ends, which in ((slice(0, 2), held[0]), (slice(-2, None), held[1])):
+    for ends, which in ((slice(0, 2), held_ends[0]), (slice(-2, None), held_ends[1])):
         if which:
             index = (np.arange(squares.count) * squares.unknowns + curve)[ends, None]
-            squares.add_rows(index, np.ones(1), np.full(len(index), _HELD), values[ends])
+            squares.add_rows(index, np.ones(1), np.full(len(index), _HOLD_WEIGHT), values[ends])
 
 
-def _arm(calm: Calm, side: int, mine: Contact, rows, shoulder, turns, weight: float) -> np.ndarray:
+def _solve_arm(smoothness: SmoothnessTerms, side: int, contacts: BodyContacts, rows, shoulder, rotations, weight: float) -> np.ndarray:
     """Solve the rotation vectors (W, 3) of one arm for its contacts `rows`.
 
     shoulder (T, 3) m; rotations (T, 3) rad, the rotations so far.
     """
     # A small rotation w moves the point by w x lever; along `direction` that is (lever x direction) . w.
-    row = cross(mine.place[rows] - shoulder[mine.frame[rows]], mine.away[rows])
-    long = np.linalg.norm(row, axis=1) > _SHORT_ARM
-    rows, row, squares = rows[long], row[long], calm.arms[side].copy()
-    frame = mine.frame[rows]
-    goal = np.einsum("rk,rk->r", row, turns[frame]) + mine.arm[rows]
-    squares.add_rows((frame - calm.low)[:, None] * 3 + np.arange(3), row, np.full(len(rows), weight), goal)
-    return _limited(squares.solve())
+    row = cross_product(contacts.position[rows] - shoulder[contacts.frame[rows]], contacts.direction[rows])
+    has_lever = np.linalg.norm(row, axis=1) > _MIN_LEVER
+    rows, row, squares = rows[has_lever], row[has_lever], smoothness.arms[side].copy()
+    frame = contacts.frame[rows]
+    goal = np.einsum("rk,rk->r", row, rotations[frame]) + contacts.arm_distance[rows]
+    squares.add_rows((frame - smoothness.low)[:, None] * 3 + np.arange(3), row, np.full(len(rows), weight), goal)
+    return _limit_rotation(squares.solve())
 
 
-def _limited(turns: np.ndarray) -> np.ndarray:
+def _limit_rotation(rotations: np.ndarray) -> np.ndarray:
     """Limit rotation vectors (T, 3) softly to MAX_ARM_ANGLE."""
-    size = np.maximum(np.linalg.norm(turns, axis=1, keepdims=True), 1e-9)
-    return turns * (MOST_TURN * np.tanh(size / MOST_TURN) / size)
+    size = np.maximum(np.linalg.norm(rotations, axis=1, keepdims=True), 1e-9)
+    return rotations * (MAX_ARM_ANGLE * np.tanh(size / MAX_ARM_ANGLE) / size)
 
 
-def _root_and_feet(calm: Calm, mine: Contact, rows, curves, weight: float) -> np.ndarray:
+def _solve_root_and_feet(smoothness: SmoothnessTerms, contacts: BodyContacts, rows, curves, weight: float) -> np.ndarray:
     """Solve the first six curves (W, 6) for the contacts `rows`."""
-    parts, frame, part = calm.body.parts, mine.frame[rows], mine.part[rows]
+    parts, frame, part = smoothness.body.parts, contacts.frame[rows], contacts.part[rows]
     side = np.array([p.side for p in parts])[part]
     ends = np.array([p.along if p.limb == "leg" else (0.0, 0.0) for p in parts])[part]
     # How far down the leg the contact is: the foot's shift counts by this share, the root's by the rest.
-    share = (ends[:, 0] + mine.at[rows] * (ends[:, 1] - ends[:, 0]))[:, None]
-    push = mine.away[rows, :2]
+    share = (ends[:, 0] + contacts.line_share[rows] * (ends[:, 1] - ends[:, 0]))[:, None]
+    push = contacts.direction[rows, :2]
     size = np.maximum(np.linalg.norm(push, axis=1, keepdims=True), 1e-9)
-    push = push * (np.maximum(size, _UPRIGHT) / size)
+    push = push * (np.maximum(size, _MIN_LEVEL_SHARE) / size)
     columns = np.stack([0 * side, 0 * side + 1, FEET.start + 2 * side, FEET.start + 2 * side + 1], axis=1)
     values = np.concatenate([(1.0 - share) * push, share * push], axis=1)
-    goal = np.einsum("rk,rk->r", values, curves[frame[:, None], columns]) + mine.give[rows]
-    squares = calm.root_and_feet.copy()
-    squares.add_rows((frame - calm.low)[:, None] * ARMS.start + columns, values, np.full(len(rows), weight), goal)
+    goal = np.einsum("rk,rk->r", values, curves[frame[:, None], columns]) + contacts.distance[rows]
+    squares = smoothness.root_and_feet.copy()
+    squares.add_rows((frame - smoothness.low)[:, None] * ARMS.start + columns, values, np.full(len(rows), weight), goal)
     return squares.solve()

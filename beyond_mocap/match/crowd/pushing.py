@@ -24,38 +24,38 @@ from dataclasses import replace
 import numpy as np
 
 from ...base.vectors import unit_vectors
-from .capsules import Touching, touching
-from .crowd_body import BASE, Calm, Contact, CrowdBody, moved, solve_curves
+from .capsules import CapsuleContacts, find_capsule_contacts
+from .crowd_body import BASE_FPS, SmoothnessTerms, BodyContacts, CrowdBody, move_capsules, solve_curves
 
-ALLOWED = 0.005
+ALLOWED_DEPTH = 0.005
 """m of overlap that is accepted."""
 
-ROOM = 0.06
+SEARCH_MARGIN = 0.06
 """m beyond the accepted overlap: closer capsules count as a contact."""
 
-INERTIA = 4.0
+SIDE_INERTIA = 4.0
 """Weight of a metre of pressure for its side, relative to a metre between two lines."""
 
 # Rounds in all, rounds in which contacts at arms move the arms alone, and the share of each step.
-_ROUNDS, _ARMS_ALONE = 24, 4
-_STEP = 0.35
-_LOOKED_OVER = 8  # rounds after which the close frames are found again
-_CLOSE, _AROUND = 0.1, 4  # m within which, and frames around which bodies are close
+_ROUNDS, _ARM_ROUNDS = 24, 4
+_STEP_SHARE = 0.35
+_SEARCH_INTERVAL = 8  # rounds after which the close frames are found again
+_NEAR_DISTANCE, _NEAR_FRAMES = 0.1, 4  # m within which, and frames around which bodies are close
 
 SIDE_SECONDS = 0.2
 """s before and after a moment within which a contact counts for the side at that moment, with falling weight."""
 
-OUTWARD = 2.0
+TRUNK_WEIGHT = 2.0
 """Weight of the direction between two trunks, relative to the side on which two capsules pass."""
 
-PRESSURE_STEP, MOST_PRESSURE = 0.2, 0.5
+PRESSURE_STEP, MAX_PRESSURE = 0.2, 0.5
 """Share of the missing distance that becomes pressure each round, and the largest pressure, m: bodies that cannot be
 separated are not thrown about."""
 
 
-def pushed(
+def solve_separation(
     bodies: Sequence[CrowdBody], pairs: Sequence[tuple[int, int]], curves: Sequence[np.ndarray],
-    pressures: Sequence[Pressure], held, fps: float, first: int = 0,
+    pressures: Sequence[Pressure], held_ends, fps: float, first: int = 0,
 ) -> list[np.ndarray]:  # fmt: skip
     """Solve the curves with which these pairs no longer overlap, where that is possible.
 
@@ -70,19 +70,19 @@ def pushed(
     Returns:
         (T, 12) per body, m and rad.
     """
-    now = [np.array(values) for values in curves]
-    calm = [Calm.of(body, own, ends, fps) for body, own, ends in zip(bodies, now, held)]
-    for turn in range(_ROUNDS):
-        placed = [moved(body, values) for body, values in zip(bodies, now)]
-        if turn % _LOOKED_OVER == 0:
-            near = [_near_frames(bodies, placed, pair) for pair in pairs]
-        contacts = _contacts(bodies, placed, pairs, near=near, pressures=pressures, first=first, fps=fps)
-        for number, mine in enumerate(contacts):
-            if len(mine.frame) and calm[number].count > 3:
-                wanted = solve_curves(calm[number], mine, now[number], placed=placed[number],
-                                      arms_too=turn >= _ARMS_ALONE, weight=BASE / fps)
-                now[number] = now[number] + _STEP * (wanted - now[number])
-    return now
+    solution = [np.array(values) for values in curves]
+    smoothness = [SmoothnessTerms.from_body(body, own, ends, fps) for body, own, ends in zip(bodies, solution, held_ends)]
+    for number in range(_ROUNDS):
+        capsule_lines = [move_capsules(body, values) for body, values in zip(bodies, solution)]
+        if number % _SEARCH_INTERVAL == 0:
+            near = [_find_near_frames(bodies, capsule_lines, pair) for pair in pairs]
+        contacts = _find_contacts(bodies, capsule_lines, pairs, near=near, pressures=pressures, first=first, fps=fps)
+        for body_index, body_contacts in enumerate(contacts):
+            if len(body_contacts.frame) and smoothness[body_index].count > 3:
+                target = solve_curves(smoothness[body_index], body_contacts, solution[body_index], capsule_lines=capsule_lines[body_index],
+                                      arms_too=number >= _ARM_ROUNDS, weight=BASE_FPS / fps)
+                solution[body_index] = solution[body_index] + _STEP_SHARE * (target - solution[body_index])
+    return solution
 
 
 class Pressure:
@@ -97,14 +97,14 @@ class Pressure:
     def __init__(self):
         self.keys, self.values, self.sides = np.zeros(0, int), np.zeros(0), np.zeros((0, 3))
 
-    def pushes(self, keys: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def find_pressures(self, keys: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Find the pressures (K,) m and sides (K, 3) of the contacts `keys` (K,)."""
         if not len(self.keys):
             return np.zeros(len(keys)), np.zeros((len(keys), 3))
         at = np.minimum(np.searchsorted(self.keys, keys), len(self.keys) - 1)
         return np.where(self.keys[at] == keys, self.values[at], 0.0), self.sides[at]
 
-    def keep(self, keys: np.ndarray, values: np.ndarray, sides: np.ndarray, span: tuple[int, int]) -> None:
+    def update_pressures(self, keys: np.ndarray, values: np.ndarray, sides: np.ndarray, span: tuple[int, int]) -> None:
         """Update the pressures of a span; other contacts in the span no longer press.
 
         Args:
@@ -114,19 +114,19 @@ class Pressure:
             span: numbers from span[0] to below span[1].
         """
         order = np.argsort(keys, kind="stable")
-        kept = order[values[order] > 0.0]
+        pressing = order[values[order] > 0.0]
         low, high = np.searchsorted(self.keys, span)
         for name, new in (("keys", keys), ("values", values), ("sides", sides)):
             old = getattr(self, name)
-            setattr(self, name, np.concatenate([old[:low], new[kept], old[high:]]))
+            setattr(self, name, np.concatenate([old[:low], new[pressing], old[high:]]))
 
 
-def pressed(before: np.ndarray, lack: np.ndarray) -> np.ndarray:
+def update_pressure(before: np.ndarray, missing: np.ndarray) -> np.ndarray:
     """Compute the new pressures (K,) m from the old (K,) m and the missing distances (K,) m."""
-    return np.clip(before + PRESSURE_STEP * lack, 0.0, MOST_PRESSURE)
+    return np.clip(before + PRESSURE_STEP * missing, 0.0, MAX_PRESSURE)
 
 
-def sides(found: Touching, before: np.ndarray, fps: float) -> np.ndarray:
+def compute_sides(found: CapsuleContacts, before: np.ndarray, fps: float) -> np.ndarray:
     """Compute the sides on which capsules pass each other.
 
     Args:
@@ -140,13 +140,13 @@ def sides(found: Touching, before: np.ndarray, fps: float) -> np.ndarray:
     reach = max(1, round(SIDE_SECONDS * fps))
     order = np.lexsort((found.frame, found.other, found.one))
     frame, one, other = found.frame[order], found.one[order], found.other[order]
-    off = (_off(found) + before)[order]
+    off = (_compute_offsets(found) + before)[order]
     total = np.array(off)
     # Sorted by capsule pair and frame, rows `step` apart are at most so many frames apart; add both ways.
     for step in range(1, min(reach, len(off))):
-        apart = frame[step:] - frame[:-step]
+        gap = frame[step:] - frame[:-step]
         same = (one[step:] == one[:-step]) & (other[step:] == other[:-step])
-        weight = np.where(same, np.maximum(1.0 - apart / reach, 0.0), 0.0)[:, None]
+        weight = np.where(same, np.maximum(1.0 - gap / reach, 0.0), 0.0)[:, None]
         total[step:] += weight * off[:-step]
         total[:-step] += weight * off[step:]
     out = np.empty_like(total)
@@ -154,7 +154,7 @@ def sides(found: Touching, before: np.ndarray, fps: float) -> np.ndarray:
     return out
 
 
-def way_out(found: Touching, side: np.ndarray, trunks: np.ndarray, allowed: float) -> tuple[np.ndarray, np.ndarray]:
+def compute_separation(found: CapsuleContacts, side: np.ndarray, trunks: np.ndarray, allowed: float) -> tuple[np.ndarray, np.ndarray]:
     """Compute in which direction and how far the one has to move.
 
     Args:
@@ -167,73 +167,73 @@ def way_out(found: Touching, side: np.ndarray, trunks: np.ndarray, allowed: floa
         Directions (K, 3), unit, and distances (K,) m, negative where there is room.
     """
     out = trunks[found.frame] * np.array([1.0, 1.0, 0.0])
-    way = unit_vectors(side + OUTWARD * unit_vectors(out))
-    off = _off(found)
-    along = np.einsum("kc,kc->k", way, off)
+    direction = unit_vectors(side + TRUNK_WEIGHT * unit_vectors(out))
+    offset = _compute_offsets(found)
+    along = np.einsum("kc,kc->k", direction, offset)
     # Solve |offset + distance * direction| = radii - allowed for the distance.
-    square = along**2 + (found.radii - allowed) ** 2 - np.einsum("kc,kc->k", off, off)
-    return way, np.sqrt(np.maximum(square, 0.0)) - along
+    square = along**2 + (found.radii - allowed) ** 2 - np.einsum("kc,kc->k", offset, offset)
+    return direction, np.sqrt(np.maximum(square, 0.0)) - along
 
 
-def _near_frames(bodies, placed, pair: tuple[int, int]) -> np.ndarray:
+def _find_near_frames(bodies, capsule_lines, pair: tuple[int, int]) -> np.ndarray:
     """Find the frames at which two bodies are within _NEAR_DISTANCE, and _NEAR_FRAMES around them."""
     one, other = pair
-    found = touching(placed[one], placed[other], (bodies[one].radii, bodies[other].radii), -_CLOSE).frame
-    near = np.zeros(len(placed[pair[0]]) + 2 * _AROUND, bool)
-    for step in range(2 * _AROUND + 1):
+    found = find_capsule_contacts(capsule_lines[one], capsule_lines[other], (bodies[one].radii, bodies[other].radii), -_NEAR_DISTANCE).frame
+    near = np.zeros(len(capsule_lines[pair[0]]) + 2 * _NEAR_FRAMES, bool)
+    for step in range(2 * _NEAR_FRAMES + 1):
         near[found + step] = True
-    return np.flatnonzero(near[_AROUND:-_AROUND])
+    return np.flatnonzero(near[_NEAR_FRAMES:-_NEAR_FRAMES])
 
 
-def _contacts(bodies, placed, pairs, near, pressures, first: int, fps: float) -> list[Contact]:
+def _find_contacts(bodies, capsule_lines, pairs, near, pressures, first: int, fps: float) -> list[BodyContacts]:
     """Find the contacts of every body with all others, at the frames `near` of each pair."""
     rows: list[list[tuple]] = [[] for _ in bodies]
     for (one, other), frames, pressure in zip(pairs, near, pressures):
-        two = placed[one], placed[other]
+        two = capsule_lines[one], capsule_lines[other]
         radii = bodies[one].radii, bodies[other].radii
-        found = touching(two[0][frames], two[1][frames], radii, ALLOWED - ROOM)
+        found = find_capsule_contacts(two[0][frames], two[1][frames], radii, ALLOWED_DEPTH - SEARCH_MARGIN)
         found = replace(found, frame=frames[found.frame])
-        found, way, give = _pressing(found, two, pressure, first, fps)
+        found, direction, distance = _select_pressing(found, two, pressure, first, fps)
         for body, against, sign in ((one, other, 1.0), (other, one, -1.0)):
-            rows[body].append(_share(found, sign * way, give, bodies=bodies, placed=placed, pair=(body, against),
+            rows[body].append(_build_body_contacts(found, sign * direction, distance, bodies=bodies, capsule_lines=capsule_lines, pair=(body, against),
                                      is_one=sign > 0.0))
     empty = (np.zeros(0, int),) * 2 + (np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), np.zeros(0))
-    return [Contact(*(np.concatenate(columns) for columns in zip(empty, *mine))) for mine in rows]
+    return [BodyContacts(*(np.concatenate(columns) for columns in zip(empty, *mine))) for mine in rows]
 
 
-def _pressing(found: Touching, two, pressure: Pressure, first: int, fps: float) -> tuple:
+def _select_pressing(found: CapsuleContacts, two, pressure: Pressure, first: int, fps: float) -> tuple:
     """Select the contacts of two bodies that press; return them, directions (K, 3) and distances (K,) m."""
     parts = two[0].shape[1] * two[1].shape[1]
     # One number per (frame, capsule, capsule), ascending with the frame.
     keys = (found.frame + first) * parts + found.one * two[1].shape[1] + found.other
-    before, towards = pressure.pushes(keys)
-    side = sides(found, INERTIA * before[:, None] * towards, fps)
+    before, towards = pressure.find_pressures(keys)
+    side = compute_sides(found, SIDE_INERTIA * before[:, None] * towards, fps)
     trunks = two[0][:, 0].mean(axis=1) - two[1][:, 0].mean(axis=1)  # between the middles of the hips
-    way, lack = way_out(found, side, trunks, ALLOWED)
-    now = pressed(before, lack)
-    pressure.keep(keys, now, side, (first * parts, (first + len(two[0])) * parts))
-    pressing = np.flatnonzero(lack + now > 0.0)
-    return found.rows(pressing), way[pressing], (lack + now)[pressing]
+    direction, missing = compute_separation(found, side, trunks, ALLOWED_DEPTH)
+    new_pressure = update_pressure(before, missing)
+    pressure.update_pressures(keys, new_pressure, side, (first * parts, (first + len(two[0])) * parts))
+    pressing = np.flatnonzero(missing + new_pressure > 0.0)
+    return found.select_rows(pressing), direction[pressing], (missing + new_pressure)[pressing]
 
 
-def _share(found: Touching, way, give, bodies, placed, pair: tuple[int, int], is_one: bool) -> tuple:
+def _build_body_contacts(found: CapsuleContacts, direction, distance, bodies, capsule_lines, pair: tuple[int, int], is_one: bool) -> tuple:
     """Build the columns of `BodyContacts` for one body of a pair.
 
     is_one: whether the body is the contacts' `one`; direction (K, 3) and distance (K,) m: where to and how far both
     have to separate.
     """
-    body, against = pair
-    part, beside = (found.one, found.other) if is_one else (found.other, found.one)
-    at = found.at_one if is_one else found.at_other
-    ends = placed[body][found.frame, part]
+    body, other_body = pair
+    part, other_part = (found.one, found.other) if is_one else (found.other, found.one)
+    at = found.share_one if is_one else found.share_other
+    ends = capsule_lines[body][found.frame, part]
     place = ends[:, 0] + at[:, None] * (ends[:, 1] - ends[:, 0])
     # The firmer body moves less. An arm alone takes the whole distance, two arms half each.
     firm = [bodies[number].firm[found.frame] for number in pair]
-    arms = [np.array([p.limb == "arm" for p in bodies[n].parts])[c] for n, c in ((body, part), (against, beside))]
-    arm = give * np.where(arms[0], np.where(arms[1], 0.5, 1.0), 0.0)
-    return found.frame, part, at, place, way, give * firm[1] / (firm[0] + firm[1]), arm
+    arms = [np.array([p.limb == "arm" for p in bodies[n].parts])[c] for n, c in ((body, part), (other_body, other_part))]
+    arm = distance * np.where(arms[0], np.where(arms[1], 0.5, 1.0), 0.0)
+    return found.frame, part, at, place, direction, distance * firm[1] / (firm[0] + firm[1]), arm
 
 
-def _off(found: Touching) -> np.ndarray:
+def _compute_offsets(found: CapsuleContacts) -> np.ndarray:
     """Compute the vectors (K, 3) m from the other's line to the one's."""
-    return found.away * (found.radii - found.depth)[:, None]
+    return found.direction * (found.radii - found.depth)[:, None]

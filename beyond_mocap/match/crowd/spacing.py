@@ -15,32 +15,32 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...base.banded_least_squares import BandedLeastSquares
-from ...base.time_series import runs
+from ...base.time_series import find_runs
 from ...base.vectors import arctan2
-from ...motion.track import zero_phase_hann
+from ...motion.track import smooth_zero_phase_hann
 
 DISTANCE = 0.55
 """m between the middles of two bodies that stand or run side by side."""
 
-STAY, SECONDS = 0.003, 0.5
+SHIFT_WEIGHT, SHIFT_SECONDS = 0.003, 0.5
 """Weight of a shift relative to the missing distance, and s in which it fades in and out."""
 
 REACH = 2.5
 """s before and after a meeting within which shifts start and end."""
 
-STEADY = 30.0
+TOUCH_FIRMNESS = 30.0
 """How much more firmly a player keeps their path while they touch the ball."""
 
-_TURNED = (1.0, 1.0, 0.8, 0.8, 0.6, 0.6, 0.4, 0.4, 0.2, 0.2, 0.1, 0.1)  # s of smoothing of directions, per round
+_SMOOTH_SECONDS = (1.0, 1.0, 0.8, 0.8, 0.6, 0.6, 0.4, 0.4, 0.2, 0.2, 0.1, 0.1)  # s of smoothing of directions, per round
 _ROUNDS, _STEP = 24, 0.5  # directions change as bodies separate, so shifts go half of the way each round
-_HELD = 1e6  # weight that fixes a value: far above all others
+_HOLD_WEIGHT = 1e6  # weight that fixes a value: far above all others
 
 Span = tuple[int, int, tuple[int, int]]
 """First frame, end, and the numbers of two bodies."""
 
 
-def spaced(
-    times: np.ndarray, positions: np.ndarray, keep: np.ndarray | None = None, distance: float = DISTANCE
+def compute_spacing(
+    times: np.ndarray, positions: np.ndarray, firmness: np.ndarray | None = None, distance: float = DISTANCE
 ) -> np.ndarray:
     """Compute the horizontal shifts with which bodies keep their distance.
 
@@ -58,14 +58,14 @@ def spaced(
     if len(times) < 4:
         return shifts
     fps = (len(times) - 1) / (times[-1] - times[0])
-    firm = np.ones(positions.shape[:2]) if keep is None else keep
-    for episode in episodes(positions, distance, round(REACH * fps)):
+    weights = np.ones(positions.shape[:2]) if firmness is None else firmness
+    for episode in find_episodes(positions, distance, round(REACH * fps)):
         span, bodies = slice(episode.first, episode.end), list(episode.bodies)
-        shifts[bodies, span] = _pushed(episode, positions[bodies, span], firm[bodies, span], distance, fps)
+        shifts[bodies, span] = _solve_episode(episode, positions[bodies, span], weights[bodies, span], distance, fps)
     return np.where(np.isfinite(positions), shifts, 0.0)
 
 
-def keeping(count: int, moments: np.ndarray, fps: float, seconds: float = 0.6) -> np.ndarray:
+def compute_firmness(count: int, moments: np.ndarray, fps: float, seconds: float = 0.6) -> np.ndarray:
     """Compute how firmly a player keeps their path around touches of the ball.
 
     Args:
@@ -78,8 +78,8 @@ def keeping(count: int, moments: np.ndarray, fps: float, seconds: float = 0.6) -
     """
     if not len(moments):
         return np.ones(count)
-    away = np.abs(np.arange(count)[:, None] - np.asarray(moments)).min(axis=1) / (seconds * fps)
-    return 1.0 + (STEADY - 1.0) * np.cos(0.5 * np.pi * np.clip(away, 0.0, 1.0)) ** 2
+    distance = np.abs(np.arange(count)[:, None] - np.asarray(moments)).min(axis=1) / (seconds * fps)
+    return 1.0 + (TOUCH_FIRMNESS - 1.0) * np.cos(0.5 * np.pi * np.clip(distance, 0.0, 1.0)) ** 2
 
 
 @dataclass(frozen=True)
@@ -99,7 +99,7 @@ class Episode:
     pairs: tuple[tuple[int, int], ...]
 
 
-def episodes(positions: np.ndarray, distance: float, reach: int) -> list[Episode]:
+def find_episodes(positions: np.ndarray, distance: float, reach: int) -> list[Episode]:
     """Find all times at which two bodies come too close.
 
     Args:
@@ -115,25 +115,25 @@ def episodes(positions: np.ndarray, distance: float, reach: int) -> list[Episode
         near = np.einsum("pnk,pnk->pn", off, off) < distance**2
         for other in np.flatnonzero(near.any(axis=1)):
             pair = (one, one + 1 + int(other))
-            found += [(max(low - reach, 0), min(high + reach, len(near[0])), pair) for low, high in runs(near[other])]
-    return joined_spans(found)
+            found += [(max(low - reach, 0), min(high + reach, len(near[0])), pair) for low, high in find_runs(near[other])]
+    return join_spans(found)
 
 
-def joined_spans(spans: list[Span]) -> list[Episode]:
+def join_spans(spans: list[Span]) -> list[Episode]:
     """Join spans (first frame, end, pair) that overlap in time and share a body into episodes."""
     groups: list[tuple[int, int, set, set]] = []
     for first, end, pair in sorted(spans):
         bodies, pairs = set(pair), {pair}
-        while met := [g for g in groups if g[0] < end and first < g[1] and g[2] & bodies]:  # may meet more
-            groups = [g for g in groups if not any(g is other for other in met)]
-            for low, high, others, theirs in met:
-                first, end, bodies, pairs = min(first, low), max(end, high), bodies | others, pairs | theirs
+        while overlapping := [g for g in groups if g[0] < end and first < g[1] and g[2] & bodies]:  # may meet more
+            groups = [g for g in groups if not any(g is other for other in overlapping)]
+            for low, high, others, other_pairs in overlapping:
+                first, end, bodies, pairs = min(first, low), max(end, high), bodies | others, pairs | other_pairs
         groups.append((first, end, bodies, pairs))
     whole = [Episode(tuple(sorted(bodies)), first, end, tuple(sorted(pairs))) for first, end, bodies, pairs in groups]
     return sorted(whole, key=lambda episode: (episode.first, episode.bodies))
 
 
-def meetings(spans: list[Span], met: list[Span]) -> list[Episode]:
+def find_meetings(spans: list[Span], past_spans: list[Span]) -> list[Episode]:
     """Find the episodes of these spans, with all bodies they meet at the same time.
 
     A body is then not pushed into one that is not part of the solution.
@@ -146,51 +146,51 @@ def meetings(spans: list[Span], met: list[Span]) -> list[Episode]:
     """
     spans = list(spans)
     while True:
-        found = joined_spans(spans)
+        found = join_spans(spans)
         more = [
-            (max(first, one.first), min(end, one.end), pair)
-            for one in found
-            for first, end, pair in met
-            if first < one.end and one.first < end and set(pair) & set(one.bodies) and pair not in one.pairs
+            (max(first, episode.first), min(end, episode.end), pair)
+            for episode in found
+            for first, end, pair in past_spans
+            if first < episode.end and episode.first < end and set(pair) & set(episode.bodies) and pair not in episode.pairs
         ]
         if not more:
             return found
         spans += more
 
 
-def _pushed(episode: Episode, places: np.ndarray, firm: np.ndarray, distance: float, fps: float) -> np.ndarray:
+def _solve_episode(episode: Episode, places: np.ndarray, firmness: np.ndarray, distance: float, fps: float) -> np.ndarray:
     """Solve the shifts (K, T, 2) m of one episode's bodies at `places` (K, T, 2) m with their firmness (K, T)."""
     bodies, count = len(places), places.shape[1]
-    calm = _calm(firm, fps)
+    smoothness = _build_smoothness(firmness, fps)
     number = {body: row for row, body in enumerate(episode.bodies)}
     pairs = [(number[one], number[other]) for one, other in episode.pairs]
     shifts = np.zeros(places.shape)
-    for turn in range(_ROUNDS):
-        seconds = _TURNED[turn] if turn < len(_TURNED) else 0.0
-        rows = [_lacking(places, shifts, pair, distance=distance, seconds=seconds, fps=fps) for pair in pairs]
+    for round_number in range(_ROUNDS):
+        seconds = _SMOOTH_SECONDS[round_number] if round_number < len(_SMOOTH_SECONDS) else 0.0
+        rows = [_build_distance_rows(places, shifts, pair, distance=distance, seconds=seconds, fps=fps) for pair in pairs]
         index, values, goal = (np.concatenate(parts) for parts in zip(*rows))
         if not len(index):
             break
-        squares = calm.copy()
+        squares = smoothness.copy()
         squares.add_rows(index, values, np.ones(len(index)), goal)
         least = squares.solve().reshape(count, bodies, 2).transpose(1, 0, 2)
         shifts = shifts + _STEP * (least - shifts)
     return shifts
 
 
-def _calm(firm: np.ndarray, fps: float) -> BandedLeastSquares:
+def _build_smoothness(firmness: np.ndarray, fps: float) -> BandedLeastSquares:
     """Build the squares that keep shifts small and smooth, and hold both ends; firmness (K, T)."""
-    squares = BandedLeastSquares(firm.shape[1], 2 * len(firm))
-    held = np.zeros(firm.shape[1])
-    held[:2], held[-2:] = _HELD, _HELD
-    for body, weight in enumerate(firm):
+    squares = BandedLeastSquares(firmness.shape[1], 2 * len(firmness))
+    hold_weights = np.zeros(firmness.shape[1])
+    hold_weights[:2], hold_weights[-2:] = _HOLD_WEIGHT, _HOLD_WEIGHT
+    for body, weight in enumerate(firmness):
         for axis in (0, 1):
-            squares.add_value(STAY * weight + held, 2 * body + axis)
-            squares.add_smoothness(STAY * (SECONDS * fps) ** 6 * weight, 2 * body + axis)
+            squares.add_value(SHIFT_WEIGHT * weight + hold_weights, 2 * body + axis)
+            squares.add_smoothness(SHIFT_WEIGHT * (SHIFT_SECONDS * fps) ** 6 * weight, 2 * body + axis)
     return squares
 
 
-def _lacking(
+def _build_distance_rows(
     places: np.ndarray, shifts: np.ndarray, pair: tuple[int, int], distance: float, seconds: float, fps: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Build the rows of one pair for `BandedLeastSquares.add_rows`: where it is too close, in which direction and how
@@ -199,22 +199,22 @@ def _lacking(
     """
     one, other = pair
     bodies = len(places)
-    off = places[one] + shifts[one] - places[other] - shifts[other]
-    near = np.einsum("tk,tk->t", off, off) < distance**2
-    directions, needs = np.zeros(off.shape), np.zeros(len(off))
-    for low, high in runs(near):
-        part = off[low:high]
+    offset = places[one] + shifts[one] - places[other] - shifts[other]
+    near = np.einsum("tk,tk->t", offset, offset) < distance**2
+    directions, needs = np.zeros(offset.shape), np.zeros(len(offset))
+    for low, high in find_runs(near):
+        part = offset[low:high]
         angle = np.unwrap(arctan2(part[:, 1], part[:, 0]))
         if seconds and high - low > 2:
-            angle = zero_phase_hann(angle[:, None], fps, seconds)[:, 0]
-        way = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-        along = np.einsum("tk,tk->t", way, part)
+            angle = smooth_zero_phase_hann(angle[:, None], fps, seconds)[:, 0]
+        direction = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+        along = np.einsum("tk,tk->t", direction, part)
         # Solve |part + need * direction| = distance for the need.
         needs[low:high] = np.sqrt(along**2 + distance**2 - np.einsum("tk,tk->t", part, part)) - along
-        directions[low:high] = way
+        directions[low:high] = direction
     frame = np.flatnonzero(near)
-    way, need = directions[frame], np.minimum(needs[frame], distance)
+    direction, need = directions[frame], np.minimum(needs[frame], distance)
     # Unknown number of body b, axis a at frame t: (t * bodies + b) * 2 + a.
     index = (frame * 2 * bodies)[:, None] + np.array([2 * one, 2 * one + 1, 2 * other, 2 * other + 1])
-    apart = (shifts[one] - shifts[other])[frame]
-    return index, np.concatenate([way, -way], axis=1), need + np.einsum("tk,tk->t", way, apart)
+    shift = (shifts[one] - shifts[other])[frame]
+    return index, np.concatenate([direction, -direction], axis=1), need + np.einsum("tk,tk->t", direction, shift)

@@ -8,23 +8,23 @@ import numpy as np
 
 from ...synthesis.search.preferences import PERIOD
 
-NEAR = 10.0
+NEAR_DISTANCE = 10.0
 """m between two players within which the same clip in step is noticed."""
 
-PHASE = 0.15
+PHASE_SECONDS = 0.15
 """s between the times in a clip within which two players are in step."""
 
-APART = 0.3
+LAG_STEP = 0.3
 """s between the lags that can be chosen."""
 
-BESIDE = 0.3
+NEXT_LAG_WEIGHT = 0.3
 """Weight of a neighbour with the next lag, relative to one with the same lag."""
 
 SWEEPS = 6
 """Rounds in which every player chooses, knowing the choice of all others."""
 
 
-def lags(positions: np.ndarray) -> np.ndarray:
+def choose_lags(positions: np.ndarray) -> np.ndarray:
     """Choose each player's preferred lag (`Plan.lag`), so that players who are often near each other differ.
 
     There are PERIOD / LAG_STEP lags. The player who is near others most chooses first. Each takes the lag whose users,
@@ -36,21 +36,21 @@ def lags(positions: np.ndarray) -> np.ndarray:
     Returns:
         (P,) s.
     """
-    count = round(PERIOD / APART)
+    count = round(PERIOD / LAG_STEP)
     near = np.zeros((len(positions), len(positions)))
     for one, place in enumerate(positions):
-        near[one] = (np.linalg.norm(positions - place, axis=-1) < NEAR).mean(axis=-1)
+        near[one] = (np.linalg.norm(positions - place, axis=-1) < NEAR_DISTANCE).mean(axis=-1)
     np.fill_diagonal(near, 0.0)
     chosen = np.full(len(positions), -1)
     order = np.argsort(-near.sum(axis=1), kind="stable")
     for one in np.tile(order, SWEEPS):
         chosen[one] = -1
-        taken = np.array([near[one, chosen == number].sum() for number in range(count)])
-        chosen[one] = int(np.argmin(taken + BESIDE * (np.roll(taken, 1) + np.roll(taken, -1))))
-    return chosen * APART
+        use = np.array([near[one, chosen == number].sum() for number in range(count)])
+        chosen[one] = int(np.argmin(use + NEXT_LAG_WEIGHT * (np.roll(use, 1) + np.roll(use, -1))))
+    return chosen * LAG_STEP
 
 
-def in_step(shown: np.ndarray, seconds: np.ndarray, positions: np.ndarray) -> np.ndarray:
+def find_in_step(clips: np.ndarray, seconds: np.ndarray, positions: np.ndarray) -> np.ndarray:
     """Find who shows the same clip as a player within NEAR_DISTANCE, within PHASE_SECONDS of it.
 
     Args:
@@ -60,17 +60,17 @@ def in_step(shown: np.ndarray, seconds: np.ndarray, positions: np.ndarray) -> np
     Returns:
         (P, T) bool.
     """
-    found = np.zeros(shown.shape, bool)
-    for one in range(len(shown) - 1):
+    is_in_step = np.zeros(clips.shape, bool)
+    for one in range(len(clips) - 1):
         others = slice(one + 1, None)
-        same = (shown[others] == shown[one]) & (shown[one] >= 0) & (np.abs(seconds[others] - seconds[one]) < PHASE)
-        near = np.linalg.norm(positions[others] - positions[one], axis=-1) < NEAR
-        found[others] |= same & near
-        found[one] |= (same & near).any(axis=0)
-    return found
+        same = (clips[others] == clips[one]) & (clips[one] >= 0) & (np.abs(seconds[others] - seconds[one]) < PHASE_SECONDS)
+        near = np.linalg.norm(positions[others] - positions[one], axis=-1) < NEAR_DISTANCE
+        is_in_step[others] |= same & near
+        is_in_step[one] |= (same & near).any(axis=0)
+    return is_in_step
 
 
-def share_in_step(shown: np.ndarray, seconds: np.ndarray, positions: np.ndarray) -> float:
+def measure_share_in_step(clips: np.ndarray, seconds: np.ndarray, positions: np.ndarray) -> float:
     """Measure the share of the time of all players in which they are in step with a neighbour; 0 if none is present."""
-    there = shown >= 0
-    return float(in_step(shown, seconds, positions)[there].mean()) if there.any() else 0.0
+    is_present = clips >= 0
+    return float(find_in_step(clips, seconds, positions)[is_present].mean()) if is_present.any() else 0.0

@@ -15,10 +15,10 @@ from ...annotation import KeyMoment
 from ...base.errors import InputError
 from ...library.keys import Key
 from ...library.library import Library
-from ...motion.skeleton import frozen_array
+from ...motion.skeleton import freeze_array
 from ...synthesis.search.edit_list import EditList, PlacedKey
 
-CONTINUES = 0.05
+CONTINUITY_TOLERANCE = 0.05
 """Library frames: a run that starts this close to where the previous one ends continues it without a cut."""
 
 _FIELDS = (("clip", int), ("first", float), ("rate", float), ("length", int), ("cut", bool))
@@ -26,7 +26,7 @@ _FIELDS = (("clip", int), ("first", float), ("rate", float), ("length", int), ("
 ClipName = tuple[str, bool]
 """A clip's path below the library, and whether it is mirrored."""
 
-_EVEN = 1e-6
+_RATE_TOLERANCE = 1e-6
 """Library frames by which the steps within a run may differ."""
 
 
@@ -76,7 +76,7 @@ class NamedEdit:
 
     def __post_init__(self):
         for name, kind in _FIELDS:
-            object.__setattr__(self, name, frozen_array(getattr(self, name), kind))
+            object.__setattr__(self, name, freeze_array(getattr(self, name), kind))
 
     def __len__(self) -> int:
         return int(self.length.sum())
@@ -97,18 +97,18 @@ class NamedEdit:
         return self.clip[run], self.first[run] + self.rate[run] * (np.arange(len(run)) - self.starts[run])
 
 
-def part(edit: NamedEdit, low: int, high: int) -> NamedEdit:
+def cut_named_edit(edit: NamedEdit, low: int, high: int) -> NamedEdit:
     """Cut the frames low .. high out of an edit list; it keeps all keys."""
     starts = edit.starts
     begin, end = np.maximum(starts, low), np.minimum(starts + edit.length, high)
-    kept = end > begin
+    rows = end > begin
     first = edit.first + edit.rate * (begin - starts)
     cut = np.where(begin == low, True, edit.cut)
-    return NamedEdit(clips=edit.clips, clip=edit.clip[kept], first=first[kept], rate=edit.rate[kept],
-                     length=(end - begin)[kept], cut=cut[kept], keys=edit.keys)
+    return NamedEdit(clips=edit.clips, clip=edit.clip[rows], first=first[rows], rate=edit.rate[rows],
+                     length=(end - begin)[rows], cut=cut[rows], keys=edit.keys)
 
 
-def chained(parts: Sequence[NamedEdit], keys: Sequence[NamedKey]) -> NamedEdit:
+def join_named_edits(parts: Sequence[NamedEdit], keys: Sequence[NamedKey]) -> NamedEdit:
     """Join edit lists one after the other.
 
     There is a cut in between unless the next one continues the clip where the one before leaves it.
@@ -119,22 +119,22 @@ def chained(parts: Sequence[NamedEdit], keys: Sequence[NamedKey]) -> NamedEdit:
     Returns:
         One edit list.
     """
-    clips = table(parts)
-    parts = [retabled(each, clips) for each in parts]
+    clips = list_clips(parts)
+    parts = [renumber_clips(each, clips) for each in parts]
     clip, first, rate, length, cut = (np.concatenate([getattr(each, name) for each in parts]) for name, _ in _FIELDS)
     for join in np.cumsum([len(each.clip) for each in parts])[:-1]:
         goes_on = first[join - 1] + rate[join - 1] * length[join - 1]
-        cut[join] = clip[join] != clip[join - 1] or abs(first[join] - goes_on) > CONTINUES
+        cut[join] = clip[join] != clip[join - 1] or abs(first[join] - goes_on) > CONTINUITY_TOLERANCE
     return NamedEdit(clips=clips, clip=clip, first=first, rate=rate, length=length, cut=cut,
                      keys=tuple(sorted(keys, key=lambda key: key.time)))
 
 
-def table(parts: Sequence[NamedEdit]) -> tuple[ClipName, ...]:
+def list_clips(parts: Sequence[NamedEdit]) -> tuple[ClipName, ...]:
     """List all clips of some edit lists, each once, sorted."""
     return tuple(sorted({name for each in parts for name in each.clips}))
 
 
-def retabled(edit: NamedEdit, clips: tuple[ClipName, ...]) -> NamedEdit:
+def renumber_clips(edit: NamedEdit, clips: tuple[ClipName, ...]) -> NamedEdit:
     """Renumber the clips of an edit list for another table that has all of them."""
     place = {name: number for number, name in enumerate(clips)}
     number = np.array([place[name] for name in edit.clips], int)
@@ -142,7 +142,7 @@ def retabled(edit: NamedEdit, clips: tuple[ClipName, ...]) -> NamedEdit:
     return replace(edit, clips=clips, clip=number[edit.clip], keys=keys)
 
 
-def named(library: Library, edit: EditList, moments: Sequence[KeyMoment]) -> NamedEdit:
+def to_named_edit(library: Library, edit: EditList, moments: Sequence[KeyMoment]) -> NamedEdit:
     """Convert a library's edit list to one with named clips.
 
     Args:
@@ -153,36 +153,36 @@ def named(library: Library, edit: EditList, moments: Sequence[KeyMoment]) -> Nam
         The named edit list.
     """
     local = edit.frame - library.frames.first[edit.clip]
-    starts = np.array(_run_starts(edit, local))
+    starts = np.array(_find_run_starts(edit, local))
     length = np.diff(np.append(starts, len(edit)))
     last = starts + length - 1
     rate = np.where(length > 1, (local[last] - local[starts]) / np.maximum(length - 1, 1), 1.0)
     used = np.unique([*edit.clip[starts], *(placed.key.clip for placed in edit.keys)])
     row = {int(clip): number for number, clip in enumerate(used)}
     clips = tuple((library.clips[clip].path, library.clips[clip].mirrored) for clip in used)
-    keys = [_named_key(placed, row, moments[placed.wanted].time) for placed in edit.keys]
+    keys = [_to_named_key(placed, row, moments[placed.number].time) for placed in edit.keys]
     clip = np.array([row[int(clip)] for clip in edit.clip[starts]], int)
-    cut = np.isin(starts, edit.seams) | (starts == 0)
+    cut = np.isin(starts, edit.transitions) | (starts == 0)
     return NamedEdit(clips=clips, clip=clip, first=local[starts], rate=rate, length=length, cut=cut,
                      keys=tuple(sorted(keys, key=lambda key: key.time)))
 
 
-def _run_starts(edit: EditList, local: np.ndarray) -> list[int]:
+def _find_run_starts(edit: EditList, local: np.ndarray) -> list[int]:
     """Find the frames at which another piece starts, or the same one continues at another rate."""
     starts = []
     for low, high in edit.pieces:
         step = np.diff(local[low:high])
-        starts += [low, *(low + 1 + np.flatnonzero(np.abs(np.diff(step)) > _EVEN)).tolist()]
+        starts += [low, *(low + 1 + np.flatnonzero(np.abs(np.diff(step)) > _RATE_TOLERANCE)).tolist()]
     return starts
 
 
-def _named_key(placed: PlacedKey, row: dict[int, int], time: float) -> NamedKey:
+def _to_named_key(placed: PlacedKey, row: dict[int, int], time: float) -> NamedKey:
     key = placed.key
     return NamedKey(time=time, clip=row[key.clip], frame=key.frame, start=key.start, end=key.end,
-                    words=tuple(sorted(key.words)))
+                    words=tuple(sorted(key.labels)))
 
 
-def bound(library: Library, edit: NamedEdit, moments: Sequence[KeyMoment] = ()) -> EditList:
+def to_library_edit(library: Library, edit: NamedEdit, moments: Sequence[KeyMoment] = ()) -> EditList:
     """Convert a named edit list to one of `library`.
 
     Args:
@@ -205,4 +205,4 @@ def bound(library: Library, edit: NamedEdit, moments: Sequence[KeyMoment] = ()) 
     wanted = {moment.time: index for index, moment in enumerate(moments)}
     keys = [PlacedKey(wanted[key.time], Key(int(number[key.clip]), key.frame, key.start, key.end, frozenset(key.words)))
             for key in edit.keys if key.time in wanted]  # fmt: skip
-    return EditList(number[clip], pool, edit.seams, tuple(sorted(keys, key=lambda key: key.wanted)))
+    return EditList(number[clip], pool, edit.seams, tuple(sorted(keys, key=lambda key: key.number)))

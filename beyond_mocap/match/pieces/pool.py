@@ -22,20 +22,20 @@ from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, 
 from dataclasses import dataclass
 from typing import NoReturn
 
-from ...base.errors import BeyondMocapError, Cancelled, InputError
+from ...base.errors import BeyondMocapError, UserCancelledError, InputError
 
-AHEAD = 2
+PIECES_PER_WORKER = 2
 """Pieces that each worker runs or has waiting: enough that none is idle, few enough to save memory."""
 
-POLL = 0.2
+POLL_SECONDS = 0.2
 """s between two checks for a cancellation."""
 
-PATIENCE = 60.0
+MAX_WAIT = 60.0
 """s without any worker after which a cluster is given up."""
 
-_ANSWERS = "10s"  # the longest a scheduler may take to answer
-_IDLE = 60  # s after which a local worker without work ends
-_BREAKS = 2  # breaks of the workers after which pieces run one by one
+_ANSWER_TIMEOUT = "10s"  # the longest a scheduler may take to answer
+_IDLE_SECONDS = 60  # s after which a local worker without work ends
+_MAX_BREAKS = 2  # breaks of the workers after which pieces run one by one
 
 Work = Callable[..., object]
 Task = tuple[object, tuple]
@@ -43,7 +43,7 @@ Task = tuple[object, tuple]
 
 
 @dataclass(frozen=True)
-class Failed:
+class TaskFailure:
     """A piece of work that failed.
 
     Attributes:
@@ -54,7 +54,7 @@ class Failed:
 
 
 @dataclass(frozen=True, eq=False)
-class Done:
+class TaskResult:
     """A piece of work that was run.
 
     Attributes:
@@ -69,7 +69,7 @@ class Done:
 
 
 @dataclass(frozen=True)
-class Workplace:
+class WorkerConfig:
     """Where work runs.
 
     Attributes:
@@ -87,18 +87,18 @@ class Workplace:
             raise InputError("workers", f"{self.workers}", "1 or more")
 
 
-def check_place(place: Workplace) -> None:
+def check_workers(config: WorkerConfig) -> None:
     """Check that a cluster's scheduler answers, so that an error is reported before work starts; InputError
     otherwise.
     """
-    if place.scheduler:
-        with _cluster(place.scheduler):
+    if config.scheduler:
+        with _connect_cluster(config.scheduler):
             pass
 
 
-def run(
-    tasks: Iterable[Task], work: Work, place: Workplace, cancelled: Callable[[], bool] | None = None,
-    spent: Callable[[Done], None] | None = None,
+def run_tasks(
+    tasks: Iterable[Task], work: Work, config: WorkerConfig, cancelled: Callable[[], bool] | None = None,
+    report_result: Callable[[TaskResult], None] | None = None,
 ) -> Iterator[tuple[object, object]]:
     """Run tasks and give their results as they end, in any order.
 
@@ -115,42 +115,42 @@ def run(
         Cancelled: soon after `cancelled` returns True.
         InputError: if the cluster does not answer, has no workers, or goes away.
     """
-    stop = cancelled or (lambda: False)
-    if place.scheduler:
-        with _cluster(place.scheduler) as client:
-            yield from _told(_spread(iter(tasks), work, _Cluster(client), stop), spent)
-    elif place.workers == 1:
-        yield from _told(_here(tasks, work, stop), spent)
+    is_cancelled = cancelled or (lambda: False)
+    if config.scheduler:
+        with _connect_cluster(config.scheduler) as client:
+            yield from _report_results(_run_on_workers(iter(tasks), work, _Cluster(client), is_cancelled), report_result)
+    elif config.workers == 1:
+        yield from _report_results(_run_here(tasks, work, is_cancelled), report_result)
     else:
-        yield from _told(_spread(iter(tasks), work, _Processes(place.workers), stop), spent)
+        yield from _report_results(_run_on_workers(iter(tasks), work, _Processes(config.workers), is_cancelled), report_result)
 
 
-def _told(done: Generator[tuple[object, Done], None, None], spent) -> Iterator[tuple[object, object]]:
-    with contextlib.closing(done):
-        for key, one in done:
-            if spent is not None:
-                spent(one)
+def _report_results(results: Generator[tuple[object, TaskResult], None, None], report_result) -> Iterator[tuple[object, object]]:
+    with contextlib.closing(results):
+        for key, one in results:
+            if report_result is not None:
+                report_result(one)
             yield key, one.result
 
 
-def attempt(work: Work, arguments: tuple) -> Done:
+def run_task(work: Work, arguments: tuple) -> TaskResult:
     """Run `work` with `arguments` and measure it.
 
     Errors become text, because not every error can be sent to another process. Raises Cancelled.
     """
-    begun = time.process_time()
+    started = time.process_time()
     try:
         result = work(*arguments)
-    except Cancelled:
+    except UserCancelledError:
         raise
     except BeyondMocapError as error:
-        result = Failed(str(error))
+        result = TaskFailure(str(error))
     except Exception as error:  # an error of one piece must not stop the others
-        result = Failed(" ".join(f"{type(error).__name__}: {error}".split()))
-    return Done(result, peak_memory(), time.process_time() - begun)
+        result = TaskFailure(" ".join(f"{type(error).__name__}: {error}".split()))
+    return TaskResult(result, measure_peak_memory(), time.process_time() - started)
 
 
-def peak_memory() -> float:
+def measure_peak_memory() -> float:
     """Measure the peak memory of this process in MB; 0 where the system does not provide it (Windows)."""
     try:
         import resource
@@ -159,64 +159,64 @@ def peak_memory() -> float:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (1e6 if sys.platform == "darwin" else 1024.0)
 
 
-def _here(tasks: Iterable[Task], work: Work, stop: Callable[[], bool]) -> Generator[tuple[object, Done], None, None]:
+def _run_here(tasks: Iterable[Task], work: Work, is_cancelled: Callable[[], bool]) -> Generator[tuple[object, TaskResult], None, None]:
     for key, arguments in tasks:
-        if stop():
-            raise Cancelled("cancelled")
-        yield key, attempt(work, arguments)
+        if is_cancelled():
+            raise UserCancelledError("cancelled")
+        yield key, run_task(work, arguments)
 
 
-def _spread(tasks: Iterator[Task], work: Work, place, stop) -> Generator[tuple[object, Done], None, None]:
+def _run_on_workers(tasks: Iterator[Task], work: Work, workers, is_cancelled) -> Generator[tuple[object, TaskResult], None, None]:
     """Keep workers busy, give results as they end, and run lost pieces again.
 
     After a break all pieces that were running are run again; after several breaks pieces run one by one, so that the
     one that ends its worker is found.
     """
-    again: deque[Task] = deque()
-    going: dict[Future, Task] = {}
+    repeated: deque[Task] = deque()
+    running: dict[Future, Task] = {}
     breaks = 0
     try:
         while True:
-            alone = breaks >= _BREAKS and bool(again or going)
-            while len(going) < (1 if alone else place.room()) and (task := _next(again, tasks)) is not None:
+            alone = breaks >= _MAX_BREAKS and bool(repeated or running)
+            while len(running) < (1 if alone else workers.room()) and (task := _take_next(repeated, tasks)) is not None:
                 try:
-                    going[place.submit(work, task[1])] = task
+                    running[workers.submit(work, task[1])] = task
                 except BrokenExecutor:  # a worker ended in the meantime
-                    again.appendleft(task)
+                    repeated.appendleft(task)
                     break
-            if not going and again:
+            if not running and repeated:
                 breaks += 1
-                place.renew()
+                workers.renew()
                 continue
-            if not going:
+            if not running:
                 return
-            done, _ = wait(going, timeout=POLL, return_when=FIRST_COMPLETED)
-            if stop():
-                raise Cancelled("cancelled")
-            place.check(bool(done))
+            done, _ = wait(running, timeout=POLL_SECONDS, return_when=FIRST_COMPLETED)
+            if is_cancelled():
+                raise UserCancelledError("cancelled")
+            workers.check(bool(done))
             lost = []
             for future in done:
-                task = going.pop(future)
+                task = running.pop(future)
                 if not _is_broken(future):
-                    yield task[0], _result(future)
+                    yield task[0], _take_result(future)
                 elif alone:
-                    place.renew()
-                    yield task[0], Done(Failed("its worker process ended, possibly for lack of memory"))
+                    workers.renew()
+                    yield task[0], TaskResult(TaskFailure("its worker process ended, possibly for lack of memory"))
                 else:
                     lost.append(task)
             if lost:
-                again.extend([*lost, *going.values()])
-                going.clear()
+                repeated.extend([*lost, *running.values()])
+                running.clear()
                 breaks += 1
-                place.renew()
-            elif not again and not going:
+                workers.renew()
+            elif not repeated and not running:
                 breaks = 0
     finally:
-        place.close(going)
+        workers.close(running)
 
 
-def _next(again: deque[Task], tasks: Iterator[Task]) -> Task | None:
-    return again.popleft() if again else next(tasks, None)
+def _take_next(repeated: deque[Task], tasks: Iterator[Task]) -> Task | None:
+    return repeated.popleft() if repeated else next(tasks, None)
 
 
 def _is_broken(future: Future) -> bool:
@@ -224,27 +224,27 @@ def _is_broken(future: Future) -> bool:
     return future.cancelled() or isinstance(future.exception(), (BrokenExecutor, CancelledError))
 
 
-def _result(future: Future) -> Done:
+def _take_result(future: Future) -> TaskResult:
     """Get the result of a future; an error in sending it counts as a failure of this piece."""
     try:
         return future.result()
     except Exception as error:  # such as a result that cannot be sent
-        return Done(Failed(f"its worker gave no result ({' '.join(f'{type(error).__name__}: {error}'.split())[:200]})"))
+        return TaskResult(TaskFailure(f"its worker gave no result ({' '.join(f'{type(error).__name__}: {error}'.split())[:200]})"))
 
 
 class _Processes:
     """Processes of this machine."""
 
-    started: Executor | None = None
+    shared_executor: Executor | None = None
     """The processes this program started last; they may wait for more work."""
 
     def __init__(self, workers: int):
         self._workers = workers
         self._executor: Executor | None = None
 
-    def room(self) -> int:
+    def find_capacity(self) -> int:
         """Find how many pieces may run or wait at once."""
-        return AHEAD * self._workers
+        return PIECES_PER_WORKER * self._workers
 
     def submit(self, work: Work, arguments: tuple) -> Future:
         """Submit a piece; processes of an earlier stage continue with what they have loaded.
@@ -255,21 +255,21 @@ class _Processes:
             from joblib.externals.loky import get_reusable_executor
 
             self._executor = get_reusable_executor(
-                self._workers, timeout=_IDLE, reuse=True, initializer=_follow, initargs=(os.getpid(),),
+                self._workers, timeout=_IDLE_SECONDS, reuse=True, initializer=_start_worker, initargs=(os.getpid(),),
                 env={name: "1" for name in _THREADS},
             )  # fmt: skip
-            _Processes.started = self._executor
-        return self._executor.submit(attempt, work, arguments)
+            _Processes.shared_executor = self._executor
+        return self._executor.submit(run_task, work, arguments)
 
-    def check(self, moved: bool) -> None:
+    def check(self, has_progress: bool) -> None:
         """Do nothing: the executor reports when a process ends."""
 
-    def close(self, going: Iterable[Future]) -> None:
+    def close(self, running: Iterable[Future]) -> None:
         """End the processes if they still work; otherwise they wait for the next stage."""
-        if any(not future.done() for future in going):
-            self.renew()
+        if any(not future.done() for future in running):
+            self.restart_workers()
 
-    def renew(self) -> None:
+    def restart_workers(self) -> None:
         """End the processes after one has ended; the next piece starts new ones."""
         executor, self._executor = self._executor, None
         if executor is not None:
@@ -279,23 +279,23 @@ class _Processes:
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 
 
-def _follow(parent: int) -> None:
+def _start_worker(parent: int) -> None:
     """Set up a worker: it ignores Ctrl-C, which a terminal sends to all processes of a command, and ends soon after
     the process `parent` that started it.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_end_after, args=(parent,), daemon=True).start()
+    threading.Thread(target=_exit_after_parent, args=(parent,), daemon=True).start()
 
 
-def _end_after(parent: int) -> None:
+def _exit_after_parent(parent: int) -> None:
     while os.getppid() == parent:
         time.sleep(1.0)
     os._exit(1)
 
 
-def ended() -> None:
+def stop_workers() -> None:
     """Stop the local processes that wait for work."""
-    executor, _Processes.started = _Processes.started, None
+    executor, _Processes.shared_executor = _Processes.shared_executor, None
     if executor is not None:
         executor.shutdown(wait=True, kill_workers=True)  # type: ignore[call-arg]  # loky's own
 
@@ -306,39 +306,39 @@ class _Cluster:
     def __init__(self, client):
         self._client = client
         self._executor = client.get_executor(pure=False)
-        self._looked, self._room, self._moved = -PATIENCE, AHEAD, time.monotonic()
+        self._checked_time, self._capacity, self._progress_time = -MAX_WAIT, PIECES_PER_WORKER, time.monotonic()
 
-    def room(self) -> int:
+    def find_capacity(self) -> int:
         """Find how many pieces may run or wait at once; workers may come and go."""
-        if time.monotonic() - self._looked > 1.0:
-            self._looked, self._room = time.monotonic(), AHEAD * max(self._threads(), 1)
-        return self._room
+        if time.monotonic() - self._checked_time > 1.0:
+            self._checked_time, self._capacity = time.monotonic(), PIECES_PER_WORKER * max(self._count_threads(), 1)
+        return self._capacity
 
     def submit(self, work: Work, arguments: tuple) -> Future:
         """Submit a piece; InputError if the scheduler is gone."""
         try:
-            return self._executor.submit(attempt, work, arguments)
+            return self._executor.submit(run_task, work, arguments)
         except Exception:  # a client without a scheduler raises various errors
-            return self.renew()
+            return self.restart_workers()
 
-    def check(self, moved: bool) -> None:
+    def check(self, has_progress: bool) -> None:
         """Raise InputError if there has been no worker for too long."""
-        if moved or self._threads():
-            self._moved = time.monotonic()
-        elif time.monotonic() - self._moved > PATIENCE:
-            raise InputError("scheduler", f"no worker for {PATIENCE:g} s", "a worker", "start 'dask worker ADDRESS'")
+        if has_progress or self._count_threads():
+            self._progress_time = time.monotonic()
+        elif time.monotonic() - self._progress_time > MAX_WAIT:
+            raise InputError("scheduler", f"no worker for {MAX_WAIT:g} s", "a worker", "start 'dask worker ADDRESS'")
 
-    def renew(self) -> NoReturn:
+    def restart_workers(self) -> NoReturn:
         """Raise InputError: a cluster restarts its workers itself, so lost pieces mean that its scheduler is gone."""
         what = "start it and the command again; finished work is kept"
         raise InputError("scheduler", "the scheduler has stopped", "a running scheduler", what)
 
-    def close(self, going: Iterable[Future]) -> None:
+    def close(self, running: Iterable[Future]) -> None:
         """Cancel the pieces that are no longer needed."""
-        for future in going:
+        for future in running:
             future.cancel()
 
-    def _threads(self) -> int:
+    def _count_threads(self) -> int:
         with contextlib.suppress(Exception):  # a scheduler that is gone raises various errors
             if self._client.status == "running":
                 return sum(worker["nthreads"] for worker in self._client.scheduler_info()["workers"].values())
@@ -346,7 +346,7 @@ class _Cluster:
 
 
 @contextlib.contextmanager
-def _cluster(address: str) -> Iterator[object]:
+def _connect_cluster(address: str) -> Iterator[object]:
     """Connect to the scheduler at `address`; InputError if it does not answer, or Dask is not installed."""
     try:
         from distributed import Client
@@ -356,7 +356,7 @@ def _cluster(address: str) -> Iterator[object]:
     for name in [one for one in logging.root.manager.loggerDict if one.split(".")[0] == "distributed"]:
         logging.getLogger(name).setLevel(logging.CRITICAL + 1)  # errors are reported here, in one line
     try:
-        client = Client(address, timeout=_ANSWERS, set_as_default=False)
+        client = Client(address, timeout=_ANSWER_TIMEOUT, set_as_default=False)
     except (OSError, ValueError, TypeError) as error:
         found = f"{address} does not answer ({' '.join(str(error).split())[:120]})"
         expected = "the address of a Dask scheduler, such as tcp://127.0.0.1:8786"

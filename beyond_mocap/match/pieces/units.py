@@ -15,9 +15,9 @@ from ...annotation import Timeline
 from ...base.errors import InputError
 from ...library.features import FPS
 from ...motion.track import Track
-from ...synthesis.plan import Plan, SolvedCourse
+from ...synthesis.plan import Plan, SolvedTrajectory
 from ...synthesis.search.offer import SLOT
-from ..player_edit import kept
+from ..player_edit import to_stored_plan
 
 WINDOW = 300.0
 """s of a window, without overlaps."""
@@ -26,13 +26,13 @@ OVERLAP = 12.0
 """s that two neighbours share: two thirds before the edge between them, which the later one needs to converge to the
 sequence of the earlier one, and one third after it."""
 
-RUN_IN = 2.0 / 3.0
+OVERLAP_BEFORE = 2.0 / 3.0
 """Share of the overlap before the edge."""
 
-_SHORTEST = 0.25
+_MIN_WINDOW_SHARE = 0.25
 """A first or last window shorter than this share is merged with its neighbour."""
 
-_BEYOND = 0.5
+_BALL_MARGIN = 0.5
 """s of the ball's trajectory that are kept beyond both ends."""
 
 _SAME = 1e-9
@@ -63,7 +63,7 @@ class Unit:
     own: tuple[int, int] = (0, 0)
 
 
-def units_of(plan: Plan, stretch: int = 0, window: float = WINDOW, overlap: float = OVERLAP) -> tuple[Unit, ...]:
+def build_units(plan: Plan, stretch: int = 0, window: float = WINDOW, overlap: float = OVERLAP) -> tuple[Unit, ...]:
     """Build the windows of one stretch of a player. Key moments move to the touches they mean before the plan is cut.
 
     Args:
@@ -80,10 +80,10 @@ def units_of(plan: Plan, stretch: int = 0, window: float = WINDOW, overlap: floa
         raise InputError("window", f"{window:g} s", "5 to 3600 s")
     if not 1.0 <= overlap <= window / 2.0:
         raise InputError("overlap", f"{overlap:g} s", f"1 s to half of the window, {window / 2.0:g} s")
-    plan = kept(plan)
-    begin, count = float(plan.track.times[0]), frame_count(plan)
-    edges = window_edges(begin, count, window)
-    before, behind = (SLOT * max(1, round(share * overlap * FPS / SLOT)) for share in (RUN_IN, 1.0 - RUN_IN))
+    plan = to_stored_plan(plan)
+    begin, count = float(plan.track.times[0]), count_frames(plan)
+    edges = build_window_edges(begin, count, window)
+    before, behind = (SLOT * max(1, round(share * overlap * FPS / SLOT)) for share in (OVERLAP_BEFORE, 1.0 - OVERLAP_BEFORE))
     units = []
     for number, (low, high) in enumerate(zip(edges, edges[1:])):
         first, end = max(0, low - before), min(count, high + behind)
@@ -94,12 +94,12 @@ def units_of(plan: Plan, stretch: int = 0, window: float = WINDOW, overlap: floa
     return tuple(units)
 
 
-def frame_count(plan: Plan, fps: float = FPS) -> int:
+def count_frames(plan: Plan, fps: float = FPS) -> int:
     """Count the frames of the plan's track at `fps`, as `motion.track.sample` does."""
     return int(np.floor((plan.track.times[-1] - plan.track.times[0]) * fps + 1e-6)) + 1
 
 
-def window_edges(begin: float, count: int, window: float, fps: float = FPS, step: int = SLOT) -> list[int]:
+def build_window_edges(start: float, count: int, window: float, fps: float = FPS, step: int = SLOT) -> list[int]:
     """Build the frames between which the windows of a stretch lie.
 
     Args:
@@ -111,10 +111,10 @@ def window_edges(begin: float, count: int, window: float, fps: float = FPS, step
     Returns:
         0, the edges, and count. A short first or last window is merged with its neighbour.
     """
-    end = begin + count / fps
-    numbers = range(int(np.floor(begin / window)) + 1, int(np.ceil(end / window)))
-    inner = [step * round((number * window - begin) * fps / step) for number in numbers]
-    least = _SHORTEST * window * fps
+    end = start + count / fps
+    numbers = range(int(np.floor(start / window)) + 1, int(np.ceil(end / window)))
+    inner = [step * round((number * window - start) * fps / step) for number in numbers]
+    least = _MIN_WINDOW_SHARE * window * fps
     return [0, *(edge for edge in inner if least <= edge <= count - least), count]
 
 
@@ -131,14 +131,14 @@ def cut_plan(plan: Plan, start: float, end: float) -> Plan:
     Returns:
         The cut plan.
     """
-    inside = [key for key in plan.timeline.keys if start <= key.in_force <= end]
+    inside = [key for key in plan.timeline.keys if start <= key.resolved_time <= end]
     spans = [span for span in plan.timeline.spans if span.start < end and span.end > start]
     return replace(
         plan,
         track=cut_track(plan.track, start, end),
         timeline=Timeline(tuple(spans), tuple(inside)),
         pins=tuple(pin for pin in plan.pins if pin.time <= end and pin.end >= start),
-        solved=None if plan.solved is None else _cut_course(plan.solved, start - _BEYOND, end + _BEYOND),
+        solved=None if plan.solved is None else _cut_trajectory(plan.solved, start - _BALL_MARGIN, end + _BALL_MARGIN),
     )
 
 
@@ -150,8 +150,8 @@ def cut_track(track: Track, start: float, end: float) -> Track:
     after = np.clip(np.searchsorted(track.times, times - _SAME), 0, len(track) - 1)
     return Track(
         times,
-        _between(track.times, track.positions, times, before, after),
-        _between(track.times, track.ball, times, before, after),
+        _interpolate_samples(track.times, track.positions, times, before, after),
+        _interpolate_samples(track.times, track.ball, times, before, after),
         ball_height_known=track.ball_height_known[before] & track.ball_height_known[after],
         filled=track.filled[before] | track.filled[after],
         outlier=track.outlier[before] | track.outlier[after],
@@ -159,7 +159,7 @@ def cut_track(track: Track, start: float, end: float) -> Track:
     )
 
 
-def _between(known: np.ndarray, values: np.ndarray, times: np.ndarray, before: np.ndarray, after: np.ndarray):
+def _interpolate_samples(known: np.ndarray, values: np.ndarray, times: np.ndarray, before: np.ndarray, after: np.ndarray):
     """Interpolate (K, n) values between the samples `before` (K,) and `after` (K,); exact values at samples.
 
     known: (N,) s; values: (N, n).
@@ -169,8 +169,8 @@ def _between(known: np.ndarray, values: np.ndarray, times: np.ndarray, before: n
     return np.where(share == 0.0, values[before], values[before] * (1.0 - share) + values[after] * share)
 
 
-def _cut_course(course: SolvedCourse, start: float, end: float) -> SolvedCourse:
+def _cut_trajectory(course: SolvedTrajectory, start: float, end: float) -> SolvedTrajectory:
     low = max(int(np.searchsorted(course.times, start)) - 1, 0)
     part = slice(low, int(np.searchsorted(course.times, end)) + 1)
     touches = tuple(touch for touch in course.touches if start <= touch.time <= end)
-    return SolvedCourse(course.times[part], course.ball[part], course.filled[part], touches)
+    return SolvedTrajectory(course.times[part], course.ball[part], course.filled[part], touches)

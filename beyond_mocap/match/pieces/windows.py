@@ -16,28 +16,28 @@ from pathlib import Path
 
 import numpy as np
 
-from ...base.errors import InputError, TimedLine, spans_of
+from ...base.errors import InputError, TimedMessage, line_spans
 from ...files.whole import atomic_write
-from ...library.automatic import with_chosen_gaits
+from ...library.automatic import apply_chosen_gaits
 from ...library.features import FPS
 from ...library.library import Library
 from ...synthesis.plan import Plan
 from ...synthesis.resolve_plan import resolve_plan
-from ...synthesis.search.distance import exact_keys
-from ...synthesis.search.path_costs import PathCosts, balanced
+from ...synthesis.search.distance import align_keys
+from ...synthesis.search.path_costs import PathCosts, balance_weights
 from ...synthesis.search.path_search import PathSearch
-from ...synthesis.search.slots import AROUND
-from ...synthesis.search.wanted import build_order
-from ..player_edit import LAYOUT, PlayerEdit, Stretch, kept
-from .named_edit import CONTINUES, NamedEdit, NamedKey, bound, chained, named, part, retabled, table
+from ...synthesis.search.slots import MIN_KEY_MARGIN
+from ...synthesis.search.wanted import build_request
+from ..player_edit import WINDOW_SECONDS, PlayerEdit, Stretch, to_stored_plan
+from .named_edit import CONTINUITY_TOLERANCE, NamedEdit, NamedKey, to_library_edit, join_named_edits, to_named_edit, cut_named_edit, renumber_clips, list_clips
 from .units import Unit, cut_plan
 
 _ARRAYS = ("clip", "first", "rate", "length", "cut")
 _PLAIN = ("player", "stretch", "number", "first", "own", "seconds", "hurried")
-_APART = 4
+_MIN_SEAM_DISTANCE = 4
 """Frames between a joint and other transitions, so that it can be blended."""
 
-_NEAR_SEAM, _NEAR_KEY = 10.0, 1000.0
+_SEAM_COST, _KEY_COST = 10.0, 1000.0
 """Cost of a joint that close to another transition, and of one within the clip of a key moment."""
 
 
@@ -68,7 +68,7 @@ class Piece:
     hurried: int | None = None
 
 
-def searched(library: Library, unit: Unit, cancelled: Callable[[], bool] | None = None,
+def search_window(library: Library, unit: Unit, cancelled: Callable[[], bool] | None = None,
              hurry: Callable[[], bool] | None = None) -> Piece:  # fmt: skip
     """Search the edit list of one window of a player. The same library, unit and numpy give the same bits.
 
@@ -86,27 +86,27 @@ def searched(library: Library, unit: Unit, cancelled: Callable[[], bool] | None 
     """
     from threadpoolctl import threadpool_limits
 
-    begun = time.process_time()
+    started = time.process_time()
     with threadpool_limits(limits=1):
-        library = searched_library(library, unit.plan)
-        plan = resolve_plan(unit.plan, library, touches_solved=True)
-        order = build_order(library, plan)
-        search = PathSearch(library, order, balanced(unit.plan.alpha), cancelled=cancelled, hurry=hurry, on_grid=True)
-        edit = exact_keys(library, search.run(), order)
+        library = build_search_library(library, unit.plan)
+        plan = resolve_plan(unit.plan, library, are_touches_resolved=True)
+        order = build_request(library, plan)
+        search = PathSearch(library, order, balance_weights(unit.plan.alpha), cancelled=cancelled, hurry=hurry, on_grid=True)
+        edit = align_keys(library, search.run(), order)
     return Piece(player=unit.player, stretch=unit.stretch, number=unit.number, first=unit.first, own=unit.own,
-                 edit=named(library, edit, plan.timeline.keys), seconds=time.process_time() - begun,
-                 warnings=order.warnings, hurried=search.hurried)  # fmt: skip
+                 edit=to_named_edit(library, edit, plan.timeline.keys), seconds=time.process_time() - started,
+                 warnings=order.warnings, hurried=search.hurried_from)  # fmt: skip
 
 
-def searched_library(library: Library, plan: Plan) -> Library:
+def build_search_library(library: Library, plan: Plan) -> Library:
     """Build the library in which all windows of a plan are searched."""
-    return with_chosen_gaits(library.extended if plan.made else library, dict(plan.gaits))
+    return apply_chosen_gaits(library.with_synthetic_clips if plan.made else library, dict(plan.gaits))
 
 
-def keep_piece(path: Path, piece: Piece) -> None:
+def save_piece(path: Path, piece: Piece) -> None:
     """Save a piece; InputError if it cannot be written."""
     header = {name: getattr(piece, name) for name in _PLAIN}
-    header |= {"warnings": [[str(line), spans_of(line)] for line in piece.warnings]}
+    header |= {"warnings": [[str(line), line_spans(line)] for line in piece.warnings]}
     header |= {"clips": piece.edit.clips, "keys": [asdict(key) for key in piece.edit.keys]}
     out = io.BytesIO()
     arrays = {name: getattr(piece.edit, name) for name in _ARRAYS}
@@ -114,16 +114,16 @@ def keep_piece(path: Path, piece: Piece) -> None:
     atomic_write(path, out.getvalue())
 
 
-def kept_piece(path: Path) -> Piece | None:
+def load_piece(path: Path) -> Piece | None:
     """Load the piece that `save_piece` wrote; None if there is no complete file."""
     try:
-        with np.load(path, allow_pickle=False) as kept:
-            header = json.loads(kept["header"].tobytes())
-            arrays = {name: kept[name] for name in _ARRAYS}
+        with np.load(path, allow_pickle=False) as file:
+            header = json.loads(file["header"].tobytes())
+            arrays = {name: file[name] for name in _ARRAYS}
         keys = tuple(NamedKey(**{**key, "words": tuple(key["words"])}) for key in header.pop("keys"))
         clips = tuple((path, mirrored) for path, mirrored in header.pop("clips"))
-        told = tuple(TimedLine(text, *spans) for text, spans in header["warnings"])
-        header |= {"own": tuple(header["own"]), "warnings": told}
+        warnings = tuple(TimedMessage(text, *spans) for text, spans in header["warnings"])
+        header |= {"own": tuple(header["own"]), "warnings": warnings}
         return Piece(edit=NamedEdit(clips=clips, **arrays, keys=keys), **header)
     except Exception:  # a damaged file can raise any error of zipfile, zlib, numpy or this package
         return None
@@ -142,8 +142,8 @@ class Joint:
     agreed: bool
 
 
-def spliced(
-    library: Library, plans: Sequence[Plan], pieces: Sequence[Piece], window: float = LAYOUT
+def join_pieces(
+    library: Library, plans: Sequence[Plan], pieces: Sequence[Piece], window: float = WINDOW_SECONDS
 ) -> tuple[PlayerEdit, tuple[Joint, ...]]:
     """Join all windows of a player.
 
@@ -159,76 +159,76 @@ def spliced(
     """
     stretches, joints = [], []
     for number, plan in enumerate(plans):
-        plan = kept(plan)
-        mine = sorted((piece for piece in pieces if piece.stretch == number), key=lambda piece: piece.number)
-        numbers = [piece.number for piece in mine]
-        if not mine or numbers != list(range(len(mine))):
+        plan = to_stored_plan(plan)
+        stretch_pieces = sorted((piece for piece in pieces if piece.stretch == number), key=lambda piece: piece.number)
+        numbers = [piece.number for piece in stretch_pieces]
+        if not stretch_pieces or numbers != list(range(len(stretch_pieces))):
             found = f"windows {', '.join(map(str, numbers)) or 'none'} of {plan.track.name}"
             raise InputError("match", found, "all windows of a stretch", "search the others too")
-        edit, joined = _joined(library, plan, mine)
+        edit, stretch_joints = _join_stretch(library, plan, stretch_pieces)
         begin = float(plan.track.times[0])
-        warnings = tuple(dict.fromkeys(line for piece in mine for line in piece.warnings))
+        warnings = tuple(dict.fromkeys(line for piece in stretch_pieces for line in piece.warnings))
         short = tuple((begin + (piece.first + piece.hurried) / FPS, begin + piece.own[1] / FPS)
-                      for piece in mine if piece.hurried is not None)  # fmt: skip
+                      for piece in stretch_pieces if piece.hurried is not None)  # fmt: skip
         stretches.append(Stretch(plan, edit, warnings, short))
-        joints += joined
+        joints += stretch_joints
     return PlayerEdit(plans[0].track.name, window, tuple(stretches)), tuple(joints)
 
 
-def _joined(library: Library, plan: Plan, pieces: list[Piece]) -> tuple[NamedEdit, list[Joint]]:
+def _join_stretch(library: Library, plan: Plan, pieces: list[Piece]) -> tuple[NamedEdit, list[Joint]]:
     """Join the windows of a stretch; return its edit list and the joints."""
-    clips = table([piece.edit for piece in pieces])
-    pieces = [replace(piece, edit=retabled(piece.edit, clips)) for piece in pieces]
-    joints = [_joint(library, plan, *pair) for pair in zip(pieces, pieces[1:])]
+    clips = list_clips([piece.edit for piece in pieces])
+    pieces = [replace(piece, edit=renumber_clips(piece.edit, clips)) for piece in pieces]
+    joints = [_find_joint(library, plan, *pair) for pair in zip(pieces, pieces[1:])]
     edges = [0, *(joint.frame for joint in joints), pieces[-1].first + len(pieces[-1].edit)]
     parts, keys = [], []
     for piece, low, high in zip(pieces, edges, edges[1:]):
-        parts.append(part(piece.edit, low - piece.first, high - piece.first))
-        keys += [key for key in piece.edit.keys if low <= _frame(plan, key) < high]
-    return chained(parts, keys), joints
+        parts.append(cut_named_edit(piece.edit, low - piece.first, high - piece.first))
+        keys += [key for key in piece.edit.keys if low <= _find_key_frame(plan, key) < high]
+    return join_named_edits(parts, keys), joints
 
 
-def _frame(plan: Plan, key: NamedKey) -> float:
+def _find_key_frame(plan: Plan, key: NamedKey) -> float:
     """Find the frame of the stretch at which a key moment is played."""
     moment = next(moment for moment in plan.timeline.keys if moment.time == key.time)
-    return (moment.in_force - float(plan.track.times[0])) * FPS
+    return (moment.resolved_time - float(plan.track.times[0])) * FPS
 
 
-def _joint(library: Library, plan: Plan, before: Piece, after: Piece) -> Joint:
+def _find_joint(library: Library, plan: Plan, before: Piece, after: Piece) -> Joint:
     """Find the joint of two windows: closest to the edge between them where both agree, else where it costs least."""
     low, high, edge = after.first, before.first + len(before.edit), after.own[0]
-    (clip, frame), (other, there) = (
+    (clip, frame), (other, other_frame) = (
         tuple(values[low - piece.first : high - piece.first] for values in piece.edit.frames())
         for piece in (before, after)
     )
-    same = (clip == other) & (np.abs(frame - there) < CONTINUES)
+    same = (clip == other) & (np.abs(frame - other_frame) < CONTINUITY_TOLERANCE)
     # Both the frame and the one before must agree, so that the joint continues the clip.
     at = np.flatnonzero(same[1:] & same[:-1]) + 1
     if len(at):
         return Joint(low + int(at[np.argmin(np.abs(low + at - edge))]), True)
-    return Joint(low + 1 + int(np.argmin(_costs(library, plan, before, after=after, low=low, high=high))), False)
+    return Joint(low + 1 + int(np.argmin(_compute_joint_costs(library, plan, before, after=after, low=low, high=high))), False)
 
 
-def _costs(library: Library, plan: Plan, before: Piece, after: Piece, low: int, high: int) -> np.ndarray:
+def _compute_joint_costs(library: Library, plan: Plan, before: Piece, after: Piece, low: int, high: int) -> np.ndarray:
     """Compute the costs (high - low - 1,) of joints at frames low + 1 .. high."""
-    library = searched_library(library, plan)
+    library = build_search_library(library, plan)
     begin = float(plan.track.times[0])
     here = cut_plan(plan, begin + low / FPS, begin + (high - 1) / FPS)
-    order = build_order(library, resolve_plan(here, library, touches_solved=True))
-    leaves, enters = (bound(library, part(p.edit, low - p.first, high - p.first)) for p in (before, after))
-    costs = PathCosts(library, order, balanced(plan.alpha))
-    step = np.gradient(leaves.frame)
-    step[np.append(leaves.seams, leaves.seams - 1)] = 1.0
+    order = build_request(library, resolve_plan(here, library, are_touches_resolved=True))
+    left_edit, entered_edit = (to_library_edit(library, cut_named_edit(p.edit, low - p.first, high - p.first)) for p in (before, after))
+    costs = PathCosts(library, order, balance_weights(plan.alpha))
+    step = np.gradient(left_edit.frame)
+    step[np.append(left_edit.transitions, left_edit.transitions - 1)] = 1.0
     # The cut goes from the frame after each left one to the frame the other window has there.
-    terms = costs.cut_terms(leaves.frame[:-1] + step[:-1], enters.frame[1:])
+    terms = costs.iter_cut_terms(left_edit.frame[:-1] + step[:-1], entered_edit.frame[1:])
     cost = np.diagonal(sum(values for _, values in terms)).copy()
     at = np.arange(1, high - low)
-    for seam in (*leaves.seams, *enters.seams):
-        cost += _NEAR_SEAM * ((np.abs(at - seam) < _APART) & (at != seam))
+    for seam in (*left_edit.transitions, *entered_edit.transitions):
+        cost += _SEAM_COST * ((np.abs(at - seam) < _MIN_SEAM_DISTANCE) & (at != seam))
     for key in (*before.edit.keys, *after.edit.keys):
         name = before.edit.clips[key.clip]
         rate = FPS / next(clip for clip in library.clips if (clip.path, clip.mirrored) == name).motion.fps
-        entry, leave = (max(AROUND, seconds * rate) for seconds in (key.frame - key.start, key.end - key.frame))
-        middle = _frame(plan, key) - low
-        cost += _NEAR_KEY * ((at > middle - entry) & (at < middle + leave))
+        entry, leave = (max(MIN_KEY_MARGIN, seconds * rate) for seconds in (key.frame - key.start, key.end - key.frame))
+        middle = _find_key_frame(plan, key) - low
+        cost += _KEY_COST * ((at > middle - entry) & (at < middle + leave))
     return cost

@@ -16,23 +16,23 @@ from pathlib import Path
 import numpy as np
 
 from ...base.errors import InputError
-from ...evaluation.report import evaluate, rounded
+from ...evaluation.report import evaluate, round_values
 from ...files.bvh import bvh
-from ...library.build import build
+from ...library.build import build_library
 from ...library.library import Library
 from ...motion.track import Track
 from ...motion.track.ball_path import BallPath
-from ...synthesis.provenance import Provenance, provenance_of, write_provenance
+from ...synthesis.provenance import Provenance, build_provenance, write_provenance
 from ...synthesis.quality import movement
-from ...synthesis.quality.played import Played, played_from_take
+from ...synthesis.quality.played import Playback, playback_from_take
 from ...synthesis.take import Take
-from ..crowd.crowd_window import CrowdPart, crowd_window
+from ..crowd.crowd_window import PlayerCorrection, resolve_window
 from ..player_edit import PlayerEdit
-from ..shown import shown
+from ..shown import construct_displayed_player
 from .units import Unit
-from .windows import Piece, searched
+from .windows import Piece, search_window
 
-_MOST, _LEAST, _SUMMED = {"max", "support_max"}, {"min"}, {"frames", "duration_s"}
+_MAX_NAMES, _MIN_NAMES, _SUM_NAMES = {"max", "support_max"}, {"min"}, {"frames", "duration_s"}
 
 
 @dataclass(frozen=True)
@@ -57,10 +57,10 @@ class LibrarySource:
 
 
 _lock = threading.RLock()
-_held: dict[LibrarySource, Library] = {}
+_loaded: dict[LibrarySource, Library] = {}
 
 
-def library_of(source: LibrarySource) -> Library:
+def load_library(source: LibrarySource) -> Library:
     """Load the library, from memory if this process has read it before; one is held at a time.
 
     Args:
@@ -72,21 +72,21 @@ def library_of(source: LibrarySource) -> Library:
             results would differ.
     """
     with _lock:  # several threads of one worker may ask at the same time
-        if source not in _held:
-            built = build(source.folder, cache_dir=source.cache, skeleton=source.skeleton, unit=source.unit,
+        if source not in _loaded:
+            built = build_library(source.folder, cache_dir=source.cache, skeleton=source.skeleton, unit=source.unit,
                           seed=source.seed)
-            if source.key and built.kept[1] != source.key:
+            if source.key and built.cache_location[1] != source.key:
                 raise InputError(source.folder, "a different library from the one of this match",
                                  "the same clips and the same numpy for all workers", "start the command again")
-            hold(source, built)
-        return _held[source]
+            set_library(source, built)
+        return _loaded[source]
 
 
-def hold(source: LibrarySource, library: Library) -> None:
+def set_library(source: LibrarySource, library: Library) -> None:
     """Set the library that work in this process uses."""
     with _lock:
-        _held.clear()
-        _held[source] = library
+        _loaded.clear()
+        _loaded[source] = library
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +103,7 @@ class PlayerFiles:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Finish:
+class FinishRequest:
     """What is needed to finish a player.
 
     Attributes:
@@ -127,15 +127,15 @@ class Finish:
 
 def search_unit(source: LibrarySource, unit: Unit) -> Piece:
     """Search one window of one player (`windows.search_window`)."""
-    return searched(library_of(source), unit)
+    return search_window(load_library(source), unit)
 
 
-def part_crowd(source: LibrarySource, edits: Sequence[PlayerEdit], start: float, end: float) -> tuple[CrowdPart, ...]:
+def resolve_collision_window(source: LibrarySource, edits: Sequence[PlayerEdit], start: float, end: float) -> tuple[PlayerCorrection, ...]:
     """Resolve the collisions of all players in one window (`crowd.window.resolve_window`)."""
-    return crowd_window(library_of(source), edits, start, end)
+    return resolve_window(load_library(source), edits, start, end)
 
 
-def finish_player(source: LibrarySource, order: Finish) -> PlayerFiles:
+def finish_player(source: LibrarySource, request: FinishRequest) -> PlayerFiles:
     """Construct a player's whole motion, its figures and its files.
 
     Args:
@@ -146,25 +146,25 @@ def finish_player(source: LibrarySource, order: Finish) -> PlayerFiles:
     """
     from threadpoolctl import threadpool_limits
 
-    library = library_of(source)
+    library = load_library(source)
     with threadpool_limits(limits=1):
-        plans = [stretch.plan for stretch in order.edit.stretches]
+        plans = [stretch.plan for stretch in request.edit.stretches]
         span = float(plans[0].track.times[0]), float(plans[-1].track.times[-1])
-        takes = shown(library, order.edit, order.ball, *span)
+        takes = construct_displayed_player(library, request.edit, request.ball, *span)
         files, report = {}, None
-        if order.figures:
-            overlap = [_overlap(take, order) for take in takes]
-            report = player_report(library, takes, order.measured, overlap, order.ball)
-            table = _join_provenance([provenance_of(take) for take in takes])
-            files["provenance.csv"] = _written(lambda path: write_provenance(path, table))
-        if order.bvh:
+        if request.figures:
+            overlap = [_build_overlap(take, request) for take in takes]
+            report = build_player_report(library, takes, request.measured, overlap, request.ball)
+            table = _join_provenance([build_provenance(take) for take in takes])
+            files["provenance.csv"] = _write_to_bytes(lambda path: write_provenance(path, table))
+        if request.bvh:
             for number, take in enumerate(takes, 1):
                 ending = "bvh" if number == 1 else f"{number}.bvh"
-                files[ending] = _written(lambda path, take=take: bvh.write(path, take.motion))
+                files[ending] = _write_to_bytes(lambda path, take=take: bvh.write_bvh(path, take.motion))
     return PlayerFiles(report, files)
 
 
-def player_report(
+def build_player_report(
     library: Library, takes: Sequence[Take], tracks: Sequence[Track], overlap: Sequence[np.ndarray], ball: BallPath
 ) -> dict:
     """Build a player's report over all stretches, in the form of the contract's Report JSON with `time_lost_s` and
@@ -182,13 +182,13 @@ def player_report(
         InputError: if a take has another skeleton than the library.
     """
     reports = [evaluate(take, track, library) for take, track in zip(takes, tracks)]
-    out = combined(reports, [len(take.motion) for take in takes])
-    out["time_lost_s"] = time_lost(out["warning_seconds"])
-    out["per_second"] = per_second([played_from_take(take) for take in takes], tracks, overlap, ball)
-    return rounded(out)
+    out = merge_reports(reports, [len(take.motion) for take in takes])
+    out["time_lost_s"] = measure_time_lost(out["warning_seconds"])
+    out["per_second"] = measure_per_second([playback_from_take(take) for take in takes], tracks, overlap, ball)
+    return round_values(out)
 
 
-def combined(reports: Sequence[dict], weights: Sequence[float]) -> dict:
+def merge_reports(reports: Sequence[dict], weights: Sequence[float]) -> dict:
     """Merge the reports of several stretches.
 
     Means, shares and percentiles are weighted averages; maxima and minima stay so; numbers of frames and seconds are
@@ -202,10 +202,10 @@ def combined(reports: Sequence[dict], weights: Sequence[float]) -> dict:
     """
     if len(reports) == 1:
         return dict(reports[0])
-    return {name: _joined(name, [one.get(name) for one in reports], weights) for name in reports[0]}
+    return {name: _merge_values(name, [one.get(name) for one in reports], weights) for name in reports[0]}
 
 
-def time_lost(warning_seconds: Sequence[Sequence[Sequence[float]]]) -> float:
+def measure_time_lost(warning_seconds: Sequence[Sequence[Sequence[float]]]) -> float:
     """Measure the seconds in which a request was not met: the spans of the warnings, each second once."""
     spans = sorted((first, last) for line in warning_seconds for first, last in line)
     lost, until = 0.0, -np.inf
@@ -215,8 +215,8 @@ def time_lost(warning_seconds: Sequence[Sequence[Sequence[float]]]) -> float:
     return lost
 
 
-def per_second(
-    played: Sequence[Played], tracks: Sequence[Track], overlap: Sequence[np.ndarray], ball: BallPath
+def measure_per_second(
+    played: Sequence[Playback], tracks: Sequence[Track], overlap: Sequence[np.ndarray], ball: BallPath
 ) -> dict:
     """Measure figures for whole seconds of the match's clock.
 
@@ -235,7 +235,7 @@ def per_second(
     rows: dict[str, list] = {name: [None] * (end - start) for name in names}
     for one, track, deep in zip(played, tracks, overlap):
         second = np.floor(one.times + 1e-6).astype(int) - start
-        for name, values, over in _curves(one, track, deep, ball):
+        for name, values, over in _compute_curves(one, track, deep, ball):
             for number in np.unique(second):
                 found = values[second == number]
                 found = found[np.isfinite(found)]
@@ -243,12 +243,12 @@ def per_second(
     return {"start_s": start, **rows}
 
 
-def _overlap(take: Take, order: Finish) -> np.ndarray:
+def _build_overlap(take: Take, request: FinishRequest) -> np.ndarray:
     """Build (T,) m by which a take's body overlaps others."""
     out = np.zeros(len(take.motion))
-    at = order.frames - round(take.start_time * take.motion.fps)
+    at = request.frames - round(take.start_time * take.motion.fps)
     inside = (at >= 0) & (at < len(out))
-    out[at[inside]] = order.depth[inside]
+    out[at[inside]] = request.depth[inside]
     return out
 
 
@@ -260,7 +260,7 @@ def _join_provenance(tables: Sequence[Provenance]) -> Provenance:
                       words=tuple(words for one in tables for words in one.words), **arrays)
 
 
-def _written(write) -> bytes:
+def _write_to_bytes(write) -> bytes:
     """Return what `write(path)` writes."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "content"
@@ -268,37 +268,37 @@ def _written(write) -> bytes:
         return path.read_bytes()
 
 
-def _joined(name: str, values: list, weights: Sequence[float]):
+def _merge_values(name: str, values: list, weights: Sequence[float]):
     """Merge one value of several reports by its type and name; dicts are merged key by key."""
     known = [(value, weight) for value, weight in zip(values, weights) if value is not None]
     if not known:
         return None
     first = known[0][0]
     if isinstance(first, dict):
-        kept = [weight for _, weight in known]
-        return {key: _joined(key, [value.get(key) for value, _ in known], kept) for key in first}
+        known_weights = [weight for _, weight in known]
+        return {key: _merge_values(key, [value.get(key) for value, _ in known], known_weights) for key in first}
     if isinstance(first, list):
         return [entry for value, _ in known for entry in value]
     if isinstance(first, (bool, str)) or name in ("version", "seed", "fps"):
         return first
     numbers = np.array([value for value, _ in known], dtype=float)
-    if name in _MOST or name in _LEAST or name in _SUMMED:
-        done = numbers.max() if name in _MOST else numbers.min() if name in _LEAST else numbers.sum()
+    if name in _MAX_NAMES or name in _MIN_NAMES or name in _SUM_NAMES:
+        merged = numbers.max() if name in _MAX_NAMES else numbers.min() if name in _MIN_NAMES else numbers.sum()
     else:
-        done = np.average(numbers, weights=[weight for _, weight in known])
-    return int(done) if isinstance(first, int) and name in _SUMMED else float(done)
+        merged = np.average(numbers, weights=[weight for _, weight in known])
+    return int(merged) if isinstance(first, int) and name in _SUM_NAMES else float(merged)
 
 
-def _curves(played: Played, track: Track, overlap: np.ndarray, ball: BallPath):
+def _compute_curves(played: Playback, track: Track, overlap: np.ndarray, ball: BallPath):
     """Compute (name, values (T,) or (T, 2), how a second is summarised)."""
-    wanted = movement.track_at(track, played.times)
+    targets = movement.interpolate_track(track, played.times)
     skate = np.full((len(played.motion), 2), np.nan)
-    skate[1:] = 100.0 * movement.contact_speeds(played.feet, played.contacts, played.motion.fps)
+    skate[1:] = 100.0 * movement.measure_contact_speeds(played.feet, played.contacts, played.motion.fps)
     place = [np.interp(played.times, ball.times, ball.positions[:, axis], np.nan, np.nan) for axis in (0, 1)]
-    away = np.linalg.norm(played.pelvis - np.stack(place, axis=1), axis=1)
+    ball_distance = np.linalg.norm(played.pelvis - np.stack(place, axis=1), axis=1)
     return (
-        ("root_error_m", movement.root_error(played.pelvis, wanted, played.motion.fps), np.mean),
+        ("root_error_m", movement.measure_root_error(played.pelvis, targets, played.motion.fps), np.mean),
         ("skate_cm_s", skate, np.mean),
         ("overlap_m", np.asarray(overlap, dtype=float), np.max),
-        ("ball_m", away, np.min),
+        ("ball_m", ball_distance, np.min),
     )

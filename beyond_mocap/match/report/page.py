@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...base.errors import told_time
+from ...base.errors import format_seconds
 from ...evaluation.html_page import (
     Html,
     build_image,
@@ -22,30 +22,30 @@ from ...evaluation.html_page import (
     build_section,
     build_table,
     build_title,
-    element,
-    fragment,
+    build_element,
+    join_html,
 )
-from ...evaluation.report import flat
-from ...synthesis.quality.targets import target_of
-from .pictures import heat_strip, png
+from ...evaluation.report import flatten_report
+from ...synthesis.quality.targets import find_target
+from .pictures import render_heat_strip, encode_png
 from .results import (
     LIMITS,
-    LONGEST,
+    MAX_SECONDS,
     MatchResults,
     PlayerResult,
     WorstSecond,
-    badness,
-    number,
+    measure_badness,
+    to_number,
     read_match_results,
-    worst_seconds,
+    find_worst_seconds,
 )
 
 Thumbnail = Callable[[str, float], "np.ndarray | None"]
 """Player's id and second on the match clock -> picture as of `appearance.picture.pose_picture`, or None."""
 
-_AROUND = 15.0  # s before and after a bad second, shown in its strip
+_STRIP_SECONDS = 15.0  # s before and after a bad second, shown in its strip
 _TITLES = {"root_error_m": "off the track", "skate_cm_s": "feet in contact slide", "overlap_m": "bodies overlap"}
-_TOLD = {
+_PHRASES = {
     "root_error_m": ("{:.1f} cm off the track", 100.0), "skate_cm_s": ("feet in contact slide at {:.1f} cm/s", 1.0),
     "overlap_m": ("{:.1f} cm deep in another body", 100.0), "ball_m": ("ball {:.1f} m away", 1.0),
 }
@@ -64,7 +64,7 @@ details { border-bottom: 1px solid #eee; padding: .3em 0 } summary { cursor: poi
 """
 
 
-def page(folder: Path, thumbnail: Thumbnail | None = None) -> str:
+def build_match_page(folder: Path, thumbnail: Thumbnail | None = None) -> str:
     """Build the page of what 'beyond-mocap match' wrote, as text; failed and unfinished players are marked.
 
     Args:
@@ -77,146 +77,146 @@ def page(folder: Path, thumbnail: Thumbnail | None = None) -> str:
     """
     match = read_match_results(Path(folder))
     anchors = {player.id: f"player-{number}" for number, player in enumerate(match.players, 1)}
-    worst, span = worst_seconds(match.players), _span(match)
-    everybody = shared_warnings(match.players)
-    data = build_list((*match.lines, *everybody))
+    worst, span = find_worst_seconds(match.players), _choose_span(match)
+    shared = find_shared_warnings(match.players)
+    data = build_list((*match.lines, *shared))
     return build_page(
-        match.title, _head(match, span), _worst(match, worst, anchors, thumbnail),
-        *_teams(match, span, anchors, everybody), build_section("The data", data) if data else "", _took(match),
-        _players(match, worst, span, anchors, everybody), style=_STYLE,
+        match.title, _build_head(match, span), _build_worst_section(match, worst, anchors, thumbnail),
+        *_build_teams(match, span, anchors, shared), build_section("The data", data) if data else "", _build_times(match),
+        _build_players(match, worst, span, anchors, shared), style=_STYLE,
     )  # fmt: skip
 
 
-def _span(match: MatchResults) -> tuple[float, float]:
+def _choose_span(match: MatchResults) -> tuple[float, float]:
     """Choose the first and last second of the page: those requested, else those available; LONGEST at most."""
     known = [one for one in match.players if one.per_second]
     first, last = match.start, match.end
     if not math.isfinite(first):
         first = min((one.start for one in known), default=0.0)
     if not math.isfinite(last):
-        last = max((one.start + len(badness(one)) for one in known), default=first + 1.0)
-    return first, min(max(last, first + 1.0), first + LONGEST)
+        last = max((one.start + len(measure_badness(one)) for one in known), default=first + 1.0)
+    return first, min(max(last, first + 1.0), first + MAX_SECONDS)
 
 
-def _head(match: MatchResults, span: tuple[float, float]) -> Html:
+def _build_head(match: MatchResults, span: tuple[float, float]) -> Html:
     """Build the title and the summary of who is finished."""
-    made, missing = sum(one.made for one in match.players), [one for one in match.players if not one.made]
+    finished, missing = sum(one.is_finished for one in match.players), [one for one in match.players if not one.is_finished]
     rate = f", {match.fps:g} frames a second" if math.isfinite(match.fps) else ""
-    told = (f"{_clock(span[0])} to {_clock(span[1])} on the match clock{rate}; {made} of {len(match.players)} "
+    text = (f"{_format_clock(span[0])} to {_format_clock(span[1])} on the match clock{rate}; {finished} of {len(match.players)} "
             "players finished")  # fmt: skip
-    parts = [element("h1", match.title), element("p", told, class_="quiet")]
+    parts = [build_element("h1", match.title), build_element("p", text, class_="quiet")]
     if missing:
-        names = ", ".join(one.called for one in missing)
-        parts.append(element("p", f"Partial: {len(missing)} not finished: {names}", class_="missed"))
+        names = ", ".join(one.display_name for one in missing)
+        parts.append(build_element("p", f"Partial: {len(missing)} not finished: {names}", class_="missed"))
     elif match.status and match.status != "done":
-        parts.append(element("p", f"Partial: {match.status}", class_="missed"))
-    return fragment(*parts, between="\n")
+        parts.append(build_element("p", f"Partial: {match.status}", class_="missed"))
+    return join_html(*parts, separator="\n")
 
 
-def _worst(match: MatchResults, worst: tuple[WorstSecond, ...], anchors: Mapping[str, str], thumbnail) -> Html:
+def _build_worst_section(match: MatchResults, worst: tuple[WorstSecond, ...], anchors: Mapping[str, str], thumbnail) -> Html:
     """Build the section with the worst seconds."""
     title = "Worst seconds"
     if not any(player.per_second for player in match.players):
-        return build_section(title, element("p", "No report has figures by the second.", class_="quiet"))
+        return build_section(title, build_element("p", "No report has figures by the second.", class_="quiet"))
     track, overlap = 100 * LIMITS["root_error_m"], 100 * LIMITS["overlap_m"]
     limits = (f"beyond {track:g} cm off the track, {LIMITS['skate_cm_s']:g} cm/s of foot sliding, or {overlap:g} cm "
               "of overlap of two bodies")  # fmt: skip
     if not worst:
-        return build_section(title, element("p", f"No second is {limits}.", class_="met"))
-    lines = [_worst_line(match, place, one, anchors, thumbnail) for place, one in enumerate(worst, 1)]
-    return build_section(title, element("p", f"Seconds {limits}.", class_="quiet"), *lines)
+        return build_section(title, build_element("p", f"No second is {limits}.", class_="met"))
+    lines = [_build_worst_line(match, place, one, anchors, thumbnail) for place, one in enumerate(worst, 1)]
+    return build_section(title, build_element("p", f"Seconds {limits}.", class_="quiet"), *lines)
 
 
-def _worst_line(match: MatchResults, place: int, one: WorstSecond, anchors: Mapping[str, str], thumbnail) -> Html:
+def _build_worst_line(match: MatchResults, place: int, second: WorstSecond, anchors: Mapping[str, str], thumbnail) -> Html:
     """Build one line of the worst seconds, with picture, figures and strip."""
-    pose = thumbnail(one.player.id, one.time + 0.5) if thumbnail is not None else None
-    strip = _strip(one.player, (one.time - _AROUND, one.time + _AROUND + 1.0), "wide")
-    other = (" (in ", _linked(one.other, anchors), ")") if one.other is not None else ()
-    who = (_linked(one.player, anchors), *other, ", ", element("b", _clock(one.time)), _frame(match, one.time))
-    limit = f"{one.times:.1f} times the limit; {_AROUND:g} s before and after. In Blender: "
-    return element(
-        "div", element("b", str(place)), _pose(one.player, pose) if pose is not None else "",
-        element("div", element("p", *who, ": ", "; ".join(_figures_at(one))), strip,
-                element("p", limit, element("code", _go_to(one)), class_="quiet")),
-        class_="worst", id=_moment_anchor(one, anchors),
+    pose = thumbnail(second.player.id, second.time + 0.5) if thumbnail is not None else None
+    strip = _build_strip(second.player, (second.time - _STRIP_SECONDS, second.time + _STRIP_SECONDS + 1.0), "wide")
+    other = (" (in ", _build_link(second.other, anchors), ")") if second.other is not None else ()
+    who = (_build_link(second.player, anchors), *other, ", ", build_element("b", _format_clock(second.time)), _describe_frame(match, second.time))
+    limit = f"{second.times:.1f} times the limit; {_STRIP_SECONDS:g} s before and after. In Blender: "
+    return build_element(
+        "div", build_element("b", str(place)), _build_pose_image(second.player, pose) if pose is not None else "",
+        build_element("div", build_element("p", *who, ": ", "; ".join(_describe_figures(second))), strip,
+                build_element("p", limit, build_element("code", _build_jump_command(second)), class_="quiet")),
+        class_="worst", id=_build_anchor(second, anchors),
     )  # fmt: skip
 
 
-def _figures_at(one: WorstSecond) -> list[str]:
+def _describe_figures(second: WorstSecond) -> list[str]:
     """Describe what is wrong in this second, the worst figure first, and how far away the ball is."""
-    row = round(one.time - one.player.start)
-    values = {figure: column[row] for figure, column in one.player.per_second.items() if np.isfinite(column[row])}
+    row = round(second.time - second.player.start)
+    values = {figure: column[row] for figure, column in second.player.per_second.items() if np.isfinite(column[row])}
     wrong = [figure for figure in values if figure not in LIMITS or values[figure] > LIMITS[figure]]
-    order = sorted(wrong, key=lambda figure: figure != one.figure)
-    return [_TOLD[figure][0].format(_TOLD[figure][1] * values[figure]) for figure in order]
+    order = sorted(wrong, key=lambda figure: figure != second.figure)
+    return [_PHRASES[figure][0].format(_PHRASES[figure][1] * values[figure]) for figure in order]
 
 
-def _teams(match: MatchResults, span: tuple[float, float], anchors, everybody: tuple[str, ...]) -> list[Html]:
+def _build_teams(match: MatchResults, span: tuple[float, float], anchors, shared: tuple[str, ...]) -> list[Html]:
     """Build a table of players per team."""
-    strips = {player.id: _strip(player, span) for player in match.players}
+    strips = {player.id: _build_strip(player, span) for player in match.players}
     parts = []
     for team in match.teams:
-        own = [player for player in match.players if player.team == team.name]
-        dot = element("span", class_="dot", style=f"background:{team.colour}") if team.colour else ""
-        if own:
-            table = team_table(own, strips, anchors, everybody)
-            parts.append(build_section(fragment(dot, team.name or "No team"), table))
-    told = ("Strips: the worst figure of every second; green far below its limit, amber at it, red beyond, grey where "
+        members = [player for player in match.players if player.team == team.name]
+        dot = build_element("span", class_="dot", style=f"background:{team.colour}") if team.colour else ""
+        if members:
+            table = build_team_table(members, strips, anchors, shared)
+            parts.append(build_section(join_html(dot, team.name or "No team"), table))
+    text = ("Strips: the worst figure of every second; green far below its limit, amber at it, red beyond, grey where "
             "the player has no motion. Green and red figures: target met or not.")  # fmt: skip
-    return [*parts, element("p", told, class_="quiet")] if parts else []
+    return [*parts, build_element("p", text, class_="quiet")] if parts else []
 
 
-def _players(match: MatchResults, worst: tuple[WorstSecond, ...], span, anchors, everybody: tuple[str, ...]) -> Html:
+def _build_players(match: MatchResults, worst: tuple[WorstSecond, ...], span, anchors, shared: tuple[str, ...]) -> Html:
     """Build the details of every player."""
     parts = []
     for player in match.players:
         reason = f": {player.reason}" if player.reason else ""
-        lines = [] if player.made else [element("p", f"{player.status}{reason}", class_="missed")]
+        lines = [] if player.is_finished else [build_element("p", f"{player.status}{reason}", class_="missed")]
         for figure, limit in LIMITS.items():
             if figure in player.per_second:
                 bad = player.per_second[figure] / limit
-                strip = _image(heat_strip(bad, player.start, span), "wide")
-                lines += [element("p", _TITLES[figure], class_="quiet"), strip]
+                strip = _build_strip_image(render_heat_strip(bad, player.start, span), "wide")
+                lines += [build_element("p", _TITLES[figure], class_="quiet"), strip]
         own = [one for one in worst if one.player is player]
         for one in own:
-            anchor, told = f"#{_moment_anchor(one, anchors)}", f"{_clock(one.time)}: one of the worst seconds"
-            lines.append(element("p", element("a", told, href=anchor)))
-        lines.append(build_list(own_warnings(player, everybody) + player.data))
-        name = element("summary", player.called, " ", element("span", player.team, class_="quiet"))
-        parts.append(element("details", name, *lines, id=anchors[player.id], open=bool(own)))
+            anchor, text = f"#{_build_anchor(one, anchors)}", f"{_format_clock(one.time)}: one of the worst seconds"
+            lines.append(build_element("p", build_element("a", text, href=anchor)))
+        lines.append(build_list(select_own_warnings(player, shared) + player.data))
+        name = build_element("summary", player.display_name, " ", build_element("span", player.team, class_="quiet"))
+        parts.append(build_element("details", name, *lines, id=anchors[player.id], open=bool(own)))
     return build_section("Every player", *parts) if parts else Html()
 
 
-def _took(match: MatchResults) -> Html:
-    rows = [build_row(stage, element("td", f"{spent:.1f} s", class_="n")) for stage, spent in match.seconds.items()]
+def _build_times(match: MatchResults) -> Html:
+    rows = [build_row(stage, build_element("td", f"{spent:.1f} s", class_="n")) for stage, spent in match.seconds.items()]
     return build_section("Where the time went", build_table((), rows)) if rows else Html()
 
 
-def _strip(player: PlayerResult, span: tuple[float, float], look: str = "") -> Html:
-    bad = badness(player)
+def _build_strip(player: PlayerResult, span: tuple[float, float], look: str = "") -> Html:
+    bad = measure_badness(player)
     if not len(bad):
-        return element("span", "nothing by the second", class_="quiet")
-    return _image(heat_strip(bad, player.start, span), look)
+        return build_element("span", "nothing by the second", class_="quiet")
+    return _build_strip_image(render_heat_strip(bad, player.start, span), look)
 
 
-def _image(data: bytes, look: str) -> Html:
+def _build_strip_image(data: bytes, look: str) -> Html:
     return build_image(data, "worst figure of every second", f"strip {look}".strip())
 
 
-def _pose(player: PlayerResult, pose: np.ndarray) -> Html:
+def _build_pose_image(player: PlayerResult, pose: np.ndarray) -> Html:
     """Build the image of a picture of `appearance.picture`, whose lowest row is the first."""
-    return build_image(png(np.rint(255.0 * np.clip(pose[::-1], 0.0, 1.0)).astype(np.uint8)), player.called, "pose")
+    return build_image(encode_png(np.rint(255.0 * np.clip(pose[::-1], 0.0, 1.0)).astype(np.uint8)), player.display_name, "pose")
 
 
-def _linked(player: PlayerResult, anchors: Mapping[str, str]) -> Html:
-    return element("a", player.called, href=f"#{anchors[player.id]}")
+def _build_link(player: PlayerResult, anchors: Mapping[str, str]) -> Html:
+    return build_element("a", player.display_name, href=f"#{anchors[player.id]}")
 
 
-def _moment_anchor(one: WorstSecond, anchors: Mapping[str, str]) -> str:
+def _build_anchor(one: WorstSecond, anchors: Mapping[str, str]) -> str:
     return f"{anchors[one.player.id]}-second-{one.time:.0f}"
 
 
-def _frame(match: MatchResults, time: float) -> str:
+def _describe_frame(match: MatchResults, time: float) -> str:
     """Describe the frame of the span, counted from the first on the clock's grid as in ball.csv; "" if unknown."""
     if not math.isfinite(match.start * match.fps):
         return ""
@@ -224,13 +224,13 @@ def _frame(match: MatchResults, time: float) -> str:
     return f", frame {max(math.ceil(time * match.fps - 1e-6) - first, 0)}"
 
 
-def _go_to(one: WorstSecond) -> str:
-    return f"bpy.ops.beyond_mocap.match_second(seconds={told_time(one.time)}, player={one.player.id!r})"
+def _build_jump_command(one: WorstSecond) -> str:
+    return f"bpy.ops.beyond_mocap.match_second(seconds={format_seconds(one.time)}, player={one.player.id!r})"
 
 
-def _clock(seconds: float) -> str:
+def _format_clock(seconds: float) -> str:
     """Format seconds for the page: 754 s (12:34)."""
-    return f"{told_time(seconds)} s ({int(seconds // 60)}:{int(seconds % 60):02d})"
+    return f"{format_seconds(seconds)} s ({int(seconds // 60)}:{int(seconds % 60):02d})"
 
 
 @dataclass(frozen=True)
@@ -263,23 +263,23 @@ COLUMNS = (
     Column("loop_share", "repeated", "%", 100.0),
     Column("overlap_m.max", "overlap", "cm", 100.0),
 )
-_OVERLAP = 0.02  # m of overlap of two bodies that is accepted
+_MAX_OVERLAP = 0.02  # m of overlap of two bodies that is accepted
 
 
-def shared_warnings(players: Sequence[PlayerResult]) -> tuple[str, ...]:
+def find_shared_warnings(players: Sequence[PlayerResult]) -> tuple[str, ...]:
     """Find the warnings that all reports share: they are about the library, not a player; none for a single player."""
-    told = [own_warnings(player, ()) for player in players if player.report]
-    return tuple(line for line in told[0] if all(line in other for other in told)) if len(told) > 1 else ()
+    warnings = [select_own_warnings(player, ()) for player in players if player.report]
+    return tuple(line for line in warnings[0] if all(line in other for other in warnings)) if len(warnings) > 1 else ()
 
 
-def own_warnings(player: PlayerResult, everybody: tuple[str, ...]) -> tuple[str, ...]:
+def select_own_warnings(player: PlayerResult, shared: tuple[str, ...]) -> tuple[str, ...]:
     """Select a player's warnings, each once, without those in `shared`."""
     lines = dict.fromkeys(map(str, player.report.get("warnings") or ()))
-    return tuple(line for line in lines if line not in everybody)
+    return tuple(line for line in lines if line not in shared)
 
 
-def team_table(
-    players: Sequence[PlayerResult], strips: Mapping[str, Html], anchors: Mapping[str, str], everybody: tuple[str, ...]
+def build_team_table(
+    players: Sequence[PlayerResult], strips: Mapping[str, Html], anchors: Mapping[str, str], shared: tuple[str, ...]
 ) -> Html:
     """Build a team's table: a row per player, then their mean and the worst of them.
 
@@ -293,58 +293,58 @@ def team_table(
     """
     titles = [build_title(column.title, column.unit) for column in COLUMNS]
     head = ("player", *titles, build_title("warnings"), "second by second")
-    rows = [_row(player, element("td", strips[player.id]), anchors[player.id], everybody) for player in players]
-    return build_table(head, [*rows, *_summary(players, everybody)])
+    rows = [_build_player_row(player, build_element("td", strips[player.id]), anchors[player.id], shared) for player in players]
+    return build_table(head, [*rows, *_build_summary(players, shared)])
 
 
-def _row(player: PlayerResult, strip: Html, anchor: str, everybody: tuple[str, ...]) -> Html:
+def _build_player_row(player: PlayerResult, strip: Html, anchor: str, shared: tuple[str, ...]) -> Html:
     """Build a player's row; without a report, only status and strip."""
-    link = element("a", player.called, href=f"#{anchor}")
+    link = build_element("a", player.display_name, href=f"#{anchor}")
     if not player.report:
-        why = element("td", _why(player), colspan=len(COLUMNS) + 1, class_="missed")
-        return build_row(element("td", link, class_="name"), why, strip)
-    found = flat({key: value for key, value in player.report.items() if key != "per_second"})
-    cells = [_cell(column, _value(player, column.figure, found), player, found) for column in COLUMNS]
-    note = () if player.made else (element("br"), element("span", _why(player), class_="missed"))
-    count = build_number_cell(len(own_warnings(player, everybody)))
-    return build_row(element("td", link, *note, class_="name"), *cells, count, strip)
+        why = build_element("td", _describe_status(player), colspan=len(COLUMNS) + 1, class_="missed")
+        return build_row(build_element("td", link, class_="name"), why, strip)
+    found = flatten_report({key: value for key, value in player.report.items() if key != "per_second"})
+    cells = [_build_cell(column, _find_value(player, column.figure, found), player, found) for column in COLUMNS]
+    note = () if player.is_finished else (build_element("br"), build_element("span", _describe_status(player), class_="missed"))
+    count = build_number_cell(len(select_own_warnings(player, shared)))
+    return build_row(build_element("td", link, *note, class_="name"), *cells, count, strip)
 
 
-def _why(player: PlayerResult) -> str:
+def _describe_status(player: PlayerResult) -> str:
     return f"{player.status}: {player.reason}" if player.reason else player.status
 
 
-def _summary(players: Sequence[PlayerResult], everybody: tuple[str, ...]) -> list[Html]:
+def _build_summary(players: Sequence[PlayerResult], shared: tuple[str, ...]) -> list[Html]:
     """Build the rows with mean and maximum over all players with a report; none for a single one."""
-    made = [player for player in players if player.report]
-    if len(made) < 2:
+    reported = [player for player in players if player.report]
+    if len(reported) < 2:
         return []
-    columns = [[_value(player, column.figure, flat(player.report)) for player in made] for column in COLUMNS]
+    columns = [[_find_value(player, column.figure, flatten_report(player.report)) for player in reported] for column in COLUMNS]
     lines = []
     for title, measure in (("mean", lambda known: sum(known) / len(known)), ("worst", max)):
         known = [[value for value in values if math.isfinite(value)] for values in columns]
-        cells = [_plain(column, measure(values) if values else math.nan) for column, values in zip(COLUMNS, known)]
-        counts = [len(own_warnings(player, everybody)) for player in made]
+        cells = [_build_plain_cell(column, measure(values) if values else math.nan) for column, values in zip(COLUMNS, known)]
+        counts = [len(select_own_warnings(player, shared)) for player in reported]
         lines.append(build_row(title, *cells, build_number_cell(measure(counts)), "", class_="sum"))
     return lines
 
 
-def _value(player: PlayerResult, figure: str, found: Mapping[str, object]) -> float:
+def _find_value(player: PlayerResult, figure: str, found: Mapping[str, object]) -> float:
     """Find a figure; overlap from the seconds if the report has it only there."""
-    told = number(found.get(figure))
-    if math.isnan(told) and figure == "overlap_m.max":
+    reported = to_number(found.get(figure))
+    if math.isnan(reported) and figure == "overlap_m.max":
         column = [value for value in player.per_second.get("overlap_m", ()) if math.isfinite(value)]
         return max(column, default=math.nan)
-    return told
+    return reported
 
 
-def _cell(column: Column, value: float, player: PlayerResult, found: Mapping[str, object]) -> Html:
-    target = target_of(column.figure, number(player.report.get("fps")) or 30.0)
-    met = target.met(value, found) if target is not None and math.isfinite(value) else None
+def _build_cell(column: Column, value: float, player: PlayerResult, found: Mapping[str, object]) -> Html:
+    target = find_target(column.figure, to_number(player.report.get("fps")) or 30.0)
+    is_met = target.is_met(value, found) if target is not None and math.isfinite(value) else None
     if column.figure == "overlap_m.max" and math.isfinite(value):
-        met = value <= _OVERLAP
-    return _plain(column, value, {True: "met", False: "missed", None: ""}[met])
+        is_met = value <= _MAX_OVERLAP
+    return _build_plain_cell(column, value, {True: "met", False: "missed", None: ""}[is_met])
 
 
-def _plain(column: Column, value: float, status: str = "") -> Html:
+def _build_plain_cell(column: Column, value: float, status: str = "") -> Html:
     return build_number_cell(value, column.digits, column.scale, status)

@@ -11,24 +11,24 @@ from pathlib import Path
 
 import numpy as np
 
-from ...appearance.picture import pose_picture
+from ...appearance.picture import render_pose
 from ...base.errors import BeyondMocapError
 from ...library.library import Library
 from ..folder import read_state
 from ..player_edit import read_player
-from ..shown import shown
+from ..shown import construct_displayed_player
 
-CELLS = 900
+MAX_CELLS = 900
 """Most cells of a strip; if a match has more seconds, each cell shows the worst of its seconds."""
-FULL = 3.0
+FULL_COLOUR = 3.0
 """Multiple of the limit at which the colour scale ends."""
 _GOOD, _LIMIT, _BAD = np.array([[226, 240, 229], [250, 205, 110], [170, 20, 20]], float)
-_NOBODY = np.array([236, 236, 236], float)
-SIZE = 224
+_ABSENT = np.array([236, 236, 236], float)
+PICTURE_SIZE = 224
 """Pixels, side of a player's picture."""
 
 
-def heat_strip(bad: np.ndarray, start: float, span: tuple[float, float], height: int = 1) -> bytes:
+def render_heat_strip(bad: np.ndarray, start: float, span: tuple[float, float], height: int = 1) -> bytes:
     """Render the strip of one player.
 
     Args:
@@ -44,12 +44,12 @@ def heat_strip(bad: np.ndarray, start: float, span: tuple[float, float], height:
     rows = np.arange(len(bad)) + round(start) - first
     inside = (rows >= 0) & (rows < count)
     whole[rows[inside]] = bad[inside]
-    cells = min(count, CELLS)
+    cells = min(count, MAX_CELLS)
     edges = np.linspace(0, count, cells + 1).astype(int)[:-1]
-    return png(np.repeat(colours(np.fmax.reduceat(whole, edges))[None], height, axis=0))
+    return encode_png(np.repeat(compute_colours(np.fmax.reduceat(whole, edges))[None], height, axis=0))
 
 
-def thumbnails(library: Library, folder: Path) -> Callable[[str, float], np.ndarray | None]:
+def build_thumbnail_renderer(library: Library, folder: Path) -> Callable[[str, float], np.ndarray | None]:
     """Build a function that renders a player at a second of the match.
 
     Args:
@@ -63,29 +63,29 @@ def thumbnails(library: Library, folder: Path) -> Callable[[str, float], np.ndar
     """
     files: Mapping[str, str] = {row["id"]: str(row.get("file", row["id"])) for row in read_state(folder)["players"]}
 
-    def drawn(player: str, second: float) -> np.ndarray | None:
+    def render_thumbnail(player: str, second: float) -> np.ndarray | None:
         path = folder / f"{files[player]}.take.npz"
         try:
-            takes = shown(library, read_player(path), None, second, second + 1.0)
-            return pose_picture(takes[0].motion, 0, SIZE) if takes else None
+            takes = construct_displayed_player(library, read_player(path), None, second, second + 1.0)
+            return render_pose(takes[0].motion, 0, PICTURE_SIZE) if takes else None
         except BeyondMocapError:
             return None
 
-    return drawn
+    return render_thumbnail
 
 
-def colours(bad: np.ndarray) -> np.ndarray:
+def compute_colours(bad: np.ndarray) -> np.ndarray:
     """Compute colours (..., 3) uint8 of badness (...): pale green up to half the limit, amber at it, dark red from
     FULL_COLOUR, grey for NaN.
     """
-    known = np.clip(np.nan_to_num(np.asarray(bad, float))[..., None], 0.0, FULL)
+    known = np.clip(np.nan_to_num(np.asarray(bad, float))[..., None], 0.0, FULL_COLOUR)
     below = _GOOD + (_LIMIT - _GOOD) * np.clip(2.0 * known - 1.0, 0.0, 1.0)
-    above = _LIMIT + (_BAD - _LIMIT) * (known - 1.0) / (FULL - 1.0)
-    out = np.where(np.isnan(bad)[..., None], _NOBODY, np.where(known <= 1.0, below, above))
+    above = _LIMIT + (_BAD - _LIMIT) * (known - 1.0) / (FULL_COLOUR - 1.0)
+    out = np.where(np.isnan(bad)[..., None], _ABSENT, np.where(known <= 1.0, below, above))
     return np.rint(out).astype(np.uint8)
 
 
-def png(pixels: np.ndarray) -> bytes:
+def encode_png(pixels: np.ndarray) -> bytes:
     """Encode a picture as a PNG (ISO/IEC 15948): one chunk of rows without filter.
 
     Args:

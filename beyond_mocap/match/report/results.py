@@ -17,17 +17,17 @@ import numpy as np
 from ...base.errors import InputError
 from ...evaluation.report import check_depth
 
-MADE = "done"
+DONE_STATUS = "done"
 FIGURES = ("root_error_m", "skate_cm_s", "overlap_m", "ball_m")
 """Keys of a report's `per_second`, beside its `start_s`."""
-LONGEST = 6 * 3600
+MAX_SECONDS = 6 * 3600
 """s: the longest span of a match that a page shows."""
-_LATEST = 1e11  # s: some clocks count from 1970
+_MAX_TIME = 1e11  # s: some clocks count from 1970
 LIMITS = {"root_error_m": 0.015, "skate_cm_s": 7.0, "overlap_m": 0.02}
 """Limit of each figure in a second: 1.5 cm off the track, 2 cm of overlap of two bodies; at 7 cm/s a foot in contact
 slides 21 mm, which is visible, within a step of 0.3 s."""
-MOST = 10
-APART = 3
+MAX_WORST = 10
+GROUP_SECONDS = 3
 """s within which a player's bad seconds count as one."""
 
 
@@ -60,12 +60,12 @@ class PlayerResult:
     per_second: Mapping[str, np.ndarray] = field(default_factory=dict)
 
     @property
-    def made(self) -> bool:
+    def is_finished(self) -> bool:
         """True if there is a report of a finished motion."""
-        return self.status == MADE and bool(self.report)
+        return self.status == DONE_STATUS and bool(self.report)
 
     @property
-    def called(self) -> str:
+    def display_name(self) -> str:
         """Number and name for the page; the name alone if it includes the number."""
         name = self.name or self.id
         return name if not self.number or self.number in re.findall(r"\d+", name) else f"{self.number} {name}"
@@ -122,79 +122,79 @@ def read_match_results(folder: Path) -> MatchResults:
         InputError: if match.json is missing or not of the form in docs/match/match-report.md.
     """
     path = Path(folder) / "match.json"
-    told = _object(path)
-    rows = told.get("players", ())
-    if not isinstance(rows, list) or not all(isinstance(row, Mapping) and _text(row.get("id")) for row in rows):
+    state = _read_object(path)
+    rows = state.get("players", ())
+    if not isinstance(rows, list) or not all(isinstance(row, Mapping) and _to_text(row.get("id")) for row in rows):
         expected = "a list of objects with an id"
         raise InputError(path, "its players are not listed one by one", expected, "run the match again")
-    teams = _teams(told.get("teams"))
-    players = tuple(_player(Path(folder), row, teams) for row in rows)
+    teams = _parse_teams(state.get("teams"))
+    players = tuple(_parse_player(Path(folder), row, teams) for row in rows)
     known = {team.name for team in teams.values()}
     others = dict.fromkeys(player.team for player in players if player.team not in known)
     sides = [team.name for team in teams.values()][:2]
-    seconds = told.get("seconds") if isinstance(told.get("seconds"), Mapping) else {}
-    stages = {str(stage): number(spent) for stage, spent in seconds.items()}
+    seconds = state.get("seconds") if isinstance(state.get("seconds"), Mapping) else {}
+    stages = {str(stage): to_number(duration) for stage, duration in seconds.items()}
     return MatchResults(
-        title=_text(told.get("title")) or (" - ".join(sides) if len(sides) == 2 else Path(folder).resolve().name),
-        status=_text(told.get("status")), fps=number(told.get("fps")), start=_time(told.get("from_s")),
-        end=_time(told.get("to_s")), teams=(*teams.values(), *map(TeamResult, others)), players=players, seconds=stages,
-        lines=_lines(told),
+        title=_to_text(state.get("title")) or (" - ".join(sides) if len(sides) == 2 else Path(folder).resolve().name),
+        status=_to_text(state.get("status")), fps=to_number(state.get("fps")), start=_to_time(state.get("from_s")),
+        end=_to_time(state.get("to_s")), teams=(*teams.values(), *map(TeamResult, others)), players=players, seconds=stages,
+        lines=_collect_messages(state),
     )  # fmt: skip
 
 
-def _teams(told) -> dict[str, TeamResult]:
+def _parse_teams(rows_found) -> dict[str, TeamResult]:
     """Parse the teams by their ground, else by name; two teams of the same name get their ground added."""
-    rows = [row for row in told if isinstance(row, Mapping)] if isinstance(told, list) else []
-    names = [_text(row.get("name")) for row in rows]
+    rows = [row for row in rows_found if isinstance(row, Mapping)] if isinstance(rows_found, list) else []
+    names = [_to_text(row.get("name")) for row in rows]
     out = {}
     for row, name in zip(rows, names):
-        ground = _text(row.get("ground")) or name
+        ground = _to_text(row.get("ground")) or name
         label = f"{name} ({ground})" if names.count(name) > 1 and name else name or ground
-        out[ground] = TeamResult(label, _colour(row.get("colour")))
+        out[ground] = TeamResult(label, _to_colour(row.get("colour")))
     return out
 
 
-def _player(folder: Path, row: Mapping, teams: Mapping[str, TeamResult]) -> PlayerResult:
+def _parse_player(folder: Path, row: Mapping, teams: Mapping[str, TeamResult]) -> PlayerResult:
     """Parse a player's row and report."""
-    name, (status, _, reason) = str(row["id"]), _text(row.get("status")).partition(":")
+    name, (status, _, reason) = str(row["id"]), _to_text(row.get("status")).partition(":")
     report: Mapping = {}
-    trouble = ""
-    path = folder / f"{Path(_text(row.get('file')) or name).name}.report.json"
+    problem = ""
+    path = folder / f"{Path(_to_text(row.get('file')) or name).name}.report.json"
     if path.is_file():
         try:
-            report = _report(path)
+            report = _read_report(path)
         except InputError as error:
-            trouble = str(error)
-    elif status == MADE:
-        trouble = f"{path.name} is missing"
-    if trouble and status == MADE:
+            problem = str(error)
+    elif status == DONE_STATUS:
+        problem = f"{path.name} is missing"
+    if problem and status == DONE_STATUS:
         status = "no report"
-    ground = _text(row.get("team") or report.get("team"))
-    start, per_second = _by_second(report.get("per_second"))
-    return PlayerResult(id=name, name=_text(row.get("name") or report.get("name")),
-                        number=_text(row.get("number") or report.get("number")),
+    ground = _to_text(row.get("team") or report.get("team"))
+    start, per_second = _parse_per_second(report.get("per_second"))
+    return PlayerResult(id=name, name=_to_text(row.get("name") or report.get("name")),
+                        number=_to_text(row.get("number") or report.get("number")),
                         team=teams[ground].name if ground in teams else ground, status=status.strip() or "unknown",
-                        reason=trouble or _text(row.get("reason")) or reason.strip(), data=_lines(row), report=report,
+                        reason=problem or _to_text(row.get("reason")) or reason.strip(), data=_collect_messages(row), report=report,
                         start=start, per_second=per_second)  # fmt: skip
 
 
-def _by_second(told) -> tuple[float, dict[str, np.ndarray]]:
+def _parse_per_second(values_found) -> tuple[float, dict[str, np.ndarray]]:
     """Parse the first second, and the columns (S,) of FIGURES, filled with NaN to one length."""
-    if not isinstance(told, Mapping) or not math.isfinite(start := _time(told.get("start_s", 0.0))):
+    if not isinstance(values_found, Mapping) or not math.isfinite(start := _to_time(values_found.get("start_s", 0.0))):
         return 0.0, {}
-    lists = {key: told[key][:LONGEST] for key in FIGURES if isinstance(told.get(key), list)}
-    columns = {key: [number(value) for value in values] for key, values in lists.items()}
+    lists = {key: values_found[key][:MAX_SECONDS] for key in FIGURES if isinstance(values_found.get(key), list)}
+    columns = {key: [to_number(value) for value in values] for key, values in lists.items()}
     count = max(map(len, columns.values()), default=0)
     return start, {key: np.array(values + [math.nan] * (count - len(values))) for key, values in columns.items()}
 
 
-def _lines(told: Mapping) -> tuple[str, ...]:
+def _collect_messages(found: Mapping) -> tuple[str, ...]:
     """Collect the messages about data and work, in order, each once."""
-    lines = [line for key in ("data", "notes", "warnings") if isinstance(told.get(key), list) for line in told[key]]
-    return tuple(dict.fromkeys(_text(line) for line in lines))
+    lines = [line for key in ("data", "notes", "warnings") if isinstance(found.get(key), list) for line in found[key]]
+    return tuple(dict.fromkeys(_to_text(line) for line in lines))
 
 
-def number(value) -> float:
+def to_number(value) -> float:
     """Convert a JSON number to float; NaN for anything else, or if it is too large."""
     try:
         return float(value) if isinstance(value, (int, float)) and not isinstance(value, bool) else math.nan
@@ -202,40 +202,40 @@ def number(value) -> float:
         return math.nan
 
 
-def _time(value) -> float:
+def _to_time(value) -> float:
     """Convert seconds on a match clock; NaN for anything else."""
-    seconds = number(value)
-    return seconds if abs(seconds) <= _LATEST else math.nan
+    seconds = to_number(value)
+    return seconds if abs(seconds) <= _MAX_TIME else math.nan
 
 
-def _text(value) -> str:
+def _to_text(value) -> str:
     return "" if value is None else str(value).strip()
 
 
-def _colour(value) -> str:
+def _to_colour(value) -> str:
     """Convert a colour "#rrggbb"; "" for anything else."""
-    text = _text(value)
+    text = _to_text(value)
     return text if len(text) == 7 and text[0] == "#" and all(c in "0123456789abcdefABCDEF" for c in text[1:]) else ""
 
 
-def _report(path: Path) -> Mapping:
-    found = _object(path)
+def _read_report(path: Path) -> Mapping:
+    found = _read_object(path)
     if not isinstance(found.get("warnings", []), list):
         raise InputError(path, "cannot be read: its warnings are no list", "a player's report", "run the match again")
     return found
 
 
-def _object(path: Path) -> Mapping:
+def _read_object(path: Path) -> Mapping:
     try:
         found = json.loads(path.read_text("utf-8"))
     except OSError as error:
-        found, trouble = None, error.strerror or str(error)
+        found, problem = None, error.strerror or str(error)
     except (ValueError, RecursionError) as error:
-        found, trouble = None, str(error)
+        found, problem = None, str(error)
     else:
-        trouble = "not an object"
+        problem = "not an object"
     if not isinstance(found, Mapping):
-        raise InputError(path, f"cannot be read: {trouble}", "a file of 'beyond-mocap match'", "run the match again")
+        raise InputError(path, f"cannot be read: {problem}", "a file of 'beyond-mocap match'", "run the match again")
     check_depth(found, path)
     return found
 
@@ -261,7 +261,7 @@ class WorstSecond:
     other: PlayerResult | None = None
 
 
-def badness(player: PlayerResult) -> np.ndarray:
+def measure_badness(player: PlayerResult) -> np.ndarray:
     """Measure (S,) by how much the worst figure of each second exceeds its limit, as a multiple; NaN where unknown."""
     rows = [player.per_second[figure] / limit for figure, limit in LIMITS.items() if figure in player.per_second]
     if not rows:
@@ -269,7 +269,7 @@ def badness(player: PlayerResult) -> np.ndarray:
     return np.fmax.reduce(rows)
 
 
-def worst_seconds(players: Sequence[PlayerResult], most: int = MOST) -> tuple[WorstSecond, ...]:
+def find_worst_seconds(players: Sequence[PlayerResult], limit: int = MAX_WORST) -> tuple[WorstSecond, ...]:
     """Find the worst seconds beyond their limits.
 
     Of a player's seconds within GROUP_SECONDS the worst stands for all; an overlap of two bodies counts once.
@@ -281,49 +281,49 @@ def worst_seconds(players: Sequence[PlayerResult], most: int = MOST) -> tuple[Wo
         The seconds, the worst first.
     """
     found: list[WorstSecond] = []
-    for who, row, times in _in_order(players):
-        player, time = players[who], players[who].start + row
-        figure = _worst_figure(player, row)
+    for index, row, times in _sort_bad_seconds(players):
+        player, time = players[index], players[index].start + row
+        figure = _find_worst_figure(player, row)
         value = float(player.per_second[figure][row])
-        if any(_same(one, player, time, figure, value) for one in found):
+        if any(_is_same_second(one, player, time, figure, value) for one in found):
             continue
-        other = _other(players, player, time, value) if figure == "overlap_m" else None
+        other = _find_other_player(players, player, time, value) if figure == "overlap_m" else None
         found.append(WorstSecond(player=player, time=time, figure=figure, value=value, times=times, other=other))
-        if len(found) == most:
+        if len(found) == limit:
             break
     return tuple(found)
 
 
-def _in_order(players: Sequence[PlayerResult]) -> list[tuple[int, int, float]]:
+def _sort_bad_seconds(players: Sequence[PlayerResult]) -> list[tuple[int, int, float]]:
     """Sort (player, row of per_second, badness) of all seconds beyond a limit, the worst first."""
-    each = [(who, badness(player)) for who, player in enumerate(players)]
-    rows = [(who, int(row), float(bad[row])) for who, bad in each for row in np.flatnonzero(np.nan_to_num(bad) > 1.0)]
+    each = [(index, measure_badness(player)) for index, player in enumerate(players)]
+    rows = [(index, int(row), float(bad[row])) for index, bad in each for row in np.flatnonzero(np.nan_to_num(bad) > 1.0)]
     return sorted(rows, key=lambda entry: (-entry[2], entry[0], entry[1]))
 
 
-def _worst_figure(player: PlayerResult, row: int) -> str:
+def _find_worst_figure(player: PlayerResult, row: int) -> str:
     shares = {figure: player.per_second[figure][row] / limit for figure, limit in LIMITS.items()
               if figure in player.per_second}
     return max(shares, key=lambda figure: np.nan_to_num(shares[figure], nan=-1.0))
 
 
-def _same(one: WorstSecond, player: PlayerResult, time: float, figure: str, value: float) -> bool:
+def _is_same_second(known: WorstSecond, player: PlayerResult, time: float, figure: str, value: float) -> bool:
     """Say whether this second is in the list already: the same player nearby, or the same overlap from the other
     player.
     """
-    if abs(one.time - time) > APART:
+    if abs(known.time - time) > GROUP_SECONDS:
         return False
-    return one.player is player or (figure == one.figure == "overlap_m" and one.other is player)
+    return known.player is player or (figure == known.figure == "overlap_m" and known.other is player)
 
 
-def _other(players: Sequence[PlayerResult], player: PlayerResult, time: float, value: float) -> PlayerResult | None:
+def _find_other_player(players: Sequence[PlayerResult], player: PlayerResult, time: float, value: float) -> PlayerResult | None:
     """Find the player with the same overlap in that second, to the millimetre; None if there is none or more than
     one.
     """
-    like = [one for one in players if one is not player and abs(_at(one, "overlap_m", time) - value) < 1e-3]
-    return like[0] if len(like) == 1 else None
+    matches = [one for one in players if one is not player and abs(_find_value(one, "overlap_m", time) - value) < 1e-3]
+    return matches[0] if len(matches) == 1 else None
 
 
-def _at(player: PlayerResult, figure: str, time: float) -> float:
+def _find_value(player: PlayerResult, figure: str, time: float) -> float:
     row, column = round(time - player.start), player.per_second.get(figure, ())
     return float(column[row]) if 0 <= row < len(column) else np.nan

@@ -15,21 +15,21 @@ TOLERANCE = 1e-8
 """Allowed error of a whole path's length, metres; for very long paths the share _ROUNDING of the length."""
 
 _ROUNDING = 1e-11  # share of the speed below which errors are indistinguishable from rounding of large coordinates
-_MOST = 50_000  # pieces halved at a time
+_MAX_PIECES = 50_000  # pieces halved at a time
 
 _ORDER = 8
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(_ORDER)
-_HALVINGS = 40
-_NEWTON = 60
+_MAX_HALVINGS = 40
+_MAX_NEWTON_STEPS = 60
 
 
-def _series() -> np.ndarray:
+def _build_series_matrix() -> np.ndarray:
     """Build the matrix (ORDER, ORDER) from values at the nodes to Legendre coefficients."""
     values = np.polynomial.legendre.legvander(_NODES, _ORDER - 1)
     return (values * _WEIGHTS[:, None] * (np.arange(_ORDER) + 0.5)).T
 
 
-def _integral() -> np.ndarray:
+def _build_integral_matrix() -> np.ndarray:
     """Build the matrix (ORDER + 1, ORDER) from values at the nodes to coefficients of 1, x, x^2, ... of the integral
     from -1
     to x.
@@ -39,10 +39,10 @@ def _integral() -> np.ndarray:
     powers = np.zeros((_ORDER + 1, _ORDER))
     for order, column in enumerate(columns):
         powers[: len(column), order] = column
-    return powers @ _series()
+    return powers @ _build_series_matrix()
 
 
-_SERIES, _INTEGRAL = _series(), _integral()
+_SERIES, _INTEGRAL = _build_series_matrix(), _build_integral_matrix()
 
 
 class ArcLength:
@@ -54,7 +54,7 @@ class ArcLength:
 
     def __init__(self, path: Path):
         """Build the table of any path, also one with zero speed somewhere."""
-        starts, widths, values = _pieces(path)
+        starts, widths, values = _split_pieces(path)
         self._edges = np.append(starts, path.domain[1])
         self._widths = widths
         self._powers = np.ascontiguousarray((0.5 * widths[:, None] * (values @ _INTEGRAL.T)).T)
@@ -62,23 +62,23 @@ class ArcLength:
         self._before = np.concatenate([[0.0], np.cumsum(np.maximum(self._powers.sum(axis=0), 0.0))])
         self.length = float(self._before[-1])
 
-    def at(self, u: np.ndarray) -> np.ndarray:
+    def distance_at(self, u: np.ndarray) -> np.ndarray:
         """Return the metres (N,) from the path's start to parameters u (N,), which are clamped to the domain."""
         u = np.clip(np.asarray(u, dtype=float), self._edges[0], self._edges[-1])
         piece = np.clip(np.searchsorted(self._edges, u, side="right") - 1, 0, len(self._widths) - 1)
         local = 2.0 * (u - self._edges[piece]) / self._widths[piece] - 1.0
-        return self._before[piece] + _value(self._powers[:, piece], local)
+        return self._before[piece] + _evaluate_polynomials(self._powers[:, piece], local)
 
-    def parameter(self, s: np.ndarray) -> np.ndarray:
+    def parameter_at(self, s: np.ndarray) -> np.ndarray:
         """Return the parameters (N,) at arc lengths s (N,) metres, which are clamped to 0 .. length."""
         s = np.clip(np.asarray(s, dtype=float), 0.0, self.length)
         piece = np.clip(np.searchsorted(self._before, s, side="right") - 1, 0, len(self._widths) - 1)
-        wanted = s - self._before[piece]
-        local = _solved(self._powers[:, piece], self._speeds[:, piece], wanted)
+        remaining = s - self._before[piece]
+        local = _solve_polynomials(self._powers[:, piece], self._speeds[:, piece], remaining)
         return self._edges[piece] + 0.5 * (local + 1.0) * self._widths[piece]
 
 
-def _pieces(path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _split_pieces(path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Split the path into pieces on which the series of the speed converges.
 
     Returns:
@@ -87,13 +87,13 @@ def _pieces(path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     edges = np.asarray(path.breaks, dtype=float)
     starts, widths, done = edges[:-1], np.diff(edges), []
     allowed = TOLERANCE / (path.domain[1] - path.domain[0])
-    for halving in range(_HALVINGS):
+    for halving in range(_MAX_HALVINGS):
         at = starts[:, None] + 0.5 * (_NODES + 1.0) * widths[:, None]
         values = np.linalg.norm(path.at(at.ravel(), 1), axis=1).reshape(at.shape)
         # a piece is fine when the last two coefficients of its series are negligible
         tail = np.abs(values @ _SERIES[-2:].T).sum(axis=1)
         fine = tail <= max(allowed, _ROUNDING * values.max())
-        if halving == _HALVINGS - 1 or np.count_nonzero(~fine) > _MOST:
+        if halving == _MAX_HALVINGS - 1 or np.count_nonzero(~fine) > _MAX_PIECES:
             fine[:] = True
         done.append((starts[fine], widths[fine], values[fine]))
         if fine.all():
@@ -105,7 +105,7 @@ def _pieces(path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return starts[order], widths[order], values[order]
 
 
-def _value(powers: np.ndarray, x: np.ndarray) -> np.ndarray:
+def _evaluate_polynomials(powers: np.ndarray, x: np.ndarray) -> np.ndarray:
     """Evaluate polynomials (K, N), one for each x (N,), by Horner's rule."""
     value = powers[-1]
     for row in powers[-2::-1]:
@@ -113,16 +113,16 @@ def _value(powers: np.ndarray, x: np.ndarray) -> np.ndarray:
     return value
 
 
-def _solved(powers: np.ndarray, speeds: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+def _solve_polynomials(powers: np.ndarray, speeds: np.ndarray, targets: np.ndarray) -> np.ndarray:
     """Solve x (N,) in [-1, 1] at which rising polynomials (K, N) reach `targets` (N,): Newton's method, else bisection.
     """
-    low, high = np.full(len(wanted), -1.0), np.ones(len(wanted))
+    low, high = np.full(len(targets), -1.0), np.ones(len(targets))
     whole = powers.sum(axis=0)
-    x = np.clip(2.0 * wanted / np.where(whole > 0.0, whole, 1.0) - 1.0, -1.0, 1.0)
-    for _ in range(_NEWTON):
-        off = _value(powers, x) - wanted
+    x = np.clip(2.0 * targets / np.where(whole > 0.0, whole, 1.0) - 1.0, -1.0, 1.0)
+    for _ in range(_MAX_NEWTON_STEPS):
+        off = _evaluate_polynomials(powers, x) - targets
         high, low = np.where(off > 0.0, x, high), np.where(off > 0.0, low, x)
-        speed = _value(speeds, x)
+        speed = _evaluate_polynomials(speeds, x)
         step = x - off / np.where(speed > 0.0, speed, 1.0)
         step = np.where((speed > 0.0) & (step >= low) & (step <= high), step, 0.5 * (low + high))
         moved = np.abs(step - x).max(initial=0.0)

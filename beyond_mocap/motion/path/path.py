@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 
 from ...base.errors import InputError
-from ..skeleton import frozen_array
+from ..skeleton import freeze_array
 
 
 class Path:
@@ -32,7 +32,7 @@ class Path:
         """Return the positions (N, 3) in metres at parameters u (N,), or their derivative of order `derivative`."""
         raise NotImplementedError
 
-    def _inside(self, u: np.ndarray) -> np.ndarray:
+    def _to_domain(self, u: np.ndarray) -> np.ndarray:
         """Wrap or clamp parameters (N,) to the domain."""
         low, high = self.domain
         u = np.asarray(u, dtype=float)
@@ -52,7 +52,7 @@ class PolynomialPath(Path):
     domain: tuple[float, float]
 
     def __post_init__(self):
-        object.__setattr__(self, "coefficients", frozen_array(self.coefficients))
+        object.__setattr__(self, "coefficients", freeze_array(self.coefficients))
 
     @property
     def breaks(self) -> np.ndarray:
@@ -60,7 +60,7 @@ class PolynomialPath(Path):
 
     def at(self, u: np.ndarray, derivative: int = 0) -> np.ndarray:
         low, high = self.domain
-        scaled = (2.0 * self._inside(u) - low - high) / (high - low)
+        scaled = (2.0 * self._to_domain(u) - low - high) / (high - low)
         legendre = np.polynomial.legendre
         series = self.coefficients if derivative == 0 else legendre.legder(self.coefficients, derivative)
         return legendre.legval(scaled, series).T * (2.0 / (high - low)) ** derivative
@@ -83,7 +83,7 @@ class SplinePath(Path):
     closed: bool = False
 
     def __post_init__(self):
-        knots, coefficients = frozen_array(self.knots), frozen_array(self.coefficients)
+        knots, coefficients = freeze_array(self.knots), freeze_array(self.coefficients)
         if len(knots) != len(coefficients) + self.degree + 1 or self.degree < 1:
             raise InputError(
                 "path", f"{len(knots)} knots, {len(coefficients)} control points, degree {self.degree}",
@@ -108,5 +108,5 @@ class SplinePath(Path):
 
     def at(self, u: np.ndarray, derivative: int = 0) -> np.ndarray:
         # relative to the first control point: far from the origin derivatives would lose precision
-        values = self._spline(self._inside(u), derivative)
+        values = self._spline(self._to_domain(u), derivative)
         return values if derivative else values + self.coefficients[0]

@@ -16,23 +16,23 @@ from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 DEGREE = 3
 _WIDTH = DEGREE + 1
-_FINE = 4  # pieces within a length of `stiff`
+_PIECES_PER_STIFFNESS = 4  # pieces within a length of `stiff`
 _ROUNDS = 8
-_AROUND = 0.5  # share of `stiff` over which a value pulls its neighbours along
-_NEAR = 0.7  # share of the slack beyond which values pull more
+_PULL_RANGE = 0.5  # share of `stiff` over which a value pulls its neighbours along
+_FREE_SHARE = 0.7  # share of the slack beyond which values pull more
 SLACK = 0.06
 """Metres that the path may be off the pelvis."""
 
 TURN_SLACK = np.radians(25.0)
-SECONDS = 0.4
+SWAY_SECONDS = 0.4
 """Movement slower than about six times this belongs to the path, faster movement is sway."""
 
-WAYS = ("smooth", "straight")
+PATH_KINDS = ("smooth", "straight")
 
 
-def smoothing_spline(
+def fit_smoothing_spline(
     values: np.ndarray, at: np.ndarray, pieces: int, stiff: float, order: int = 2, weights: np.ndarray | None = None,
-    closed: bool = False, ends_met: bool = False, domain: tuple[float, float] | None = None,
+    closed: bool = False, keep_ends: bool = False, domain: tuple[float, float] | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Fit a cubic smoothing spline.
 
@@ -54,24 +54,24 @@ def smoothing_spline(
     Source: Eilers and Marx 1996; O'Sullivan 1986.
     """
     low, high = domain or (float(at[0]), float(at[-1]))
-    knots = _knots(low, high, pieces, closed)
+    knots = _build_knots(low, high, pieces, closed)
     values = np.asarray(values, dtype=float)
     origin = values.mean(axis=0)  # keeps precision far from the origin
-    basis, left = _basis(at, knots)
+    basis, left = _evaluate_basis(at, knots)
     weights = np.full(len(at), 1.0 / len(at)) if weights is None else weights / len(at)
-    bends, price = _bends(knots, order, stiff ** (2 * order) / (high - low))
+    roughness, roughness_weights = _build_roughness(knots, order, stiff ** (2 * order) / (high - low))
     count = pieces if closed else pieces + DEGREE
-    begins = np.concatenate([left, np.tile(np.arange(pieces), len(bends) // pieces)])
-    band = _band(np.concatenate([basis, bends]), begins, np.concatenate([weights, price]), count)
-    right = _right(basis, left, weights, values - origin, count)
+    begins = np.concatenate([left, np.tile(np.arange(pieces), len(roughness) // pieces)])
+    band = _build_band_matrix(np.concatenate([basis, roughness]), begins, np.concatenate([weights, roughness_weights]), count)
+    right = _build_right_side(basis, left, weights, values - origin, count)
     if closed:
-        solved = _cyclic(band, right)[np.arange(pieces + DEGREE) % count]
+        solved = _solve_cyclic(band, right)[np.arange(pieces + DEGREE) % count]
     else:
-        solved = _pinned(band, right, values[[0, -1]] - origin) if ends_met else solveh_banded(band, right, lower=True)
+        solved = _solve_pinned(band, right, values[[0, -1]] - origin) if keep_ends else solveh_banded(band, right, lower=True)
     return knots, solved + origin
 
 
-def spline_within(
+def fit_spline_within(
     values: np.ndarray, at: np.ndarray, pieces: int, stiff: float, slack: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Fit the `fit_smoothing_spline` of least acceleration that is nowhere much farther than `slack` from the values.
@@ -89,26 +89,26 @@ def spline_within(
     """
     from scipy.interpolate import BSpline
 
-    weights, around = np.ones(len(at)), int(_AROUND * stiff * (len(at) - 1) / (at[-1] - at[0])) + 1
+    weights, around = np.ones(len(at)), int(_PULL_RANGE * stiff * (len(at) - 1) / (at[-1] - at[0])) + 1
     for round_ in range(_ROUNDS):
         if round_ >= _ROUNDS // 2:
             pieces = max(min(2 * pieces, len(at) - 1), pieces)
-        knots, coefficients = smoothing_spline(values, at, pieces, stiff, weights=weights)
-        off = np.linalg.norm(BSpline(knots, coefficients, DEGREE)(at) - values, axis=1)
-        if off.max(initial=0.0) <= slack:
+        knots, coefficients = fit_smoothing_spline(values, at, pieces, stiff, weights=weights)
+        distance = np.linalg.norm(BSpline(knots, coefficients, DEGREE)(at) - values, axis=1)
+        if distance.max(initial=0.0) <= slack:
             break
-        pull = 2.0 * np.log(np.maximum(off / (_NEAR * slack), 1.0))
+        pull = 2.0 * np.log(np.maximum(distance / (_FREE_SHARE * slack), 1.0))
         pull = uniform_filter1d(maximum_filter1d(pull, around, mode="nearest"), around, mode="nearest")
         weights = weights * np.exp(pull)
     return knots, coefficients
 
 
-def spline_pieces(length: float, stiff: float) -> int:
+def count_spline_pieces(length: float, stiff: float) -> int:
     """Count the pieces that a spline of this length needs so that finer ones would change nothing."""
-    return max(int(np.ceil(_FINE * length / stiff)), 4)
+    return max(int(np.ceil(_PIECES_PER_STIFFNESS * length / stiff)), 4)
 
 
-def ground_path(places: np.ndarray, facing: np.ndarray, fps: float, way: str = "smooth"):
+def compute_root_path(places: np.ndarray, facing: np.ndarray, fps: float, kind: str = "smooth"):
     """Compute the root's path over the ground and its heading.
 
     Args:
@@ -119,9 +119,9 @@ def ground_path(places: np.ndarray, facing: np.ndarray, fps: float, way: str = "
     Returns:
         The path (T, 2) in metres and its heading (T,) in radians.
     """
-    line = _within(places, fps, SLACK)
-    if way == "smooth":
-        return line, _within(facing[:, None], fps, TURN_SLACK)[:, 0]
+    line = _smooth_within(places, fps, SLACK)
+    if kind == "smooth":
+        return line, _smooth_within(facing[:, None], fps, TURN_SLACK)[:, 0]
     along = places[-1] - places[0]
     length = np.linalg.norm(along)
     turn = np.full(len(places), np.mean(facing))
@@ -131,17 +131,17 @@ def ground_path(places: np.ndarray, facing: np.ndarray, fps: float, way: str = "
     return places[0] + ((line - places[0]) @ along)[:, None] * along, turn
 
 
-def _within(values: np.ndarray, fps: float, slack: float) -> np.ndarray:
+def _smooth_within(values: np.ndarray, fps: float, slack: float) -> np.ndarray:
     """Smooth values (T, K) by a curve that is nowhere much farther than `slack` from them: (T, K)."""
     from scipy.interpolate import BSpline
 
     if len(values) < 2:
         return values.copy()
     times = np.arange(len(values)) / fps
-    return BSpline(*spline_within(values, times, spline_pieces(times[-1], SECONDS), SECONDS, slack), DEGREE)(times)
+    return BSpline(*fit_spline_within(values, times, count_spline_pieces(times[-1], SWAY_SECONDS), SWAY_SECONDS, slack), DEGREE)(times)
 
 
-def _knots(low: float, high: float, pieces: int, closed: bool) -> np.ndarray:
+def _build_knots(low: float, high: float, pieces: int, closed: bool) -> np.ndarray:
     """Build the knots: repeated at the ends of an open curve, continued evenly beyond those of a closed one."""
     inner = np.linspace(low, high, pieces + 1)
     if not closed:
@@ -150,7 +150,7 @@ def _knots(low: float, high: float, pieces: int, closed: bool) -> np.ndarray:
     return np.concatenate([low - step[::-1], inner, high + step])
 
 
-def _basis(at: np.ndarray, knots: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _evaluate_basis(at: np.ndarray, knots: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Evaluate the four B-splines (N, 4) that are not zero at parameters (N,), and the first of them (N,): Cox and de
     Boor.
     """
@@ -170,7 +170,7 @@ def _basis(at: np.ndarray, knots: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return basis.T, left
 
 
-def _bends(knots: np.ndarray, order: int, factor: float) -> tuple[np.ndarray, np.ndarray]:
+def _build_roughness(knots: np.ndarray, order: int, factor: float) -> tuple[np.ndarray, np.ndarray]:
     """Build rows (M, 4) over each piece's coefficients and weights (M,) of the penalty.
 
     Their weighted squares add up to factor times the integral of the squared derivative. The third derivative is
@@ -190,7 +190,7 @@ def _bends(knots: np.ndarray, order: int, factor: float) -> tuple[np.ndarray, np
     return np.concatenate([middle, change]), np.concatenate([wide, wide / 12])
 
 
-def _band(rows: np.ndarray, left: np.ndarray, weights: np.ndarray, count: int) -> np.ndarray:
+def _build_band_matrix(rows: np.ndarray, left: np.ndarray, weights: np.ndarray, count: int) -> np.ndarray:
     """Build the sum of w r r' as a band (4, count): [d, a] is the entry of coefficients a and a + d, cyclic."""
     band = np.zeros((_WIDTH, count))
     for i in range(_WIDTH):
@@ -200,7 +200,7 @@ def _band(rows: np.ndarray, left: np.ndarray, weights: np.ndarray, count: int) -
     return band
 
 
-def _right(rows: np.ndarray, left: np.ndarray, weights: np.ndarray, values: np.ndarray, count: int) -> np.ndarray:
+def _build_right_side(rows: np.ndarray, left: np.ndarray, weights: np.ndarray, values: np.ndarray, count: int) -> np.ndarray:
     """Build the sum of w r v: (count, K)."""
     out = np.zeros((count, values.shape[1]))
     for i in range(_WIDTH):
@@ -210,7 +210,7 @@ def _right(rows: np.ndarray, left: np.ndarray, weights: np.ndarray, values: np.n
     return out
 
 
-def _pinned(band: np.ndarray, right: np.ndarray, ends: np.ndarray) -> np.ndarray:
+def _solve_pinned(band: np.ndarray, right: np.ndarray, ends: np.ndarray) -> np.ndarray:
     """Solve the coefficients (P, K) of which the first and the last are `ends` (2, K)."""
     last = len(right) - 1
     for below in range(1, _WIDTH):  # move the known coefficients' terms to the right side
@@ -219,7 +219,7 @@ def _pinned(band: np.ndarray, right: np.ndarray, ends: np.ndarray) -> np.ndarray
     return np.concatenate([ends[:1], solveh_banded(band[:, 1:-1], right[1:-1], lower=True), ends[1:]])
 
 
-def _cyclic(band: np.ndarray, right: np.ndarray) -> np.ndarray:
+def _solve_cyclic(band: np.ndarray, right: np.ndarray) -> np.ndarray:
     """Solve the coefficients (P, K) of a closed curve: the last three are solved after all others (Schur complement).
     """
     count = len(right)

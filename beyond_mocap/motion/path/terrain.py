@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from ...base.errors import InputError
-from ..skeleton import frozen_array
+from ..skeleton import freeze_array
 
 _EDGE = 1e-9  # barycentric tolerance: a point on an edge is on both its triangles
-_STEEPEST = 1e-6  # upward part of a triangle's normal below which it is a wall, which has no height
-_ENTRIES = 8  # entries per triangle in all cells together, at most
+_MIN_NORMAL_Z = 1e-6  # upward part of a triangle's normal below which it is a wall, which has no height
+_MAX_ENTRIES = 8  # entries per triangle in all cells together, at most
 
 
 class Terrain:
@@ -27,19 +27,19 @@ class Terrain:
         Raises:
             InputError: if an index is out of range or a vertex is not finite.
         """
-        corners = _corners(vertices, triangles)
+        corners = _collect_corners(vertices, triangles)
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         size = np.linalg.norm(normals, axis=1)
-        flat = np.abs(normals[:, 2]) > _STEEPEST * np.where(size > 0.0, size, np.inf)
+        flat = np.abs(normals[:, 2]) > _MIN_NORMAL_Z * np.where(size > 0.0, size, np.inf)
         corners, normals = corners[flat], normals[flat]
         sides = corners[:, 1:] - corners[:, :1]
-        self._normals = frozen_array(normals / (np.sign(normals[:, 2]) * size[flat])[:, None])
-        self._first = frozen_array(corners[:, 0])
-        self._inverse = frozen_array(np.linalg.inv(sides[:, :, :2]))  # (dx, dy) @ inverse = shares of the two sides
-        self._rise = frozen_array(sides[:, :, 2])
-        self._sort(corners[:, :, :2].min(axis=1), corners[:, :, :2].max(axis=1))
+        self._normals = freeze_array(normals / (np.sign(normals[:, 2]) * size[flat])[:, None])
+        self._first = freeze_array(corners[:, 0])
+        self._inverse = freeze_array(np.linalg.inv(sides[:, :, :2]))  # (dx, dy) @ inverse = shares of the two sides
+        self._rise = freeze_array(sides[:, :, 2])
+        self._build_grid(corners[:, :, :2].min(axis=1), corners[:, :, :2].max(axis=1))
 
-    def heights(self, places: np.ndarray, below: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def find_heights(self, places: np.ndarray, below: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Find the highest ground not above a limit.
 
         Args:
@@ -49,20 +49,20 @@ class Terrain:
             Heights (N,) in metres and unit normals (N, 3), upward; NaN where there is no ground.
         """
         places, below = np.asarray(places, dtype=float), np.asarray(below, dtype=float)
-        asked, triangle = self._candidates(places)
-        shares = np.einsum("pi,pij->pj", places[asked] - self._first[triangle, :2], self._inverse[triangle])
+        queries, triangle = self._find_candidates(places)
+        shares = np.einsum("pi,pij->pj", places[queries] - self._first[triangle, :2], self._inverse[triangle])
         height = self._first[triangle, 2] + np.einsum("pi,pi->p", shares, self._rise[triangle])
-        inside = (shares >= -_EDGE).all(axis=1) & (shares.sum(axis=1) <= 1.0 + _EDGE) & (height <= below[asked])
-        asked, triangle, height = asked[inside], triangle[inside], height[inside]
+        inside = (shares >= -_EDGE).all(axis=1) & (shares.sum(axis=1) <= 1.0 + _EDGE) & (height <= below[queries])
+        queries, triangle, height = queries[inside], triangle[inside], height[inside]
         # sorted by place, then height: the last entry of each place is its highest ground
-        order = np.lexsort((height, asked))
-        asked, triangle, height = asked[order], triangle[order], height[order]
-        highest = np.flatnonzero(np.diff(asked, append=-1))
+        order = np.lexsort((height, queries))
+        queries, triangle, height = queries[order], triangle[order], height[order]
+        highest = np.flatnonzero(np.diff(queries, append=-1))
         heights, normals = np.full(len(places), np.nan), np.full((len(places), 3), np.nan)
-        heights[asked[highest]], normals[asked[highest]] = height[highest], self._normals[triangle[highest]]
+        heights[queries[highest]], normals[queries[highest]] = height[highest], self._normals[triangle[highest]]
         return heights, normals
 
-    def _sort(self, low: np.ndarray, high: np.ndarray) -> None:
+    def _build_grid(self, low: np.ndarray, high: np.ndarray) -> None:
         """Build the grid, as fine as the triangles allow, from their bounds (F, 2) each."""
         self._origin = low.min(axis=0) if len(low) else np.zeros(2)
         extent = high.max(axis=0) - self._origin if len(low) else np.ones(2)
@@ -71,7 +71,7 @@ class Terrain:
             first, last = (np.floor((end - self._origin) / self._cell).astype(int) for end in (low, high))
             wide = last - first + 1
             count = np.prod(wide, axis=1)
-            if count.sum() <= _ENTRIES * len(low):
+            if count.sum() <= _MAX_ENTRIES * len(low):
                 break
             self._cell *= 2.0
         self._shape = np.floor(extent / self._cell).astype(int) + 1
@@ -81,20 +81,20 @@ class Terrain:
         step = np.arange(len(triangle)) - np.repeat(np.cumsum(count) - count, count)
         row, column = first[triangle, 0] + step // wide[triangle, 1], first[triangle, 1] + step % wide[triangle, 1]
         cell = row * self._shape[1] + column
-        self._inhabitants = triangle[np.argsort(cell, kind="stable")]
-        self._begin = np.concatenate([[0], np.cumsum(np.bincount(cell, minlength=np.prod(self._shape)))])
+        self._cell_triangles = triangle[np.argsort(cell, kind="stable")]
+        self._cell_starts = np.concatenate([[0], np.cumsum(np.bincount(cell, minlength=np.prod(self._shape)))])
 
-    def _candidates(self, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _find_candidates(self, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Find pairs of a requested place and a triangle in the same cell: (P,) and (P,), the places rising."""
         cell = np.floor((places - self._origin) / self._cell)
         on = np.flatnonzero(((cell >= 0) & (cell < self._shape)).all(axis=1))
         number = cell[on].astype(int) @ np.array([self._shape[1], 1])
-        begin, count = self._begin[number], np.diff(self._begin)[number]
+        begin, count = self._cell_starts[number], np.diff(self._cell_starts)[number]
         step = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
-        return np.repeat(on, count), self._inhabitants[np.repeat(begin, count) + step]
+        return np.repeat(on, count), self._cell_triangles[np.repeat(begin, count) + step]
 
 
-def _corners(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+def _collect_corners(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """Collect the positions (F, 3, 3) of the triangles' corners, or raise InputError."""
     vertices, triangles = np.asarray(vertices, dtype=float).reshape(-1, 3), np.asarray(triangles).reshape(-1, 3)
     if not np.isfinite(vertices).all():

@@ -28,11 +28,11 @@ _LEG = (
 _CENTRE_TIPS = (("Head", (10, 0, 125)),)
 _LIMB_TIPS = (("Hand", (0, 0, -100)), ("ToeBase", (38, 0, -3)))
 STATURE = 1.80
-LEG = 0.873
+ADULT_LEG = 0.873
 """Metres, thigh plus shank of the adult to whom published figures of gait apply."""
 
 
-def adult_skeleton(stature: float = STATURE) -> Skeleton:
+def build_adult_skeleton(stature: float = STATURE) -> Skeleton:
     """Build the adult's skeleton.
 
     Args:

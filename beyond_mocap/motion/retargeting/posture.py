@@ -14,12 +14,12 @@ import numpy as np
 
 from ...base.vectors import unit_vectors
 from .. import limb, quaternion
-from ..humanoid import Humanoid, Limb, identify
-from ..motion import Motion, local_rotations, pose_kinematics
-from .neutral import Neutral
+from ..humanoid import Humanoid, Limb, identify_joints
+from ..motion import Motion, compute_local_rotations, compute_pose
+from .neutral import NeutralStance
 
 # metres below full length from where a leg eases: less than what `gait` leaves, so that feet in contact are exact
-_SOFT = 0.003
+_SOFT_DISTANCE = 0.003
 _X, _Y, _Z = np.eye(3)
 
 
@@ -63,12 +63,12 @@ class Posture:
     def __len__(self) -> int:
         return len(self.hips)
 
-    def changed(self, **arrays: Any) -> "Posture":
+    def replace_arrays(self, **arrays: Any) -> "Posture":
         """Return the same posture with some arrays replaced."""
         return replace(self, **arrays)
 
     @classmethod
-    def joined(cls, parts: Sequence["Posture"]) -> "Posture":
+    def join(cls, parts: Sequence["Posture"]) -> "Posture":
         """Join the frames of several postures, one after the other, at the first one's rate."""
         arrays = {f.name: np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(cls) if f.name != "fps"}
         return cls(fps=parts[0].fps, **arrays)
@@ -78,7 +78,7 @@ class Posture:
         return replace(self, **{f.name: getattr(self, f.name)[where] for f in fields(self) if f.name != "fps"})
 
 
-def to_motion(posture: Posture, neutral: Neutral) -> Motion:
+def to_motion(posture: Posture, neutral: NeutralStance) -> Motion:
     """Convert a posture to a motion of a skeleton; the legs reach for the ankles by inverse kinematics.
 
     Args:
@@ -88,71 +88,71 @@ def to_motion(posture: Posture, neutral: Neutral) -> Motion:
         The motion of `neutral.skeleton`.
     """
     skeleton = neutral.skeleton
-    body = identify(skeleton)
-    turns = _turns(posture, neutral, body)
+    body = identify_joints(skeleton)
+    turns = _compute_world_rotations(posture, neutral, body)
     world = quaternion.multiply(turns, neutral.rotations)
-    local = local_rotations(skeleton, world)
-    places, _ = pose_kinematics(skeleton, np.zeros((len(posture), 3)), local)
+    local = compute_local_rotations(skeleton, world)
+    places, _ = compute_pose(skeleton, np.zeros((len(posture), 3)), local)
     middle = 0.5 * (places[:, body.left.upper_leg] + places[:, body.right.upper_leg])
     return Motion(skeleton, posture.hips - middle, local, posture.fps)
 
 
-def pelvis_rotation(posture: Posture) -> np.ndarray:
+def compute_pelvis_rotation(posture: Posture) -> np.ndarray:
     """Compute the world rotation (T, 4) of the pelvis relative to the neutral stance."""
-    return quaternion.multiply(quaternion.about_up(posture.heading), quaternion.from_rotation_vector(posture.pelvis))
+    return quaternion.multiply(quaternion.from_up_angle(posture.heading), quaternion.from_rotation_vector(posture.pelvis))
 
 
-def hip_joints(posture: Posture, neutral: Neutral) -> np.ndarray:
+def compute_hip_positions(posture: Posture, neutral: NeutralStance) -> np.ndarray:
     """Compute the world positions (T, 2, 3) of the hip joints, metres."""
-    body = identify(neutral.skeleton)
-    turn = pelvis_rotation(posture)
+    body = identify_joints(neutral.skeleton)
+    turn = compute_pelvis_rotation(posture)
     apart = neutral.positions[body.left.upper_leg] - neutral.positions[body.right.upper_leg]
     half = 0.5 * quaternion.rotate(turn, apart)
     return np.stack([posture.hips + half, posture.hips - half], axis=1)
 
 
-def foot_rotation(feet: np.ndarray) -> np.ndarray:
+def compute_foot_rotation(feet: np.ndarray) -> np.ndarray:
     """Compute world rotations (..., 4) of feet from roll, pitch, yaw (..., 3), relative to a flat foot that points
     along +X.
     """
     return quaternion.multiply(
-        quaternion.about_up(feet[..., 2]),
-        quaternion.multiply(quaternion.about_axis(_Y, feet[..., 1]), quaternion.about_axis(_X, feet[..., 0])),
+        quaternion.from_up_angle(feet[..., 2]),
+        quaternion.multiply(quaternion.from_axis_angle(_Y, feet[..., 1]), quaternion.from_axis_angle(_X, feet[..., 0])),
     )
 
 
-def _turns(posture: Posture, neutral: Neutral, body: Humanoid) -> np.ndarray:
+def _compute_world_rotations(posture: Posture, neutral: NeutralStance, body: Humanoid) -> np.ndarray:
     """Compute the world rotation of every joint relative to the neutral stance (T, J, 4); other joints follow their
     parents.
     """
     skeleton = neutral.skeleton
-    said = _trunk(posture, body)
-    chest = said[body.chest]
+    rotations = _rotate_trunk(posture, body)
+    chest = rotations[body.chest]
     for side, limb_joints in enumerate((body.left, body.right)):
-        said.update(_arm(posture, limb_joints, side, chest))
-        said.update(_leg(posture, neutral, limb_joints, side))
-    above = quaternion.about_up(posture.heading)
+        rotations.update(_rotate_arm(posture, limb_joints, side, chest))
+        rotations.update(_solve_leg(posture, neutral, limb_joints, side))
+    above = quaternion.from_up_angle(posture.heading)
     out = np.empty((len(posture), len(skeleton), 4))
     for joint, parent in enumerate(skeleton.parents):
-        out[:, joint] = said.get(joint, out[:, parent] if parent >= 0 else above)
+        out[:, joint] = rotations.get(joint, out[:, parent] if parent >= 0 else above)
     return out
 
 
-def _trunk(posture: Posture, body: Humanoid) -> dict[int, np.ndarray]:
+def _rotate_trunk(posture: Posture, body: Humanoid) -> dict[int, np.ndarray]:
     """Compute the rotations (T, 4) of pelvis, spine, neck and head, by joint."""
-    pelvis = pelvis_rotation(posture)
-    said = {body.hips: pelvis}
+    pelvis = compute_pelvis_rotation(posture)
+    rotations = {body.hips: pelvis}
     count = max(len(body.spine), 1)
     for step, joint in enumerate(body.spine, start=1):
-        said[joint] = quaternion.multiply(pelvis, quaternion.from_rotation_vector(posture.spine * (step / count)))
-    chest = said[body.chest]
+        rotations[joint] = quaternion.multiply(pelvis, quaternion.from_rotation_vector(posture.spine * (step / count)))
+    chest = rotations[body.chest]
     for joint, share in ((body.neck, 0.45), (body.head, 1.0)):
         if joint is not None:
-            said[joint] = quaternion.multiply(chest, quaternion.from_rotation_vector(posture.head * share))
-    return said
+            rotations[joint] = quaternion.multiply(chest, quaternion.from_rotation_vector(posture.head * share))
+    return rotations
 
 
-def _arm(posture: Posture, joints: Limb, side: int, chest: np.ndarray) -> dict[int, np.ndarray]:
+def _rotate_arm(posture: Posture, joints: Limb, side: int, chest: np.ndarray) -> dict[int, np.ndarray]:
     """Compute the rotations (T, 4) of one arm, by joint."""
     if joints.upper_arm is None:
         return {}
@@ -160,45 +160,45 @@ def _arm(posture: Posture, joints: Limb, side: int, chest: np.ndarray) -> dict[i
     flex, abduct, inward, elbow, pronate = np.moveaxis(posture.arms[:, side], -1, 0)
     # a raised arm raises its collar bone: by about a third of what exceeds 30 degrees (scapulohumeral rhythm)
     raised = np.maximum(np.hypot(flex * (flex > 0), abduct) - np.radians(30.0), 0.0)
-    collar = quaternion.multiply(chest, quaternion.about_axis(_X, sign * 0.22 * raised))
-    upper = quaternion.multiply(chest, quaternion.about_axis(_X, sign * abduct))
-    upper = quaternion.multiply(upper, quaternion.about_axis(_Y, -flex))
-    upper = quaternion.multiply(upper, quaternion.about_axis(_Z, -sign * inward))
-    lower = quaternion.multiply(upper, quaternion.about_axis(_Y, -elbow))
-    hand = quaternion.multiply(lower, quaternion.about_axis(_Z, -sign * pronate))
-    hand = quaternion.multiply(hand, quaternion.about_axis(_X, -sign * posture.wrists[:, side]))
-    said = {joints.upper_arm: upper}
+    collar = quaternion.multiply(chest, quaternion.from_axis_angle(_X, sign * 0.22 * raised))
+    upper = quaternion.multiply(chest, quaternion.from_axis_angle(_X, sign * abduct))
+    upper = quaternion.multiply(upper, quaternion.from_axis_angle(_Y, -flex))
+    upper = quaternion.multiply(upper, quaternion.from_axis_angle(_Z, -sign * inward))
+    lower = quaternion.multiply(upper, quaternion.from_axis_angle(_Y, -elbow))
+    hand = quaternion.multiply(lower, quaternion.from_axis_angle(_Z, -sign * pronate))
+    hand = quaternion.multiply(hand, quaternion.from_axis_angle(_X, -sign * posture.wrists[:, side]))
+    rotations = {joints.upper_arm: upper}
     for joint, turn in ((joints.shoulder, collar), (joints.lower_arm, lower), (joints.hand, hand)):
         if joint is not None:
-            said[joint] = turn
-    return said
+            rotations[joint] = turn
+    return rotations
 
 
-def _leg(posture: Posture, neutral: Neutral, joints: Limb, side: int) -> dict[int, np.ndarray]:
+def _solve_leg(posture: Posture, neutral: NeutralStance, joints: Limb, side: int) -> dict[int, np.ndarray]:
     """Solve the rotations (T, 4) of one leg, by joint."""
     places = neutral.positions
     upper = float(np.linalg.norm(places[joints.lower_leg] - places[joints.upper_leg]))
     lower = float(np.linalg.norm(places[joints.foot] - places[joints.lower_leg]))
-    top = hip_joints(posture, neutral)[:, side]
+    top = compute_hip_positions(posture, neutral)[:, side]
     ankle = posture.ankles[:, side]
-    pole = knee_pole(posture, top, side)
-    knee, end, hinge = limb.bend(top, ankle, np.array(upper), lower=np.array(lower), pole=pole, soft=_SOFT)
-    thigh = limb.bone_frame(unit_vectors(knee - top, -_Z), hinge)
-    shank = limb.bone_frame(unit_vectors(end - knee, -_Z), hinge)
-    foot = foot_rotation(posture.feet[:, side])
-    said = {joints.upper_leg: thigh, joints.lower_leg: shank, joints.foot: foot}
+    pole = compute_knee_pole(posture, top, side)
+    knee, end, hinge = limb.solve_limb_bend(top, ankle, np.array(upper), lower=np.array(lower), pole=pole, soft=_SOFT_DISTANCE)
+    thigh = limb.build_bone_frame(unit_vectors(knee - top, -_Z), hinge)
+    shank = limb.build_bone_frame(unit_vectors(end - knee, -_Z), hinge)
+    foot = compute_foot_rotation(posture.feet[:, side])
+    rotations = {joints.upper_leg: thigh, joints.lower_leg: shank, joints.foot: foot}
     if joints.toe is not None:
-        said[joints.toe] = quaternion.multiply(foot, quaternion.about_axis(_Y, -posture.toes[:, side]))
-    return said
+        rotations[joints.toe] = quaternion.multiply(foot, quaternion.from_axis_angle(_Y, -posture.toes[:, side]))
+    return rotations
 
 
-def knee_pole(posture: Posture, top: np.ndarray, side: int) -> np.ndarray:
+def compute_knee_pole(posture: Posture, top: np.ndarray, side: int) -> np.ndarray:
     """Compute the direction (T, 3) in which the knee points: between pelvis and foot, carried along as the leg swings.
     """
-    pelvis = pelvis_rotation(posture)
+    pelvis = compute_pelvis_rotation(posture)
     sign = 1.0 if side == 0 else -1.0
-    yaw = quaternion.wrapped(posture.feet[:, side, 2] - quaternion.yaw(pelvis))
+    yaw = quaternion.wrap_angle(posture.feet[:, side, 2] - quaternion.to_yaw(pelvis))
     turned = np.clip(0.5 * yaw, -0.7, 0.7) + sign * posture.knees[:, side]
     down = quaternion.rotate(pelvis, -_Z)
     ahead = quaternion.rotate(pelvis, np.stack([np.cos(turned), np.sin(turned), np.zeros_like(turned)], axis=-1))
-    return quaternion.rotate(quaternion.between(down, posture.ankles[:, side] - top), ahead)
+    return quaternion.rotate(quaternion.rotation_between(down, posture.ankles[:, side] - top), ahead)

@@ -32,19 +32,19 @@ import numpy as np
 from ...base.errors import InputError
 from ...base.vectors import unit_vectors
 from .. import limb, quaternion
-from ..humanoid import Humanoid, Limb, assemble, identify, identify_posed, roles_of
-from ..motion import Motion, forward_kinematics, local_rotations
+from ..humanoid import Humanoid, Limb, build_humanoid, identify_joints, identify_posed_joints, list_roles
+from ..motion import Motion, forward_kinematics, compute_local_rotations
 from ..skeleton import Skeleton
-from .anatomy import Anatomy, head_chain, spine_shares, study
+from .anatomy import Anatomy, list_head_chain, compute_spine_shares, estimate_anatomy
 
-_SOFT = 0.01  # m below full length from where a limb eases
+_SOFT_DISTANCE = 0.01  # m below full length from where a limb eases
 _LIMB_PARTS = ("shoulder", "upper_arm", "lower_arm", "hand", "upper_leg", "lower_leg", "foot", "toe")
-_CARRIED_BY = {"upper_arm": "shoulder", "lower_arm": "upper_arm", "hand": "lower_arm", "toe": "foot"}
+_CARRIERS = {"upper_arm": "shoulder", "lower_arm": "upper_arm", "hand": "lower_arm", "toe": "foot"}
 # two rigs are the same, axes and all, when their bones point the same way in their rest pose within this angle
 _SAME_RIG = np.cos(np.radians(12.0))
 _TRUNK_ROUNDS = 3  # rounds of rotating the trunk and measuring the remaining error
 _UP = np.array([0.0, 0.0, 1.0])
-_FORM = '{"source joint": "target joint", ...}'
+_MAP_FORM = '{"source joint": "target joint", ...}'
 
 
 class Retargeter:
@@ -80,18 +80,18 @@ class Retargeter:
         """
         self.keeps_travel = keeps_travel
         self.pairs = pair_joints(sample, skeleton, bone_map, example)
-        self.source = study(sample.skeleton, self.pairs.source, sample, standing)
-        same = _same_rig(sample.skeleton, skeleton) if example is None else sample.skeleton.same_bones(skeleton)
+        self.source = estimate_anatomy(sample.skeleton, self.pairs.source, sample, standing)
+        same = _is_same_rig(sample.skeleton, skeleton) if example is None else sample.skeleton.has_same_bones(skeleton)
         if same:  # its own recording shows best how the rig is used: the same skeleton gets the same motion
             example, example_standing = replace(sample, skeleton=skeleton), standing
-        self.target = study(skeleton, self.pairs.target, example, example_standing)
+        self.target = estimate_anatomy(skeleton, self.pairs.target, example, example_standing)
 
-    def carry(self, motion: Motion) -> Motion:
+    def retarget(self, motion: Motion) -> Motion:
         """Retarget `motion`, a recording of the sample's skeleton, to the other skeleton."""
-        return _Transfer(motion, self.source, self.target, self.pairs, self.keeps_travel).motion()
+        return _Transfer(motion, self.source, self.target, self.pairs, self.keeps_travel).build_motion()
 
 
-def _same_rig(a: Skeleton, b: Skeleton) -> bool:
+def _is_same_rig(a: Skeleton, b: Skeleton) -> bool:
     """Whether two skeletons share names, tree and axes, and differ in lengths only."""
     if a.names != b.names or a.parents != b.parents:
         return False
@@ -103,141 +103,141 @@ def _same_rig(a: Skeleton, b: Skeleton) -> bool:
 class _Transfer:
     """The transfer of one motion from `source` to `target`."""
 
-    def __init__(self, motion: Motion, source: Anatomy, target: Anatomy, pairs: Pairs, keeps_travel: bool = False):
+    def __init__(self, motion: Motion, source: Anatomy, target: Anatomy, pairs: JointPairs, keeps_travel: bool = False):
         self.fps, self.source, self.target, self.pairs = motion.fps, source, target, pairs
         self.places, self.world = forward_kinematics(motion)
         self.scale = target.leg / source.leg
-        self.travel = 1.0 if keeps_travel else self.scale
-        soles = [self.places[:, side.foot, 2] - source.ankle for side in self._limbs(source)]
-        soles += [self.places[:, side.toe, 2] - source.ball for side in self._limbs(source) if side.toe is not None]
+        self.travel_scale = 1.0 if keeps_travel else self.scale
+        soles = [self.places[:, side.foot, 2] - source.ankle for side in self._list_limbs(source)]
+        soles += [self.places[:, side.toe, 2] - source.ball for side in self._list_limbs(source) if side.toe is not None]
         self.floor = float(np.percentile(np.min(soles, axis=0), 2))
-        self.wanted: dict[int, np.ndarray] = {}
+        self.target_rotations: dict[int, np.ndarray] = {}
 
-    def motion(self) -> Motion:
+    def build_motion(self) -> Motion:
         """Build the motion on the target's skeleton."""
-        self._trunk()
-        sides = list(zip(self._limbs(self.source), self._limbs(self.target)))
+        self._transfer_trunk()
+        sides = list(zip(self._list_limbs(self.source), self._list_limbs(self.target)))
         for mine, theirs in sides:
-            self._limb(mine, theirs)
-        world = self._trunk_line(self._world())
-        root = self._root(world)
-        places = _laid(self.target.skeleton, world) + root[:, None]
+            self._transfer_limb(mine, theirs)
+        world = self._align_trunk(self._compute_world_rotations())
+        root = self._compute_root(world)
+        places = _compute_positions(self.target.skeleton, world) + root[:, None]
         for mine, theirs in sides:
-            self._reach(places, mine, theirs)
-        return Motion(self.target.skeleton, root, local_rotations(self.target.skeleton, self._world()), self.fps)
+            self._solve_leg(places, mine, theirs)
+        return Motion(self.target.skeleton, root, compute_local_rotations(self.target.skeleton, self._compute_world_rotations()), self.fps)
 
     @staticmethod
-    def _limbs(anatomy: Anatomy) -> tuple[Limb, Limb]:
+    def _list_limbs(anatomy: Anatomy) -> tuple[Limb, Limb]:
         return anatomy.body.left, anatomy.body.right
 
-    def _turn(self, joint: int) -> np.ndarray:
+    def _compute_source_rotation(self, joint: int) -> np.ndarray:
         """Compute the rotation (T, 4) of the source's segment."""
         return quaternion.multiply(self.world[:, joint], self.source.axes[joint])
 
-    def _give(self, joint: int, turn: np.ndarray) -> None:
+    def _set_target_rotation(self, joint: int, rotation: np.ndarray) -> None:
         """Set the rotation (T, 4) of the target's segment."""
-        self.wanted[joint] = quaternion.multiply(turn, quaternion.inverse(self.target.axes[joint]))
+        self.target_rotations[joint] = quaternion.multiply(rotation, quaternion.inverse(self.target.axes[joint]))
 
-    def _trunk(self) -> None:
+    def _transfer_trunk(self) -> None:
         """Transfer the rotations of pelvis, spine, neck and head; joints between share them by arc length."""
         source, target = self.source.body, self.target.body
-        pelvis, chest = self._turn(source.hips), self._turn(source.chest)
-        self._give(target.hips, pelvis)
-        below = [pelvis, *(self._turn(joint) for joint in source.spine)]
-        shares = [0.0, *spine_shares(self.source.skeleton, source)]
-        for joint, share in zip(target.spine, spine_shares(self.target.skeleton, target)):
-            self._give(joint, _between(shares, below, share))
-        neck = head_chain(self.source.skeleton, source)
-        chain = head_chain(self.target.skeleton, target)
-        turns = [chest, *(self._turn(joint) for joint in neck)]
+        pelvis, chest = self._compute_source_rotation(source.hips), self._compute_source_rotation(source.chest)
+        self._set_target_rotation(target.hips, pelvis)
+        below = [pelvis, *(self._compute_source_rotation(joint) for joint in source.spine)]
+        shares = [0.0, *compute_spine_shares(self.source.skeleton, source)]
+        for joint, share in zip(target.spine, compute_spine_shares(self.target.skeleton, target)):
+            self._set_target_rotation(joint, _interpolate_rotations(shares, below, share))
+        neck = list_head_chain(self.source.skeleton, source)
+        chain = list_head_chain(self.target.skeleton, target)
+        turns = [chest, *(self._compute_source_rotation(joint) for joint in neck)]
         shares = np.linspace(0.0, 1.0, len(turns)) if neck else [0.0]
         for number, joint in enumerate(chain):
-            self._give(joint, _between(shares, turns, (number + 1) / len(chain)))
+            self._set_target_rotation(joint, _interpolate_rotations(shares, turns, (number + 1) / len(chain)))
 
-    def _limb(self, mine: Limb, theirs: Limb) -> None:
+    def _transfer_limb(self, mine: Limb, theirs: Limb) -> None:
         """Transfer one side's rotations; what the source lacks follows the part that carries it, in the end the chest.
         """
         for part in _LIMB_PARTS:
             joint = getattr(theirs, part)
-            if joint in self.target.known:
-                known = [p for p in _carriers(part) if getattr(mine, p) in self.source.known]
-                self._give(joint, self._turn(getattr(mine, known[0]) if known else self.source.body.chest))
+            if joint in self.target.known_joints:
+                known = [p for p in _list_carriers(part) if getattr(mine, p) in self.source.known_joints]
+                self._set_target_rotation(joint, self._compute_source_rotation(getattr(mine, known[0]) if known else self.source.body.chest))
 
-    def _world(self) -> np.ndarray:
+    def _compute_world_rotations(self) -> np.ndarray:
         """Compute the world rotations (T, J, 4) of all target joints: those that are set, and the others carried along.
         """
         skeleton = self.target.skeleton
         world = np.empty((len(self.world), len(skeleton), 4))
         for joint, parent in enumerate(skeleton.parents):
-            if joint in self.wanted:
-                world[:, joint] = self.wanted[joint]
+            if joint in self.target_rotations:
+                world[:, joint] = self.target_rotations[joint]
                 continue
             above = world[:, parent] if parent >= 0 else quaternion.identity(len(world))
-            world[:, joint] = quaternion.multiply(above, self.target.still[joint])
+            world[:, joint] = quaternion.multiply(above, self.target.mean_rotations[joint])
             if joint in self.pairs.others and parent >= 0:
-                extra = self._own_turn(self.pairs.others[joint])
+                extra = self._compute_extra_rotation(self.pairs.others[joint])
                 world[:, joint] = quaternion.multiply(extra, world[:, joint])
         return world
 
-    def _own_turn(self, joint: int) -> np.ndarray:
+    def _compute_extra_rotation(self, joint: int) -> np.ndarray:
         """Compute the world rotation (T, 4) of a source joint beyond that of its parent."""
         parent = self.source.skeleton.parents[joint]
         if parent < 0:
             return quaternion.identity(len(self.world))
-        carried = quaternion.multiply(self.world[:, parent], self.source.still[joint])
+        carried = quaternion.multiply(self.world[:, parent], self.source.mean_rotations[joint])
         return quaternion.multiply(self.world[:, joint], quaternion.inverse(carried))
 
-    def _trunk_line(self, world: np.ndarray) -> np.ndarray:
+    def _align_trunk(self, world: np.ndarray) -> np.ndarray:
         """Align the trunk, bending it below the chest where there are joints, so that the neck lies in the source's
         direction.
         """
-        spine, tops = self.target.body.spine, self.pairs.tops
+        spine, tops = self.target.body.spine, self.pairs.trunk_tops
         bending = spine[:-1] or spine
         if not bending or tops is None:
             return world
-        line = unit_vectors(self.places[:, tops[0]] - _mid_hips(self.places, self.source), _UP)
+        line = unit_vectors(self.places[:, tops[0]] - _compute_mid_hips(self.places, self.source), _UP)
         for _ in range(_TRUNK_ROUNDS):
-            places = _laid(self.target.skeleton, world)
-            start, middle = places[:, bending[0]], _mid_hips(places, self.target)
+            places = _compute_positions(self.target.skeleton, world)
+            start, middle = places[:, bending[0]], _compute_mid_hips(places, self.target)
             neck = places[:, tops[1]]
             length = np.linalg.norm(neck - middle, axis=1, keepdims=True)
-            turn = quaternion.between(neck - start, middle + line * length - start)
+            turn = quaternion.rotation_between(neck - start, middle + line * length - start)
             for joint in bending:
-                self.wanted[joint] = quaternion.multiply(turn, self.wanted[joint])
-            world = self._world()
+                self.target_rotations[joint] = quaternion.multiply(turn, self.target_rotations[joint])
+            world = self._compute_world_rotations()
         return world
 
-    def _size(self, positions: np.ndarray) -> np.ndarray:
+    def _scale_positions(self, positions: np.ndarray) -> np.ndarray:
         """Scale source positions (T, 3) to the target's size."""
         ground = self.floor + self.source.ankle
         heights = self.floor + self.target.ankle + self.scale * (positions[:, 2] - ground)
-        return np.column_stack([self.travel * positions[:, :2], heights])
+        return np.column_stack([self.travel_scale * positions[:, :2], heights])
 
-    def _root(self, world: np.ndarray) -> np.ndarray:
+    def _compute_root(self, world: np.ndarray) -> np.ndarray:
         """Compute the target's root (T, 3): its hip joints' middle is where the source's is."""
-        middle = _mid_hips(_laid(self.target.skeleton, world), self.target)
-        return self._size(_mid_hips(self.places, self.source)) - middle
+        middle = _compute_mid_hips(_compute_positions(self.target.skeleton, world), self.target)
+        return self._scale_positions(_compute_mid_hips(self.places, self.source)) - middle
 
-    def _reach(self, places: np.ndarray, mine: Limb, theirs: Limb) -> None:
+    def _solve_leg(self, places: np.ndarray, mine: Limb, theirs: Limb) -> None:
         """Move an ankle to the source's, the knee pointing like the source's; `places` (T, J, 3): positions before
         that.
         """
         hip, knee, ankle = (places[:, j] for j in (theirs.upper_leg, theirs.lower_leg, theirs.foot))
-        goal = self._size(self.places[:, mine.foot])
+        goal = self._scale_positions(self.places[:, mine.foot])
         upper, lower = (np.linalg.norm(b - a, axis=1) for a, b in ((hip, knee), (knee, ankle)))
-        goal = _in_reach(hip, ankle, goal, upper + lower)
-        pole = self._pole(mine, hip, knee, ankle, _bend_height(np.linalg.norm(goal - hip, axis=1), upper, lower))
-        swing = quaternion.between(ankle - hip, goal - hip)
-        new_knee, new_ankle, _ = limb.bend(
+        goal = _limit_reach(hip, ankle, goal, upper + lower)
+        pole = self._compute_knee_pole(mine, hip, knee, ankle, _compute_bend_height(np.linalg.norm(goal - hip, axis=1), upper, lower))
+        swing = quaternion.rotation_between(ankle - hip, goal - hip)
+        new_knee, new_ankle, _ = limb.solve_limb_bend(
             hip, goal, upper, lower=lower, pole=quaternion.rotate(swing, pole), soft=1e-9,
         )
-        thigh = quaternion.between(knee - hip, new_knee - hip)
-        shank = quaternion.between(ankle - knee, new_ankle - new_knee)
-        self.wanted[theirs.upper_leg] = quaternion.multiply(thigh, self.wanted[theirs.upper_leg])
-        self.wanted[theirs.lower_leg] = quaternion.multiply(shank, self.wanted[theirs.lower_leg])
+        thigh = quaternion.rotation_between(knee - hip, new_knee - hip)
+        shank = quaternion.rotation_between(ankle - knee, new_ankle - new_knee)
+        self.target_rotations[theirs.upper_leg] = quaternion.multiply(thigh, self.target_rotations[theirs.upper_leg])
+        self.target_rotations[theirs.lower_leg] = quaternion.multiply(shank, self.target_rotations[theirs.lower_leg])
 
 
-    def _pole(self, mine: Limb, hip: np.ndarray, knee: np.ndarray, ankle: np.ndarray, height: np.ndarray) -> np.ndarray:
+    def _compute_knee_pole(self, mine: Limb, hip: np.ndarray, knee: np.ndarray, ankle: np.ndarray, height: np.ndarray) -> np.ndarray:
         """Compute where a knee points (T, 3).
 
         As the source's, which shows little where it is straighter than the target's will be, `height` (T,) metres off
@@ -245,49 +245,49 @@ class _Transfer:
         hip-ankle; the rest of the bend is about the thigh's own hinge.
         """
         line = unit_vectors(ankle - hip, -_UP)
-        ahead = quaternion.rotate(self._turn(mine.upper_leg), np.array([1.0, 0.0, 0.0]))
+        ahead = quaternion.rotate(self._compute_source_rotation(mine.upper_leg), np.array([1.0, 0.0, 0.0]))
         off, ahead = (v - np.sum(v * line, axis=1, keepdims=True) * line for v in (knee - hip, ahead))
         lacking = np.maximum(height - np.linalg.norm(off, axis=1), 0.0)
         return off + lacking[:, None] * ahead
 
 
-def _bend_height(reach: np.ndarray, upper: np.ndarray, lower: np.ndarray) -> np.ndarray:
+def _compute_bend_height(reach: np.ndarray, upper: np.ndarray, lower: np.ndarray) -> np.ndarray:
     """Compute the distance (T,) of a limb's middle joint from the line between its ends, `reach` (T,) metres apart."""
     along = (upper**2 - lower**2 + reach**2) / np.maximum(2.0 * reach, 1e-9)
     return np.sqrt(np.maximum(upper**2 - along**2, 0.0))
 
 
-def _carriers(part: str) -> list[str]:
+def _list_carriers(part: str) -> list[str]:
     """List a limb's part and those above it that carry it, from below."""
     found = [part]
-    while found[-1] in _CARRIED_BY:
-        found.append(_CARRIED_BY[found[-1]])
+    while found[-1] in _CARRIERS:
+        found.append(_CARRIERS[found[-1]])
     return found
 
 
-def _in_reach(hip: np.ndarray, ankle: np.ndarray, goal: np.ndarray, longest: np.ndarray) -> np.ndarray:
+def _limit_reach(hip: np.ndarray, ankle: np.ndarray, goal: np.ndarray, longest: np.ndarray) -> np.ndarray:
     """Limit the goal (T, 3) softly where it would stretch a leg straighter than the source's directions do."""
-    asked, own = np.linalg.norm(goal - hip, axis=1), np.linalg.norm(ankle - hip, axis=1)
-    played = np.maximum(limb.soft_distance(asked, longest, _SOFT), np.minimum(asked, own))
-    return hip + (goal - hip) * (played / np.maximum(asked, 1e-9))[:, None]
+    requested, own = np.linalg.norm(goal - hip, axis=1), np.linalg.norm(ankle - hip, axis=1)
+    limited = np.maximum(limb.soften_distance(requested, longest, _SOFT_DISTANCE), np.minimum(requested, own))
+    return hip + (goal - hip) * (limited / np.maximum(requested, 1e-9))[:, None]
 
 
-def _mid_hips(places: np.ndarray, anatomy: Anatomy) -> np.ndarray:
+def _compute_mid_hips(places: np.ndarray, anatomy: Anatomy) -> np.ndarray:
     """Compute the middle between the hip joints: (T, 3) from positions (T, J, 3)."""
     return 0.5 * (places[:, anatomy.body.left.upper_leg] + places[:, anatomy.body.right.upper_leg])
 
 
-def _between(shares: Sequence[float] | np.ndarray, turns: list[np.ndarray], share: float) -> np.ndarray:
+def _interpolate_rotations(shares: Sequence[float] | np.ndarray, rotations: list[np.ndarray], share: float) -> np.ndarray:
     """Interpolate the rotation (T, 4) at `share` among `rotations` that are known at rising `shares`."""
     high = min(int(np.searchsorted(shares, share - 1e-9)), len(shares) - 1)
     low = max(high - 1, 0)
     width = shares[high] - shares[low]
     if width < 1e-9 or abs(shares[high] - share) < 1e-9:
-        return turns[high]
-    return quaternion.slerp(turns[low], turns[high], np.clip((share - shares[low]) / width, 0.0, 1.0))
+        return rotations[high]
+    return quaternion.slerp(rotations[low], rotations[high], np.clip((share - shares[low]) / width, 0.0, 1.0))
 
 
-def _laid(skeleton: Skeleton, world: np.ndarray) -> np.ndarray:
+def _compute_positions(skeleton: Skeleton, world: np.ndarray) -> np.ndarray:
     """Compute positions (T, J, 3) from world rotations (T, J, 4), the root at the origin."""
     parents = list(skeleton.parents[1:])
     bones = quaternion.rotate(world[:, parents], skeleton.offsets[1:])
@@ -298,7 +298,7 @@ def _laid(skeleton: Skeleton, world: np.ndarray) -> np.ndarray:
 
 
 @dataclass(frozen=True)
-class Pairs:
+class JointPairs:
     """Two bodies and the joints they share.
 
     Attributes:
@@ -310,10 +310,10 @@ class Pairs:
     source: Humanoid
     target: Humanoid
     others: dict[int, int]
-    tops: tuple[int, int] | None
+    trunk_tops: tuple[int, int] | None
 
 
-def load_bone_map(path: str | Path) -> dict[str, str]:
+def read_bone_map(path: str | Path) -> dict[str, str]:
     """Read a saved bone map.
 
     Args:
@@ -328,16 +328,16 @@ def load_bone_map(path: str | Path) -> dict[str, str]:
     except OSError as error:
         raise InputError(path, f"cannot be read ({error.strerror})", "a bone map (JSON)", "check the path") from None
     except (ValueError, RecursionError) as error:
-        raise InputError(path, f"not JSON ({error})", _FORM, "correct the file") from None
+        raise InputError(path, f"not JSON ({error})", _MAP_FORM, "correct the file") from None
     if not isinstance(found, dict) or not all(isinstance(name, str) for name in found.values()):
-        raise InputError(path, "not an object of names", _FORM, "correct the file")
+        raise InputError(path, "not an object of names", _MAP_FORM, "correct the file")
     return found
 
 
-def save_bone_map(path: str | Path, pairs: Pairs, source: Skeleton, target: Skeleton) -> None:
+def write_bone_map(path: str | Path, pairs: JointPairs, source: Skeleton, target: Skeleton) -> None:
     """Write the matching joints as a map for `read_bone_map`; spines are shared by length and not part of it."""
-    theirs = roles_of(pairs.target)
-    named = {joint: theirs[role] for role, joint in roles_of(pairs.source).items() if role in theirs}
+    theirs = list_roles(pairs.target)
+    named = {joint: theirs[role] for role, joint in list_roles(pairs.source).items() if role in theirs}
     named |= {mine: its for its, mine in pairs.others.items()}
     table = {source.names[mine]: target.names[its] for mine, its in sorted(named.items())}
     Path(path).write_text(json.dumps(table, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
@@ -346,7 +346,7 @@ def save_bone_map(path: str | Path, pairs: Pairs, source: Skeleton, target: Skel
 def pair_joints(
     motion: Motion, skeleton: Skeleton, bone_map: Mapping[str, str] | str | Path | None = None,
     example: Motion | None = None,
-) -> Pairs:
+) -> JointPairs:
     """Match the joints of `motion`'s skeleton and of `skeleton`.
 
     Args:
@@ -360,31 +360,31 @@ def pair_joints(
         InputError: for a map with unknown names and for skeletons without legs.
     """
     where = str(bone_map) if isinstance(bone_map, (str, Path)) else "bone map"
-    table = load_bone_map(bone_map) if isinstance(bone_map, (str, Path)) else dict(bone_map or {})
-    links = {_index(motion.skeleton, mine, where): _index(skeleton, its, where) for mine, its in table.items()}
-    found = _roles(motion.skeleton, motion), _roles(skeleton, example)
+    table = read_bone_map(bone_map) if isinstance(bone_map, (str, Path)) else dict(bone_map or {})
+    links = {_find_joint(motion.skeleton, mine, where): _find_joint(skeleton, its, where) for mine, its in table.items()}
+    found = _find_roles(motion.skeleton, motion), _find_roles(skeleton, example)
     if links:
-        found = _linked(*found, links)
-    source, target = (assemble(one.names, one.parents, roles) for one, roles in zip((motion.skeleton, skeleton), found))
-    others = _others(motion.skeleton, skeleton, source, target, links)
-    return Pairs(source, target, others, _tops(source, target))
+        found = _apply_links(*found, links)
+    source, target = (build_humanoid(one.names, one.parents, roles) for one, roles in zip((motion.skeleton, skeleton), found))
+    others = _pair_other_joints(motion.skeleton, skeleton, source, target, links)
+    return JointPairs(source, target, others, _find_trunk_tops(source, target))
 
 
-def _index(skeleton: Skeleton, name: str, where: str) -> int:
+def _find_joint(skeleton: Skeleton, name: str, where: str) -> int:
     if name not in skeleton.names:
         raise InputError(where, f"no joint {name!r}", f"one of {', '.join(skeleton.names)}", "correct the name")
     return skeleton.names.index(name)
 
 
-def _roles(skeleton: Skeleton, recording: Motion | None) -> dict[str, int]:
+def _find_roles(skeleton: Skeleton, recording: Motion | None) -> dict[str, int]:
     """Find the roles that names or structure show; empty where they show nothing."""
     try:
-        return roles_of(identify(skeleton) if recording is None else identify_posed(recording))
+        return list_roles(identify_joints(skeleton) if recording is None else identify_posed_joints(recording))
     except InputError:
         return {}
 
 
-def _linked(source: dict[str, int], target: dict[str, int], links: dict[int, int]):
+def _apply_links(source: dict[str, int], target: dict[str, int], links: dict[int, int]):
     """Apply the map's pairs to both bodies' roles: a mapped joint takes its partner's role."""
     back = {joint: role for role, joint in target.items()}
     source, target = dict(source), dict(target)
@@ -396,14 +396,14 @@ def _linked(source: dict[str, int], target: dict[str, int], links: dict[int, int
     return source, target
 
 
-def _others(source: Skeleton, target: Skeleton, mine: Humanoid, its: Humanoid, links: dict[int, int]) -> dict[int, int]:
+def _pair_other_joints(source: Skeleton, target: Skeleton, mine: Humanoid, its: Humanoid, links: dict[int, int]) -> dict[int, int]:
     """Pair joints without a meaning, target -> source: mapped ones, and those of the same name."""
-    taken = [set(roles_of(body).values()) | set(body.spine) for body in (mine, its)]
+    taken = [set(list_roles(body).values()) | set(body.spine) for body in (mine, its)]
     same = {source.names.index(name): joint for joint, name in enumerate(target.names) if name in source.names}
     return {b: a for a, b in {**same, **links}.items() if a not in taken[0] and b not in taken[1]}
 
 
-def _tops(source: Humanoid, target: Humanoid) -> tuple[int, int] | None:
+def _find_trunk_tops(source: Humanoid, target: Humanoid) -> tuple[int, int] | None:
     """Find where both trunks end: at the neck, else at the head."""
     for part in ("neck", "head"):
         joints = getattr(source, part), getattr(target, part)

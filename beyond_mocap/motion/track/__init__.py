@@ -5,11 +5,11 @@
     sampled = sample_track(track, fps=30)
 """
 
-from .cleaning import FASTEST, DataReport, clean
-from .data import BALL_RADIUS, SampledTrack, Track, at_sentinel
-from .sampling import SMOOTHING_SECONDS, sample, smoothed, travel_direction, zero_phase_hann
+from .cleaning import MAX_SPEED, DataReport, clean_track
+from .data import BALL_RADIUS, SampledTrack, Track, is_ball_sentinel
+from .sampling import SMOOTHING_SECONDS, sample_track, smooth_positions, compute_travel_direction, smooth_zero_phase_hann
 
 __all__ = [
-    "BALL_RADIUS", "FASTEST", "SMOOTHING_SECONDS", "DataReport", "SampledTrack", "Track", "at_sentinel", "clean",
-    "sample", "smoothed", "travel_direction", "zero_phase_hann",
+    "BALL_RADIUS", "MAX_SPEED", "SMOOTHING_SECONDS", "DataReport", "SampledTrack", "Track", "is_ball_sentinel", "clean_track",
+    "sample_track", "smooth_positions", "compute_travel_direction", "smooth_zero_phase_hann",
 ]

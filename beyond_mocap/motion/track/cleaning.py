@@ -11,15 +11,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...base.errors import InputError, TimedLine, told_time
-from ...base.time_series import runs
-from .data import Track, at_sentinel
+from ...base.errors import InputError, TimedMessage, format_seconds
+from ...base.time_series import find_runs
+from .data import Track, is_ball_sentinel
 from .sampling import GAP_INTERVALS, LONG_GAP
 
-FASTEST = 12.0
+MAX_SPEED = 12.0
 """m/s; no player runs faster, so a sample that would need it is wrong."""
 
-_HARDEST = 12.0  # m/s^2, hardest acceleration of a player
+_MAX_ACCELERATION = 12.0  # m/s^2, hardest acceleration of a player
 _SPIKE = 0.2  # metres off its neighbours' line from which a sample is a spike, beyond what acceleration explains
 _EXCURSION = 0.5  # seconds within which a jump away has to return to count as an excursion
 _COAST = (0.2, 0.9)  # seconds before a snap that are replaced: at least, and at most while the feed coasts
@@ -27,8 +27,8 @@ _CATCH_UP = 3.0  # m/s by which the player may be faster while making up for a s
 _COAST_EXACT = 0.012  # metres: a coasting feed keeps to its line up to rounding to centimetres
 _STRAY = 2  # samples before a jump at the track's start, or after one at its end, that are taken for strays
 _SNAP_LIMIT = 3.0  # metres; a longer step is another player, or real: reported, not repaired
-_LEAN = 0.3  # seconds whose slope is the velocity next to a gap
-_LONGEST_GAP = 3600.0  # seconds
+_SLOPE_SECONDS = 0.3  # seconds whose slope is the velocity next to a gap
+_MAX_GAP = 3600.0  # seconds
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,7 +57,7 @@ class DataReport:
     warnings: tuple[str, ...]
 
 
-def clean(track: Track) -> tuple[Track, DataReport]:
+def clean_track(track: Track) -> tuple[Track, DataReport]:
     """Clean a track: in order of time, with one plausible position per sample, and a report of the changes.
 
     Rows without a time are dropped, repeated times merged to their mean, times sorted. Spikes, excursions and the
@@ -77,22 +77,22 @@ def clean(track: Track) -> tuple[Track, DataReport]:
     Raises:
         InputError: if fewer than two samples have a position, or a gap is longer than an hour.
     """
-    times, positions, ball, notes, dropped, merged = _in_order(track)
-    ball, notes = _real_ball(ball, notes)
-    times, positions, ball = _with_missing_rows(times, positions, ball, track.name)
+    times, positions, ball, notes, dropped, merged = _sort_rows(track)
+    ball, notes = _remove_ball_sentinels(ball, notes)
+    times, positions, ball = _insert_missing_rows(times, positions, ball, track.name)
     known = np.isfinite(positions).all(axis=1)
     if np.count_nonzero(known) < 2:
         raise InputError(track.name, f"{np.count_nonzero(known)} samples with a position", "at least two")
     outlier, snaps = np.zeros(len(times), dtype=bool), ()
-    outlier[known], snaps = _outliers(times[known], positions[known])
-    believed = known & ~outlier
-    positions = _bridge(times, positions, believed)
+    outlier[known], snaps = _detect_outliers(times[known], positions[known])
+    is_valid = known & ~outlier
+    positions = _interpolate_gaps(times, positions, is_valid)
     cleaned = Track(times, positions, ball, ball_height_known=np.isfinite(ball[:, 2]), filled=~known, outlier=outlier,
                     name=track.name)
-    return cleaned, _report(cleaned, notes, snaps, dropped, merged)
+    return cleaned, _build_report(cleaned, notes, snaps, dropped, merged)
 
 
-def _in_order(track: Track):
+def _sort_rows(track: Track):
     """Sort rows by time, merge repeated times and drop unknown ones; with notes and counts of the changes."""
     timed = np.isfinite(track.times)
     rows = np.column_stack([track.positions, track.ball])[timed]
@@ -102,19 +102,19 @@ def _in_order(track: Track):
     times = track.times[timed]
     if np.any(np.diff(times) < 0):
         late = times[1:][np.diff(times) < 0]
-        notes.append(f"times out of order sorted: {_places(late)}")
+        notes.append(f"times out of order sorted: {_describe_times(late)}")
     order = np.argsort(times, kind="stable")
     times, rows = times[order], rows[order]
     starts = np.flatnonzero(np.diff(times, prepend=-np.inf) > 1e-6)
     merged = len(times) - len(starts)
     if merged:
         repeated = times[starts][np.diff(starts, append=len(times)) > 1]
-        notes.append(f"{merged} rows with a repeated time merged: {_places(repeated)}")
-        rows = _mean_of_groups(rows, starts)
+        notes.append(f"{merged} rows with a repeated time merged: {_describe_times(repeated)}")
+        rows = _average_groups(rows, starts)
     return times[starts], rows[:, :2], rows[:, 2:], notes, int(np.count_nonzero(~timed)), merged
 
 
-def _mean_of_groups(rows: np.ndarray, starts: np.ndarray) -> np.ndarray:
+def _average_groups(rows: np.ndarray, starts: np.ndarray) -> np.ndarray:
     """Average the finite values in each group of rows (N, k): (G, k); NaN where a group has none."""
     finite = np.isfinite(rows)
     counts = np.add.reduceat(finite, starts, axis=0, dtype=float)
@@ -122,23 +122,23 @@ def _mean_of_groups(rows: np.ndarray, starts: np.ndarray) -> np.ndarray:
     return np.divide(sums, counts, out=np.full_like(sums, np.nan), where=counts > 0)
 
 
-def _real_ball(ball: np.ndarray, notes: list[str]) -> tuple[np.ndarray, list[str]]:
+def _remove_ball_sentinels(ball: np.ndarray, notes: list[str]) -> tuple[np.ndarray, list[str]]:
     """Replace sentinels in ball rows (N, 3) with NaN: z below the ground, far outside, or parked at the origin."""
-    seen, wrong = np.isfinite(ball[:, :2]).all(axis=1), at_sentinel(ball)
+    seen, wrong = np.isfinite(ball[:, :2]).all(axis=1), is_ball_sentinel(ball)
     if wrong.any():
         notes = [*notes, f"{np.count_nonzero(wrong)} samples with the ball at a sentinel set to unknown"]
     ball = np.where((seen & ~wrong)[:, None], ball, np.nan)
     return ball, notes
 
 
-def _with_missing_rows(times, positions, ball, name: str):
+def _insert_missing_rows(times, positions, ball, name: str):
     """Insert rows of NaN, evenly, where two rows are more than three sample intervals apart."""
     steps = np.diff(times)
     interval = np.median(steps) if len(steps) else 1.0
     gaps = np.flatnonzero(steps > GAP_INTERVALS * interval + 1e-9)
-    if len(gaps) and steps[gaps].max() > _LONGEST_GAP:
+    if len(gaps) and steps[gaps].max() > _MAX_GAP:
         worst = gaps[np.argmax(steps[gaps])]
-        found = f"nothing between {told_time(times[worst])} and {told_time(times[worst + 1])} s"
+        found = f"nothing between {format_seconds(times[worst])} and {format_seconds(times[worst + 1])} s"
         raise InputError(name, found, "gaps of an hour at most", "cut the track")
     new = [np.linspace(times[i], times[i + 1], int(round(steps[i] / interval)) + 1)[1:-1] for i in gaps]
     at = np.repeat(gaps + 1, [len(piece) for piece in new])
@@ -148,12 +148,12 @@ def _with_missing_rows(times, positions, ball, name: str):
     return np.insert(times, at, np.concatenate(new)), np.insert(positions, at, blank, 0), np.insert(ball, at, blank, 0)
 
 
-def _outliers(times: np.ndarray, positions: np.ndarray) -> tuple[np.ndarray, tuple[float, ...]]:
+def _detect_outliers(times: np.ndarray, positions: np.ndarray) -> tuple[np.ndarray, tuple[float, ...]]:
     """Detect the samples (N,) bool to replace, and the times of steps too large to repair; all positions are numbers.
     """
-    wrong = _spikes(times, positions)
+    wrong = _detect_spikes(times, positions)
     left = np.flatnonzero(~wrong)
-    jumps, excess = _jumps(times[left], positions[left])
+    jumps, excess = _detect_jumps(times[left], positions[left])
     too_far, used = [], set()
     for place, jump in enumerate(jumps):
         if jump in used:
@@ -161,7 +161,7 @@ def _outliers(times: np.ndarray, positions: np.ndarray) -> tuple[np.ndarray, tup
         # a jump with a return is an excursion, one near an end a stray, a very long one is only reported, any other is
         # a snap
         # after coasting
-        back = _return(times[left], jumps, excess, place)
+        back = _find_return_jump(times[left], jumps, excess, place)
         if back is not None:
             used.add(back)
             wrong[left[jump + 1 : back + 1]] = True
@@ -170,11 +170,11 @@ def _outliers(times: np.ndarray, positions: np.ndarray) -> tuple[np.ndarray, tup
         elif np.linalg.norm(excess[place]) > _SNAP_LIMIT:
             too_far.append(float(times[left[jump + 1]]))
         else:
-            wrong[left[_coasted(times[left], positions[left], jump, float(np.linalg.norm(excess[place])))]] = True
+            wrong[left[_find_coasted_samples(times[left], positions[left], jump, float(np.linalg.norm(excess[place])))]] = True
     return wrong, tuple(too_far)
 
 
-def _spikes(times: np.ndarray, positions: np.ndarray) -> np.ndarray:
+def _detect_spikes(times: np.ndarray, positions: np.ndarray) -> np.ndarray:
     """Detect single samples (N,) bool far off the line between their neighbours, while the neighbours' lines fit
     better.
 
@@ -187,29 +187,29 @@ def _spikes(times: np.ndarray, positions: np.ndarray) -> np.ndarray:
     wrong = np.zeros(len(times), dtype=bool)
     if len(times) < 5:
         return wrong
-    off = _off_line(times[1:-1], positions[1:-1], times[:-2], place_a=positions[:-2], time_b=times[2:],
+    off = _measure_line_distance(times[1:-1], positions[1:-1], times[:-2], place_a=positions[:-2], time_b=times[2:],
                     place_b=positions[2:])
     first, last = (
-        _off_line(
+        _measure_line_distance(
             times[i], positions[i], times[j], place_a=positions[j], time_b=times[k], place_b=positions[k],
         ) for i, j, k in _ENDS
     )
-    beside = np.concatenate([[first], off, [last]])
-    far = off > _SPIKE + _HARDEST / 8.0 * (times[2:] - times[:-2]) ** 2
-    wrong[1:-1] = far & (off > 1.5 * np.maximum(beside[:-2], beside[2:]))
+    neighbour_distances = np.concatenate([[first], off, [last]])
+    far = off > _SPIKE + _MAX_ACCELERATION / 8.0 * (times[2:] - times[:-2]) ** 2
+    wrong[1:-1] = far & (off > 1.5 * np.maximum(neighbour_distances[:-2], neighbour_distances[2:]))
     return wrong
 
 
 _ENDS = ((0, 2, 3), (-1, -3, -4))
 
 
-def _off_line(time, place, time_a, place_a, time_b, place_b) -> np.ndarray:
+def _measure_line_distance(time, place, time_a, place_a, time_b, place_b) -> np.ndarray:
     """Measure the metres (...,) from `place` (..., 2) to the straight, steady path from a to b at `time` (...,)."""
     share = np.asarray((time - time_a) / (time_b - time_a))[..., None]
     return np.linalg.norm(place - place_a * (1 - share) - place_b * share, axis=-1)
 
 
-def _jumps(times: np.ndarray, positions: np.ndarray) -> tuple[list[int], np.ndarray]:
+def _detect_jumps(times: np.ndarray, positions: np.ndarray) -> tuple[list[int], np.ndarray]:
     """Detect steps that no player takes.
 
     Returns:
@@ -225,11 +225,11 @@ def _jumps(times: np.ndarray, positions: np.ndarray) -> tuple[list[int], np.ndar
     usual = np.median(np.lib.stride_tricks.sliding_window_view(padded, 2 * half + 1, axis=0), axis=2)
     excess = (velocity - usual) * steps[:, None]
     short = steps <= GAP_INTERVALS * np.median(steps) + 1e-9
-    jumps = np.flatnonzero(short & (np.linalg.norm(excess, axis=1) > _SPIKE + _HARDEST / 3.0 * steps))
+    jumps = np.flatnonzero(short & (np.linalg.norm(excess, axis=1) > _SPIKE + _MAX_ACCELERATION / 3.0 * steps))
     return jumps.tolist(), excess[jumps]
 
 
-def _return(times: np.ndarray, jumps: list[int], excess: np.ndarray, place: int) -> int | None:
+def _find_return_jump(times: np.ndarray, jumps: list[int], excess: np.ndarray, place: int) -> int | None:
     """Find the later jump within half a second that reverses jump number `place`; None if there is none."""
     for other in range(place + 1, len(jumps)):
         if times[jumps[other]] - times[jumps[place]] > _EXCURSION:
@@ -239,7 +239,7 @@ def _return(times: np.ndarray, jumps: list[int], excess: np.ndarray, place: int)
     return None
 
 
-def _coasted(times: np.ndarray, positions: np.ndarray, jump: int, size: float) -> np.ndarray:
+def _find_coasted_samples(times: np.ndarray, positions: np.ndarray, jump: int, size: float) -> np.ndarray:
     """Find the samples up to `jump` to replace.
 
     As many as making up for `size` metres takes, and further back while they lie on an exact line. The first sample of
@@ -249,47 +249,47 @@ def _coasted(times: np.ndarray, positions: np.ndarray, jump: int, size: float) -
     before = times[jump] - times[: jump + 1]
     first = int(np.searchsorted(-before, -max(_COAST[0], min(size / _CATCH_UP, _COAST[1]))))
     for start in range(min(first, jump - 3), -1, -1):
-        if before[start] > _COAST[1] or not _on_a_line(times[start : jump + 1], positions[start : jump + 1]):
+        if before[start] > _COAST[1] or not _is_on_line(times[start : jump + 1], positions[start : jump + 1]):
             break
         first = start
     return np.arange(max(first + 1, 1), jump + 1)
 
 
-def _on_a_line(times: np.ndarray, positions: np.ndarray) -> bool:
+def _is_on_line(times: np.ndarray, positions: np.ndarray) -> bool:
     """Whether the samples have one velocity up to the feed's rounding."""
     basis = np.column_stack([np.ones(len(times)), times - times[0]])
     line = basis @ np.linalg.lstsq(basis, positions, rcond=None)[0]
     return bool(np.abs(positions - line).max() <= _COAST_EXACT)
 
 
-def _bridge(times: np.ndarray, positions: np.ndarray, believed: np.ndarray) -> np.ndarray:
+def _interpolate_gaps(times: np.ndarray, positions: np.ndarray, is_valid: np.ndarray) -> np.ndarray:
     """Interpolate the positions (N, 2) by a cubic wherever they are not valid."""
     out = positions.copy()
-    for start, stop in runs(~believed):
-        before = _end_state(times, positions, believed, start - 1, -1)
-        after = _end_state(times, positions, believed, stop, +1)
-        out[start:stop] = _cubic(times[start:stop], before, after)
+    for start, stop in find_runs(~is_valid):
+        before = _estimate_end_state(times, positions, is_valid, start - 1, -1)
+        after = _estimate_end_state(times, positions, is_valid, stop, +1)
+        out[start:stop] = _interpolate_hermite(times[start:stop], before, after)
     return out
 
 
-def _end_state(times, positions, believed, index: int, direction: int):
+def _estimate_end_state(times, positions, is_valid, index: int, direction: int):
     """Estimate (time, position, velocity) of the valid sample `index`, velocity over the valid ones beside it; or None.
     """
     if not 0 <= index < len(times):
         return None
     members = [index]
-    while 0 <= (other := members[-1] + direction) < len(times) and believed[other]:
-        if abs(times[other] - times[index]) > _LEAN and len(members) > 1:
+    while 0 <= (other := members[-1] + direction) < len(times) and is_valid[other]:
+        if abs(times[other] - times[index]) > _SLOPE_SECONDS and len(members) > 1:
             break
         members.append(other)
     moment = times[members] - np.mean(times[members])
     place = positions[members] - np.mean(positions[members], axis=0)
     velocity = moment @ place / max(moment @ moment, 1e-12)
     speed = np.linalg.norm(velocity)
-    return times[index], positions[index], velocity * min(1.0, FASTEST / max(speed, 1e-9))
+    return times[index], positions[index], velocity * min(1.0, MAX_SPEED / max(speed, 1e-9))
 
 
-def _cubic(at: np.ndarray, before, after) -> np.ndarray:
+def _interpolate_hermite(at: np.ndarray, before, after) -> np.ndarray:
     """Interpolate by a Hermite cubic from one end state to the other: (len(at), 2); beyond the ends the velocity fades.
     """
     if before is None or after is None:
@@ -305,59 +305,59 @@ def _cubic(at: np.ndarray, before, after) -> np.ndarray:
     return (p0 * (1 + 2 * s) * (1 - s) ** 2 + p1 * s * s * (3 - 2 * s) + length * s * (1 - s) * (v0 * (1 - s) - v1 * s))
 
 
-def _report(track: Track, notes: list[str], snaps: tuple[float, ...], dropped: int, merged: int) -> DataReport:
+def _build_report(track: Track, notes: list[str], snaps: tuple[float, ...], dropped: int, merged: int) -> DataReport:
     """Build the report of a cleaned track."""
-    gaps = _gaps(track)
-    warnings = _warnings(track, snaps, gaps)
+    gaps = _find_gaps(track)
+    warnings = _collect_warnings(track, snaps, gaps)
     return DataReport(
-        lines=(*notes, *_replacements(track), *warnings), rate=1.0 / track.interval, dropped=dropped, merged=merged,
+        lines=(*notes, *_describe_replacements(track), *warnings), rate=1.0 / track.interval, dropped=dropped, merged=merged,
         filled=int(track.filled.sum()), outliers=int(track.outlier.sum()), gaps=gaps,
-        ball_unknown=int(np.count_nonzero(_no_ball(track))), warnings=tuple(warnings),
+        ball_unknown=int(np.count_nonzero(_find_missing_ball(track))), warnings=tuple(warnings),
     )
 
 
-def _gaps(track: Track) -> tuple[tuple[float, float], ...]:
+def _find_gaps(track: Track) -> tuple[tuple[float, float], ...]:
     """Find (start, end) seconds wherever measured samples are more than three intervals apart."""
     times = track.times[track.measured]
     wide = np.flatnonzero(np.diff(times) > GAP_INTERVALS * track.interval + 1e-9)
     return tuple((float(times[i]), float(times[i + 1])) for i in wide)
 
 
-def _no_ball(track: Track) -> np.ndarray:
+def _find_missing_ball(track: Track) -> np.ndarray:
     return ~np.isfinite(track.ball[:, :2]).all(axis=1)
 
 
-def _warnings(track: Track, snaps: tuple[float, ...], gaps) -> list[TimedLine]:
+def _collect_warnings(track: Track, snaps: tuple[float, ...], gaps) -> list[TimedMessage]:
     """Collect warnings about implausible data that were left as they are."""
     speed = np.linalg.norm(np.diff(track.positions, axis=0), axis=1) / np.diff(track.times)
-    fast = track.times[1:][speed > FASTEST]
+    fast = track.times[1:][speed > MAX_SPEED]
     out = []
     if snaps:
         out.append(
-            TimedLine(f"steps of more than {_SNAP_LIMIT:g} m left as they are: {_places(snaps)}", *zip(snaps, snaps))
+            TimedMessage(f"steps of more than {_SNAP_LIMIT:g} m left as they are: {_describe_times(snaps)}", *zip(snaps, snaps))
         )
     if len(fast):
-        out.append(TimedLine(f"faster than {FASTEST:g} m/s in {len(fast)} samples: {_places(fast)}", *zip(fast, fast)))
-    return out + [TimedLine(f"no samples from {a:.2f} to {b:.2f} s", (a, b)) for a, b in gaps if b - a > LONG_GAP]
+        out.append(TimedMessage(f"faster than {MAX_SPEED:g} m/s in {len(fast)} samples: {_describe_times(fast)}", *zip(fast, fast)))
+    return out + [TimedMessage(f"no samples from {a:.2f} to {b:.2f} s", (a, b)) for a, b in gaps if b - a > LONG_GAP]
 
 
-def _replacements(track: Track) -> list[str]:
+def _describe_replacements(track: Track) -> list[str]:
     """Describe what was inserted and replaced, and how much of the ball is missing."""
     marked = (("samples filled", track.filled), ("outliers replaced", track.outlier))
-    out = [f"{m.sum()} {what}: {_stretches(track.times[m], track.interval)}" for what, m in marked if m.any()]
-    unknown = _no_ball(track)
+    out = [f"{m.sum()} {what}: {_describe_stretches(track.times[m], track.interval)}" for what, m in marked if m.any()]
+    unknown = _find_missing_ball(track)
     if unknown.any() and not unknown.all():
         out.append(f"ball unknown in {unknown.sum()} of {len(track)} samples")
     return out
 
 
-def _places(times, most: int = 5) -> str:
+def _describe_times(times, most: int = 5) -> str:
     """Describe the first few of some times."""
     named = ", ".join(f"{time:.2f}" for time in list(times)[:most])
     return f"{named} s" + (f" and {len(times) - most} more" if len(times) > most else "")
 
 
-def _stretches(times: np.ndarray, interval: float) -> str:
+def _describe_stretches(times: np.ndarray, interval: float) -> str:
     """Describe times (N,) as stretches of neighbouring samples."""
     starts = np.flatnonzero(np.diff(times, prepend=-np.inf) > 1.5 * interval)
     ends = [*(starts[1:] - 1), len(times) - 1]

@@ -9,13 +9,13 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from ...base.errors import InputError
-from ...base.time_series import runs
-from ..skeleton import frozen_array
+from ...base.time_series import find_runs
+from ..skeleton import freeze_array
 
 BALL_RADIUS = 0.11
 """Metres; where a feed gives no height, the ball's centre lies this high."""
 
-_PITCH = 200.0  # metres from the pitch's centre beyond which a ball position is invalid
+_MAX_BALL_DISTANCE = 200.0  # metres from the pitch's centre beyond which a ball position is invalid
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +41,7 @@ class Track:
     name: str = "track"
 
     def __post_init__(self):
-        times = frozen_array(self.times).reshape(-1)
+        times = freeze_array(self.times).reshape(-1)
         count = len(times)
         arrays = {
             "positions": (self.positions, (count, 2), float),
@@ -56,7 +56,7 @@ class Track:
         arrays["ball_height_known"] = (known, (count,), bool)
         object.__setattr__(self, "times", times)
         for name, (values, shape, kind) in arrays.items():
-            array = frozen_array(values, kind)
+            array = freeze_array(values, kind)
             if array.shape != shape:
                 raise InputError(self.name, f"{name} of shape {array.shape}", f"{shape}")
             object.__setattr__(self, name, array)
@@ -107,9 +107,9 @@ class SampledTrack:
 
     def __post_init__(self):
         for name in ("times", "positions", "raw", "velocity", "speed", "direction", "ball"):
-            object.__setattr__(self, name, frozen_array(getattr(self, name)))
+            object.__setattr__(self, name, freeze_array(getattr(self, name)))
         for name in ("valid", "ball_measured"):
-            object.__setattr__(self, name, frozen_array(getattr(self, name), bool))
+            object.__setattr__(self, name, freeze_array(getattr(self, name), bool))
 
     def __len__(self) -> int:
         return len(self.times)
@@ -120,7 +120,7 @@ class SampledTrack:
         return SampledTrack(**{name: values[start:stop] for name, values in arrays.items()}, fps=self.fps)
 
 
-def at_sentinel(ball: np.ndarray) -> np.ndarray:
+def is_ball_sentinel(ball: np.ndarray) -> np.ndarray:
     """Mark known ball samples that are no position of a ball: z below the ground, far outside, or parked at the origin.
 
     Args:
@@ -128,16 +128,16 @@ def at_sentinel(ball: np.ndarray) -> np.ndarray:
     Returns:
         (N,) bool.
     """
-    seen = np.isfinite(ball[:, :2]).all(axis=1)
+    is_known = np.isfinite(ball[:, :2]).all(axis=1)
     with np.errstate(invalid="ignore"):
-        return seen & ((np.abs(ball) > _PITCH).any(axis=1) | (ball[:, 2] < -1.0) | _parked_at_origin(ball))
+        return is_known & ((np.abs(ball) > _MAX_BALL_DISTANCE).any(axis=1) | (ball[:, 2] < -1.0) | _is_parked_at_origin(ball))
 
 
-def _parked_at_origin(ball: np.ndarray) -> np.ndarray:
+def _is_parked_at_origin(ball: np.ndarray) -> np.ndarray:
     """Mark runs (N,) of three or more samples exactly at (0, 0) that the ball did not roll into or out of."""
     zero = (ball[:, :2] == 0.0).all(axis=1)
     out = np.zeros(len(ball), dtype=bool)
-    for start, stop in runs(zero):
+    for start, stop in find_runs(zero):
         beside = [i for i in (start - 1, stop) if 0 <= i < len(ball) and np.isfinite(ball[i, :2]).all()]
         out[start:stop] = stop - start >= 3 and all(np.linalg.norm(ball[i, :2]) > 1.5 for i in beside)
     return out

@@ -11,20 +11,20 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...base.errors import InputError
-from ...base.time_series import interpolate
+from ...base.time_series import interpolate_columns
 from .data import Track
 
-HZ = 25.0  # samples a second of a track from a drawn line
-FASTEST = 12.0
+SAMPLE_RATE = 25.0  # samples a second of a track from a drawn line
+MAX_SPEED = 12.0
 """m/s; no player runs faster."""
 
-SHORTEST = 0.2
+MIN_LENGTH = 0.2
 """Minimum length of a drawn line, metres."""
 
-LONGEST_SECONDS = 3600.0  # a longer track is a mistake, and would fill the memory
+MAX_SECONDS = 3600.0  # a longer track is a mistake, and would fill the memory
 
 
-def along(
+def build_line_track(
     line: np.ndarray, arc: Sequence[float], speeds: Sequence[float], waits: Sequence[float], start: float = 0.0,
     name: str = "track",
 ) -> Track:
@@ -45,28 +45,28 @@ def along(
         InputError: for a line that is too short, two stops in a row, or speeds that are invalid or beyond MAX_SPEED.
     """
     line, arc, speeds, waits = (np.asarray(values, dtype=float) for values in (line, arc, speeds, waits))
-    _check(line, arc, speeds, name)
+    _check_line(line, arc, speeds, name)
     steps = np.linalg.norm(np.diff(line, axis=0), axis=1)
-    way = np.concatenate([[0.0], np.cumsum(steps)])
+    line_distance = np.concatenate([[0.0], np.cumsum(steps)])
     gaps = np.diff(arc)
-    own = np.where(speeds > 0.0, 0.0, np.maximum(waits, 0.0))
+    pauses = np.where(speeds > 0.0, 0.0, np.maximum(waits, 0.0))
     seconds = 2.0 * gaps / (speeds[:-1] + speeds[1:])
-    arrive = np.concatenate([[0.0], np.cumsum(seconds + own[:-1])])
-    leave = arrive + own
-    if not leave[-1] <= LONGEST_SECONDS:
+    arrive = np.concatenate([[0.0], np.cumsum(seconds + pauses[:-1])])
+    leave = arrive + pauses
+    if not leave[-1] <= MAX_SECONDS:
         raise InputError(name, f"a duration of {leave[-1]:.0f} s", "an hour at most", "raise the speeds at its points")
-    count = max(int(round(leave[-1] * HZ)), 5)
+    count = max(int(round(leave[-1] * SAMPLE_RATE)), 5)
     times = np.linspace(0.0, leave[-1], count + 1)
     at = np.clip(np.searchsorted(arrive, times, side="right") - 1, 0, len(gaps) - 1)
     # seconds since leaving the last point, 0 while waiting there; then s = s0 + v t + a t^2 / 2
-    passed = np.clip(times - leave[at], 0.0, seconds[at])
-    pull = (speeds[at + 1] - speeds[at]) / seconds[at]
-    gone = np.clip(arc[at] + speeds[at] * passed + 0.5 * pull * passed**2, 0.0, way[-1])
-    places = interpolate(gone, way, line[:, :2])
+    elapsed = np.clip(times - leave[at], 0.0, seconds[at])
+    acceleration = (speeds[at + 1] - speeds[at]) / seconds[at]
+    distance = np.clip(arc[at] + speeds[at] * elapsed + 0.5 * acceleration * elapsed**2, 0.0, line_distance[-1])
+    places = interpolate_columns(distance, line_distance, line[:, :2])
     return Track(times + start, places, name=name)
 
 
-def moved(times: np.ndarray, places: np.ndarray, name: str = "track") -> Track:
+def build_moving_track(times: np.ndarray, places: np.ndarray, name: str = "track") -> Track:
     """Build the track of an animated object.
 
     Args:
@@ -81,17 +81,17 @@ def moved(times: np.ndarray, places: np.ndarray, name: str = "track") -> Track:
     times, places = np.asarray(times, dtype=float), np.asarray(places, dtype=float)
     if len(times) < 2 or times[-1] - times[0] < 0.2:
         raise InputError(name, "moves for less than 0.2 s", "an animated object", "add keyframes or a longer range")
-    count = max(int(round((times[-1] - times[0]) * HZ)), 5)
+    count = max(int(round((times[-1] - times[0]) * SAMPLE_RATE)), 5)
     even = np.linspace(times[0], times[-1], count + 1)
-    places = interpolate(even, times, places)
+    places = interpolate_columns(even, times, places)
     fastest = np.linalg.norm(np.diff(places, axis=0), axis=1).max() / (even[1] - even[0])
-    if not fastest <= FASTEST:
-        raise InputError(name, f"moves at {fastest:.1f} m/s", f"{FASTEST:g} m/s at most", "slow it down")
+    if not fastest <= MAX_SPEED:
+        raise InputError(name, f"moves at {fastest:.1f} m/s", f"{MAX_SPEED:g} m/s at most", "slow it down")
     return Track(even, places, name=name)
 
 
-def nurbs_line(
-    points: np.ndarray, weights: np.ndarray, order: int, clamped: bool, fine: int
+def sample_nurbs(
+    points: np.ndarray, weights: np.ndarray, order: int, clamped: bool, pieces_per_point: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """Sample a NURBS curve with even knots.
 
@@ -113,21 +113,21 @@ def nurbs_line(
         knots = np.arange(count + degree + 1, dtype=float)
     means = np.array([knots[i + 1 : i + 1 + degree].mean() for i in range(count)])
     means = (means - means[0]) / (means[-1] - means[0])  # unclamped, its first point still marks the beginning
-    pieces = fine * (count - 1)
+    pieces = pieces_per_point * (count - 1)
     at = np.linspace(knots[degree], knots[count], pieces + 1)
     values = BSpline(knots, np.column_stack([points * weights[:, None], weights]), degree)(at)
     return values[:, :3] / values[:, 3:], np.round(means * pieces).astype(int)
 
 
-def _check(line: np.ndarray, arc: np.ndarray, speeds: np.ndarray, name: str) -> None:
+def _check_line(line: np.ndarray, arc: np.ndarray, speeds: np.ndarray, name: str) -> None:
     """Check that the line is long enough and its speeds and points are valid (InputError)."""
     length = float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum()) if len(line) > 1 else 0.0
-    if not length >= SHORTEST or len(arc) < 2:
-        raise InputError(name, f"{length:.2f} m long", f"{SHORTEST:g} m or more", "draw it longer")
+    if not length >= MIN_LENGTH or len(arc) < 2:
+        raise InputError(name, f"{length:.2f} m long", f"{MIN_LENGTH:g} m or more", "draw it longer")
     if not np.all(np.isfinite(speeds)) or np.any(speeds < 0.0):
         raise InputError(name, "an invalid speed", "0 m/s or more", "set the speeds of its points")
-    if speeds.max() > FASTEST:
-        raise InputError(name, f"{speeds.max():.1f} m/s", f"{FASTEST:g} m/s at most", "lower the speed of that point")
+    if speeds.max() > MAX_SPEED:
+        raise InputError(name, f"{speeds.max():.1f} m/s", f"{MAX_SPEED:g} m/s at most", "lower the speed of that point")
     stops = np.flatnonzero((speeds[:-1] == 0.0) & (speeds[1:] == 0.0))
     if len(stops):
         found = f"speed 0 at both points {stops[0] + 1} and {stops[0] + 2}: no player gets from one to the other"

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...base.errors import InputError
-from ...base.time_series import runs
+from ...base.time_series import find_runs
 from . import Track
 
-LONGEST_GAP = 3.0
+MAX_GAP = 3.0
 """Seconds; a player who is missing for longer has left the pitch."""
 
 REFEREE = "referee"
@@ -61,7 +61,7 @@ class Half:
     """
 
     number: int
-    zero: float
+    clock_zero: float
     start: float
     end: float
 
@@ -99,12 +99,12 @@ class Match:
     notes: tuple[str, ...] = ()
     teams: tuple[Team, ...] = ()
     report: tuple[str, ...] = ()
-    passed: tuple[tuple[int, float], ...] = ()
+    elapsed: tuple[tuple[int, float], ...] = ()
 
     @property
     def halves(self) -> tuple[Half, ...]:
         """The periods with their numbers and clocks."""
-        passed = self.passed or tuple((number, 0.0) for number in range(1, len(self.periods) + 1))
+        passed = self.elapsed or tuple((number, 0.0) for number in range(1, len(self.periods) + 1))
         return tuple(
             Half(number, start - before, start, end) for (number, before), (start, end) in zip(passed, self.periods)
         )
@@ -120,7 +120,7 @@ class Match:
         Raises:
             InputError: for an unknown player, or one with fewer than two samples in that time.
         """
-        path = self.positions[self._index(player_id)]
+        path = self.positions[self._find_player_index(player_id)]
         low = -np.inf if start is None else start - 1e-9
         high = np.inf if end is None else end + 1e-9
         there = np.flatnonzero(np.isfinite(path).all(axis=1) & (self.times >= low) & (self.times <= high))
@@ -130,7 +130,7 @@ class Match:
         part = slice(there[0], there[-1] + 1)
         return Track(self.times[part], path[part], self.ball[part], name=player_id)
 
-    def stretches(self, player_id: str, gap: float = LONGEST_GAP) -> tuple[tuple[float, float], ...]:
+    def list_stretches(self, player_id: str, gap: float = MAX_GAP) -> tuple[tuple[float, float], ...]:
         """List the stretches in which a player is present, in order, all of more than one sample.
 
         Args:
@@ -141,7 +141,7 @@ class Match:
         Raises:
             InputError: for an unknown player.
         """
-        there = np.isfinite(self.positions[self._index(player_id)]).all(axis=1)
+        there = np.isfinite(self.positions[self._find_player_index(player_id)]).all(axis=1)
         found = []
         for begins, ends in self.periods:
             inside = np.flatnonzero(there & (self.times >= begins - 1e-9) & (self.times <= ends + 1e-9))
@@ -151,22 +151,22 @@ class Match:
                     found.append((float(self.times[piece[0]]), float(self.times[piece[-1]])))
         return tuple(found)
 
-    def _index(self, player_id: str) -> int:
+    def _find_player_index(self, player_id: str) -> int:
         ids = [player.id for player in self.players]
         if player_id not in ids:
             raise InputError("player", f"{player_id!r}", f"one of {', '.join(ids)}")
         return ids.index(player_id)
 
 
-def presence_lines(match: Match) -> list[str]:
+def describe_presence(match: Match) -> list[str]:
     """Describe, one line each, for how long every player who is not always present is there, and where they are
     missing.
     """
     lines = []
     for player, path in zip(match.players, match.positions):
-        gone = runs(~np.isfinite(path).all(axis=1))
-        short = [(a, b) for a, b in gone if match.times[b - 1] - match.times[a] <= LONGEST_GAP]
-        spans = match.stretches(player.id)
+        missing = find_runs(~np.isfinite(path).all(axis=1))
+        short = [(a, b) for a, b in missing if match.times[b - 1] - match.times[a] <= MAX_GAP]
+        spans = match.list_stretches(player.id)
         seconds = sum(end - start for start, end in spans)
         whole = [tuple(np.round(period, 6)) for period in match.periods]
         if not short and [tuple(np.round(span, 6)) for span in spans] == whole:

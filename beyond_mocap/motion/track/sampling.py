@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...base.errors import InputError
-from ...base.time_series import interpolate
+from ...base.time_series import interpolate_columns
 from ...base.vectors import arctan2
 from .data import BALL_RADIUS, SampledTrack, Track
 
@@ -22,10 +22,10 @@ MOVING_SPEED = 0.5
 """m/s; below it a direction of travel is mostly noise."""
 
 _TURN_SECONDS = 0.5  # in which a player at rest turns before setting off
-_LONGEST = 6 * 3600.0  # s
+_MAX_SECONDS = 6 * 3600.0  # s
 
 
-def sample(track: Track, fps: float, window: float = SMOOTHING_SECONDS) -> SampledTrack:
+def sample_track(track: Track, fps: float, window: float = SMOOTHING_SECONDS) -> SampledTrack:
     """Sample a cleaned track at an even rate: floor(duration * fps) + 1 frames from its first time on.
 
     The ball is interpolated linearly, constant before its first and after its last sample, and no lower than its
@@ -41,23 +41,23 @@ def sample(track: Track, fps: float, window: float = SMOOTHING_SECONDS) -> Sampl
     Raises:
         InputError: with fewer than two measured samples, or for a track longer than six hours.
     """
-    times, fine, step = _grids(track, fps)
-    positions = smoothed(interpolate(fine, track.times, track.positions), fps * step, window)[::step]
+    times, fine_times, step = _build_time_grids(track, fps)
+    positions = smooth_positions(interpolate_columns(fine_times, track.times, track.positions), fps * step, window)[::step]
     measured = track.measured
     velocity = np.broadcast_to((positions[-1] - positions[0]) * fps, positions.shape)  # of one or two frames
     if len(times) > 2:
         velocity = np.gradient(positions, 1.0 / fps, axis=0, edge_order=2)
     speed = np.linalg.norm(velocity, axis=1)
-    ball, ball_measured = _ball(track, times)
+    ball, ball_measured = _sample_ball(track, times)
     return SampledTrack(
-        times=times, positions=positions, raw=interpolate(times, track.times[measured], track.positions[measured]),
-        velocity=velocity, speed=speed, direction=travel_direction(velocity, fps),
-        valid=_bridged(times, track.times[measured], max(GAP_INTERVALS * track.interval, LONG_GAP)), ball=ball,
+        times=times, positions=positions, raw=interpolate_columns(times, track.times[measured], track.positions[measured]),
+        velocity=velocity, speed=speed, direction=compute_travel_direction(velocity, fps),
+        valid=_is_within_gap(times, track.times[measured], max(GAP_INTERVALS * track.interval, LONG_GAP)), ball=ball,
         ball_measured=ball_measured, fps=float(fps),
     )
 
 
-def smoothed(positions: np.ndarray, fps: float, window: float = SMOOTHING_SECONDS) -> np.ndarray:
+def smooth_positions(positions: np.ndarray, fps: float, window: float = SMOOTHING_SECONDS) -> np.ndarray:
     """Smooth positions without the feed's jitter: a Hann window whose bias is corrected twice.
 
     One pass of a window pulls curves inward by half its variance times the acceleration (0.037 s^2 for 1.5 s: 15 cm at
@@ -78,13 +78,13 @@ def smoothed(positions: np.ndarray, fps: float, window: float = SMOOTHING_SECOND
     Returns:
         (T, k).
     """
-    out = zero_phase_hann(positions, fps, window)
+    out = smooth_zero_phase_hann(positions, fps, window)
     for _ in range(2):
-        out = out + zero_phase_hann(positions - out, fps, window)
+        out = out + smooth_zero_phase_hann(positions - out, fps, window)
     return out
 
 
-def zero_phase_hann(values: np.ndarray, fps: float, seconds: float) -> np.ndarray:
+def smooth_zero_phase_hann(values: np.ndarray, fps: float, seconds: float) -> np.ndarray:
     """Smooth values with a symmetric Hann window; the ends are point-reflected.
 
     Point reflection continues x beyond its last value e as 2 e - x backwards, so ends stay and keep their slope.
@@ -105,7 +105,7 @@ def zero_phase_hann(values: np.ndarray, fps: float, seconds: float) -> np.ndarra
     return np.stack([np.convolve(column, window / window.sum(), "valid") for column in padded.T], axis=1)
 
 
-def travel_direction(velocity: np.ndarray, fps: float) -> np.ndarray:
+def compute_travel_direction(velocity: np.ndarray, fps: float) -> np.ndarray:
     """Compute the direction of travel, held while the player is slower than MOVING_SPEED.
 
     Slower frames keep the direction before them, and turn to the next one in the last half second before it: a player
@@ -130,11 +130,11 @@ def travel_direction(velocity: np.ndarray, fps: float) -> np.ndarray:
     before = np.clip(np.searchsorted(moving, frames, side="right") - 1, 0, None)
     after = np.clip(np.searchsorted(moving, frames), None, len(moving) - 1)
     pause = np.maximum(moving[after] - moving[before], 1)
-    left = np.clip((moving[after] - frames) / np.minimum(_TURN_SECONDS * fps, pause), 0.0, 1.0)
-    return angles[after] + (angles[before] - angles[after]) * left * left * (3.0 - 2.0 * left)
+    remaining = np.clip((moving[after] - frames) / np.minimum(_TURN_SECONDS * fps, pause), 0.0, 1.0)
+    return angles[after] + (angles[before] - angles[after]) * remaining * remaining * (3.0 - 2.0 * remaining)
 
 
-def _grids(track: Track, fps: float) -> tuple[np.ndarray, np.ndarray, int]:
+def _build_time_grids(track: Track, fps: float) -> tuple[np.ndarray, np.ndarray, int]:
     """Build the frame times, the times of a finer grid of at least 50 Hz (the window needs many), and its steps per
     frame.
     """
@@ -143,7 +143,7 @@ def _grids(track: Track, fps: float) -> tuple[np.ndarray, np.ndarray, int]:
     if np.count_nonzero(track.measured) < 2 or not np.all(np.diff(track.times) > 0):
         raise InputError(track.name, f"{np.count_nonzero(track.measured)} usable samples", "two or more, cleaned")
     duration = track.times[-1] - track.times[0]
-    if duration > _LONGEST:
+    if duration > _MAX_SECONDS:
         raise InputError(track.name, f"{duration:.0f} s", "at most six hours", "cut the track")
     step = int(np.ceil(50.0 / fps))
     count = int(np.floor(duration * fps + 1e-6)) + 1
@@ -151,7 +151,7 @@ def _grids(track: Track, fps: float) -> tuple[np.ndarray, np.ndarray, int]:
     return fine[::step], fine, step
 
 
-def _bridged(at: np.ndarray, times: np.ndarray, longest: float) -> np.ndarray:
+def _is_within_gap(at: np.ndarray, times: np.ndarray, longest: float) -> np.ndarray:
     """Whether `at` (len(at),) is at a time of `times` (N,) or between two of them no more than `longest` seconds apart.
     """
     after = np.clip(np.searchsorted(times, at - 1e-9), 0, len(times) - 1)
@@ -160,12 +160,12 @@ def _bridged(at: np.ndarray, times: np.ndarray, longest: float) -> np.ndarray:
     return covered & (times[after] - times[before] <= longest + 1e-9)
 
 
-def _ball(track: Track, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _sample_ball(track: Track, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Sample the ball at the times `at` (T,): positions (T, 3) m and whether each is measured (T,)."""
     seen = np.isfinite(track.ball[:, :2]).all(axis=1)
     if not seen.any():
         return np.full((len(at), 3), np.nan), np.zeros(len(at), dtype=bool)
     times = track.times[seen]
     height = np.where(track.ball_height_known[seen], track.ball[seen, 2], BALL_RADIUS)
-    ball = interpolate(at, times, np.column_stack([track.ball[seen, :2], np.maximum(height, BALL_RADIUS)]))
-    return ball, _bridged(at, times, GAP_INTERVALS * track.interval)
+    ball = interpolate_columns(at, times, np.column_stack([track.ball[seen, :2], np.maximum(height, BALL_RADIUS)]))
+    return ball, _is_within_gap(at, times, GAP_INTERVALS * track.interval)

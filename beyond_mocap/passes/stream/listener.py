@@ -30,20 +30,20 @@ LOOPBACK = "127.0.0.1"
 PORT = 7001
 PROTOCOLS = ("udp", "tcp", "call")
 """Datagrams that arrive; a sender connects to us; or we connect to a waiting sender, as Axis Neuron is."""
-STALLED = 1.0
+STALL_SECONDS = 1.0
 """Seconds without a frame after which a stream counts as stalled."""
-_SPOKEN = {"udp": "UDP", "tcp": "TCP", "call": "TCP"}
+_PROTOCOL_NAMES = {"udp": "UDP", "tcp": "TCP", "call": "TCP"}
 _TICK = 0.2  # s: longest wait for a socket
 _CHUNK = 1 << 16  # bytes read at once
-_MOST_A_SECOND = 8 << 20  # bytes read per second
-_CALL_AGAIN = 1.0  # s between two attempts to connect
-_RING = 6000  # frames in the ring buffer at most
-_MEASURED = 60  # latest frames from which rate and delay are measured
-_alive: weakref.WeakSet[Listener] = weakref.WeakSet()
+_BYTES_PER_SECOND = 8 << 20  # bytes read per second
+_RECONNECT_SECONDS = 1.0  # s between two attempts to connect
+_RING_FRAMES = 6000  # frames in the ring buffer at most
+_MEASURED_FRAMES = 60  # latest frames from which rate and delay are measured
+_listeners: weakref.WeakSet[Listener] = weakref.WeakSet()
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Arrived:
+class StreamFrame:
     """A frame that has arrived.
 
     Attributes:
@@ -62,7 +62,7 @@ class Arrived:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Status:
+class StreamStatus:
     """The state of a stream.
 
     Attributes:
@@ -79,9 +79,9 @@ class Status:
     state: str
     frames: int
     rate: float
-    quiet: float
-    way: float | None
-    rubbish: int
+    idle: float
+    delay: float | None
+    invalid_count: int
     line: str
 
 
@@ -107,11 +107,11 @@ class Listener:
         self.port, self.protocol, self.seconds = int(port), protocol, seconds
         self.stream = BvhStream(hierarchy, unit)
         self._lock = threading.Lock()
-        self._ring: deque[Arrived] = deque(maxlen=_RING)
+        self._ring: deque[StreamFrame] = deque(maxlen=_RING_FRAMES)
         self._count = 0
         self._stop = threading.Event()
-        self._state, self._why = "waiting", ""
-        self._came, self._heard = 0, 0.0
+        self._state, self._reason = "waiting", ""
+        self._bytes_read, self._second_start = 0, 0.0
         self._thread: threading.Thread | None = None
         self._server: socket.socket | None = None
 
@@ -134,8 +134,8 @@ class Listener:
                 self._server.close()
                 raise InputError(f"port {self.port}", f"not available ({error.strerror or error})",
                                  "a free port", "choose another one, or stop the program that uses it") from None
-        self._thread = threading.Thread(target=self._run, name="beyond_mocap stream", daemon=True)
-        _alive.add(self)
+        self._thread = threading.Thread(target=self._receive, name="beyond_mocap stream", daemon=True)
+        _listeners.add(self)
         self._thread.start()
         return self
 
@@ -145,84 +145,84 @@ class Listener:
         if self._thread is not None and self._thread is not threading.current_thread():
             self._thread.join(5.0 * _TICK)
         self._state = "stopped" if self._state != "failed" else self._state
-        _alive.discard(self)
+        _listeners.discard(self)
 
     @property
-    def running(self) -> bool:
+    def is_running(self) -> bool:
         """Whether the thread still listens."""
         return self._thread is not None and self._thread.is_alive() and not self._stop.is_set()
 
-    def since(self, number: int = 0) -> list[Arrived]:
+    def frames_since(self, number: int = 0) -> list[StreamFrame]:
         """List the frames after frame `number` that are still in the ring buffer, oldest first."""
         with self._lock:
-            found = []
+            frames = []
             for frame in reversed(self._ring):
                 if frame.number <= number:
                     break
-                found.append(frame)
-        return found[::-1]
+                frames.append(frame)
+        return frames[::-1]
 
-    def latest(self) -> Arrived | None:
+    def latest_frame(self) -> StreamFrame | None:
         """Find the newest frame; None if there is none."""
         with self._lock:
             return self._ring[-1] if self._ring else None
 
-    def status(self) -> Status:
+    def measure_status(self) -> StreamStatus:
         """Measure the state of the stream now."""
         now = time.monotonic()
         with self._lock:
-            recent = list(self._ring)[-_MEASURED:]
+            recent = list(self._ring)[-_MEASURED_FRAMES:]
             count = self._count
-        quiet = now - recent[-1].time if recent else 0.0
+        idle = now - recent[-1].time if recent else 0.0
         rate = 0.0
-        if len(recent) > 1 and quiet <= STALLED:
+        if len(recent) > 1 and idle <= STALL_SECONDS:
             rate = (len(recent) - 1) / max(recent[-1].time - recent[0].time, 1e-6)
-        ways = [way for way in map(_way, recent) if way is not None]
+        delays = [delay for delay in map(_compute_delay, recent) if delay is not None]
         state = self._state
-        if state == "receiving" and quiet > STALLED:
+        if state == "receiving" and idle > STALL_SECONDS:
             state = "stalled"
-        way = statistics.median(ways) if ways else None
-        return Status(state=state, frames=count, rate=rate, quiet=quiet, way=way, rubbish=self.stream.rubbish,
-                      line=self._line(state, rate, quiet))
+        delay = statistics.median(delays) if delays else None
+        return StreamStatus(state=state, frames=count, rate=rate, idle=idle, delay=delay, invalid_count=self.stream.invalid_count,
+                      line=self._describe(state, rate, idle))
 
-    def _line(self, state: str, rate: float, quiet: float) -> str:
+    def _describe(self, state: str, rate: float, idle: float) -> str:
         """Describe the state in one line for the user."""
-        what = f"{_SPOKEN[self.protocol]} port {self.port}"
+        port_name = f"{_PROTOCOL_NAMES[self.protocol]} port {self.port}"
         if state == "receiving":
-            return f"{rate:.0f} frames per second on {what}"
+            return f"{rate:.0f} frames per second on {port_name}"
         if state == "stalled":
-            return f"The stream has stalled: no frame for {quiet:.0f} s on {what}; start the sender again"
+            return f"The stream has stalled: no frame for {idle:.0f} s on {port_name}; start the sender again"
         if state == "ended":
-            return f"The sender has closed the connection ({what}); waiting for it to connect again"
+            return f"The sender has closed the connection ({port_name}); waiting for it to connect again"
         if state == "failed":
-            return f"The stream has failed: {self._why}; stop it and start it again"
+            return f"The stream has failed: {self._reason}; stop it and start it again"
         if state == "stopped":
             return "Not listening"
-        if self.stream.rubbish:
-            return f"{self.stream.rubbish} invalid pieces on {what}: {self.stream.told}"
-        return f"Waiting for frames on {what} of this machine" if not self._why else f"{self._why} ({what})"
+        if self.stream.invalid_count:
+            return f"{self.stream.invalid_count} invalid pieces on {port_name}: {self.stream.last_error}"
+        return f"Waiting for frames on {port_name} of this machine" if not self._reason else f"{self._reason} ({port_name})"
 
-    def _run(self) -> None:
+    def _receive(self) -> None:
         """Receive until stopped; an error ends in the state "failed"."""
         try:
-            {"udp": self._datagrams, "tcp": self._connections, "call": self._calls}[self.protocol]()
+            {"udp": self._receive_datagrams, "tcp": self._accept_connections, "call": self._call_sender}[self.protocol]()
         except Exception as error:  # a thread that ends silently would look like a waiting stream
-            self._state, self._why = "failed", f"{type(error).__name__}: {error}"
+            self._state, self._reason = "failed", f"{type(error).__name__}: {error}"
         finally:
             if self._server is not None:
                 self._server.close()
 
-    def _datagrams(self) -> None:
+    def _receive_datagrams(self) -> None:
         """Receive UDP datagrams."""
         while not self._stop.is_set():
-            if _readable(self._server):
+            if _is_readable(self._server):
                 try:
                     data = self._server.recv(_CHUNK)
                 except OSError:  # Windows reports resets for datagrams that were never sent
                     continue
-                self._take(data, whole=True)
+                self._add_bytes(data, whole=True)
 
-    def _connections(self) -> None:
+    def _accept_connections(self) -> None:
         """Accept TCP connections, one at a time; a new one replaces the old one."""
         client = None
         try:
@@ -230,39 +230,39 @@ class Listener:
                 waiting = [self._server] if client is None else [self._server, client]
                 ready, _, _ = select.select(waiting, [], [], _TICK)
                 if self._server in ready:
-                    client = self._instead(client, self._server.accept()[0])
-                elif client in ready and not self._read(client):
-                    client = self._instead(client, None)
+                    client = self._replace_connection(client, self._server.accept()[0])
+                elif client in ready and not self._read_connection(client):
+                    client = self._replace_connection(client, None)
         finally:
-            self._instead(client, None)
+            self._replace_connection(client, None)
 
-    def _instead(self, old: socket.socket | None, new: socket.socket | None) -> socket.socket | None:
+    def _replace_connection(self, old: socket.socket | None, new: socket.socket | None) -> socket.socket | None:
         """Replace a connection; incomplete pieces are dropped."""
         if old is not None:
             old.close()
-            self.stream.lost()
+            self.stream.drop_partial()
             self._state = "ended" if self._count else "waiting"
         if new is not None:
             new.setblocking(False)
         return new
 
-    def _calls(self) -> None:
+    def _call_sender(self) -> None:
         """Connect to a waiting sender, again and again."""
         while not self._stop.is_set():
             try:
-                with socket.create_connection((LOOPBACK, self.port), timeout=_CALL_AGAIN) as client:
+                with socket.create_connection((LOOPBACK, self.port), timeout=_RECONNECT_SECONDS) as client:
                     client.setblocking(False)
-                    self._why = ""
+                    self._reason = ""
                     while not self._stop.is_set():
-                        if _readable(client) and not self._read(client):
+                        if _is_readable(client) and not self._read_connection(client):
                             break
-                self.stream.lost()
+                self.stream.drop_partial()
                 self._state = "ended" if self._count else "waiting"
             except OSError as error:
-                self._why = f"No sender answers: {error.strerror or error}"
-            self._stop.wait(_CALL_AGAIN)
+                self._reason = f"No sender answers: {error.strerror or error}"
+            self._stop.wait(_RECONNECT_SECONDS)
 
-    def _read(self, client: socket.socket) -> bool:
+    def _read_connection(self, client: socket.socket) -> bool:
         """Read the bytes of a connection; False if it has ended."""
         try:
             data = client.recv(_CHUNK)
@@ -271,30 +271,30 @@ class Listener:
         except OSError:
             return False
         if data:
-            self._take(data)
+            self._add_bytes(data)
         return bool(data)
 
-    def _take(self, data: bytes, whole: bool = False) -> None:
+    def _add_bytes(self, data: bytes, whole: bool = False) -> None:
         """Parse bytes and store their frames; a flood of bytes is slowed down."""
         now = time.monotonic()
-        if now - self._heard >= 1.0:
-            self._came, self._heard = 0, now
-        self._came += len(data)
-        if self._came > _MOST_A_SECOND:  # slow down a sender that floods the port
-            self._stop.wait(max(0.0, self._heard + 1.0 - now))
+        if now - self._second_start >= 1.0:
+            self._bytes_read, self._second_start = 0, now
+        self._bytes_read += len(data)
+        if self._bytes_read > _BYTES_PER_SECOND:  # slow down a sender that floods the port
+            self._stop.wait(max(0.0, self._second_start + 1.0 - now))
         for frame in self.stream.feed(data, whole):
             with self._lock:
                 self._count += 1
                 if self._ring and frame.rows is not self._ring[-1].rows:
                     self._ring.clear()  # another skeleton: frames of the old one do not fit
-                self._ring.append(Arrived(number=self._count, time=now, sent=_clock(frame.sent, now),
+                self._ring.append(StreamFrame(number=self._count, time=now, sent=_to_monotonic(frame.sent, now),
                                           values=frame.values, rows=frame.rows))
                 while now - self._ring[0].time > self.seconds:
                     self._ring.popleft()
             self._state = "receiving"
 
 
-def poses(frames: list[Arrived]) -> tuple[Skeleton, np.ndarray, np.ndarray]:
+def convert_poses(frames: list[StreamFrame]) -> tuple[Skeleton, np.ndarray, np.ndarray]:
     """Convert frames of one body to poses.
 
     Args:
@@ -305,21 +305,21 @@ def poses(frames: list[Arrived]) -> tuple[Skeleton, np.ndarray, np.ndarray]:
         rotations: (T, J, 4) local rotations.
     """
     rows = frames[-1].rows
-    return rows.skeleton, *rows.poses(np.array([frame.values for frame in frames]))
+    return rows.skeleton, *rows.compute_poses(np.array([frame.values for frame in frames]))
 
 
-def _way(frame: Arrived) -> float | None:
+def _compute_delay(frame: StreamFrame) -> float | None:
     """Compute the delay of a frame in s; None if it is unknown or the clocks do not agree."""
-    way = None if frame.sent is None else frame.time - frame.sent
-    return way if way is not None and -0.01 <= way <= 60.0 else None
+    delay = None if frame.sent is None else frame.time - frame.sent
+    return delay if delay is not None and -0.01 <= delay <= 60.0 else None
 
 
-def _clock(sent: float | None, now: float) -> float | None:
+def _to_monotonic(sent: float | None, now: float) -> float | None:
     """Convert seconds of the Unix clock to seconds of the monotonic clock."""
     return None if sent is None else sent - time.time() + now
 
 
-def _readable(one: socket.socket) -> bool:
+def _is_readable(one: socket.socket) -> bool:
     """Whether a socket has data, after waiting _TICK at most."""
     return bool(select.select([one], [], [], _TICK)[0])
 
@@ -327,5 +327,5 @@ def _readable(one: socket.socket) -> bool:
 @atexit.register
 def _stop_all() -> None:
     """Stop all listeners when the program exits."""
-    for listener in list(_alive):
+    for listener in list(_listeners):
         listener.stop()

@@ -11,14 +11,14 @@ import numpy as np
 
 from ...ball.contact import Tool
 from ...motion.motion import Motion
-from ..hits import HitMotion, analyse
-from .listener import Arrived, Listener, poses
+from ..hits import HitMotion, detect_hits
+from .listener import StreamFrame, Listener, convert_poses
 
 WINDOW = 4.0
 """Seconds of the stream that are analysed."""
 _RATE = 60.0  # Hz: most frames per second that are analysed
-_LEAST = 0.5  # s of frames without which nothing is analysed
-_SETTLED = 0.05  # s by which a hit motion has to be over
+_LEAST_SECONDS = 0.5  # s of frames without which nothing is analysed
+_SETTLE_SECONDS = 0.05  # s by which a hit motion has to be over
 
 
 class LiveHits:
@@ -38,9 +38,9 @@ class LiveHits:
         sided = part in ("foot", "hand", "tool")
         self.sides = ((side,) if side else ("left", "right")) if sided else ("",)
         self._after = float("-inf")
-        self._seen = 0
+        self._last_number = 0
 
-    def look(self) -> tuple[HitMotion, float] | None:
+    def find_new_hit(self) -> tuple[HitMotion, float] | None:
         """Find the strongest hit motion that has ended since the last call.
 
         Returns:
@@ -48,15 +48,15 @@ class LiveHits:
         Raises:
             InputError: if the streamed body lacks the part.
         """
-        frames = self.listener.since(0)
-        if not frames or frames[-1].number == self._seen:
+        frames = self.listener.frames_since(0)
+        if not frames or frames[-1].number == self._last_number:
             return None
-        self._seen = frames[-1].number
+        self._last_number = frames[-1].number
         frames = [frame for frame in frames if frame.time > frames[-1].time - WINDOW]
-        if frames[-1].time - frames[0].time < _LEAST:
+        if frames[-1].time - frames[0].time < _LEAST_SECONDS:
             return None
-        motion, times = even(frames, _RATE)
-        found = [hit for side in self.sides for hit in self._hits(motion, side)]
+        motion, times = space_evenly(frames, _RATE)
+        found = [hit for side in self.sides for hit in self._detect_complete_hits(motion, side)]
         new = [hit for hit in found if times[hit.first] > self._after]
         if not new:
             return None
@@ -64,14 +64,14 @@ class LiveHits:
         self._after = float(times[best.key])
         return best, float(times[best.key])
 
-    def _hits(self, motion: Motion, side: str) -> list[HitMotion]:
+    def _detect_complete_hits(self, motion: Motion, side: str) -> list[HitMotion]:
         """Find the complete hit motions: begun within the window and already over."""
-        settled = len(motion) - 1 - int(np.ceil(_SETTLED * motion.fps))
-        found = analyse(motion, self.part, side, self.threshold, tool=self.tool).motions
+        settled = len(motion) - 1 - int(np.ceil(_SETTLE_SECONDS * motion.fps))
+        found = detect_hits(motion, self.part, side, self.threshold, tool=self.tool).motions
         return [hit for hit in found if 0 < hit.first and hit.last < settled]
 
 
-def recorded(listener: Listener, seconds: float, rate: float | None = None) -> Motion | None:
+def build_recording(listener: Listener, seconds: float, rate: float | None = None) -> Motion | None:
     """Build a motion from the last seconds of a stream.
 
     Networks deliver frames in bursts, so the frames are spaced evenly from the first to the last.
@@ -83,12 +83,12 @@ def recorded(listener: Listener, seconds: float, rate: float | None = None) -> M
     Returns:
         The motion, or None if there are fewer than two frames.
     """
-    frames = listener.since(0)
+    frames = listener.frames_since(0)
     frames = [frame for frame in frames if frame.time > frames[-1].time - seconds]
-    return even(frames, rate)[0] if len(frames) > 1 and frames[-1].time > frames[0].time else None
+    return space_evenly(frames, rate)[0] if len(frames) > 1 and frames[-1].time > frames[0].time else None
 
 
-def even(frames: list[Arrived], rate: float | None = None) -> tuple[Motion, np.ndarray]:
+def space_evenly(frames: list[StreamFrame], rate: float | None = None) -> tuple[Motion, np.ndarray]:
     """Build a motion with evenly spaced frames.
 
     Args:
@@ -102,7 +102,7 @@ def even(frames: list[Arrived], rate: float | None = None) -> tuple[Motion, np.n
     step = 1 if rate is None else max(1, int(len(frames) / (seconds * rate)))
     # every `step`-th frame, counted from the last one so that it is always kept
     frames = frames[::-1][::step][::-1]
-    skeleton, root, rotations = poses(frames)
+    skeleton, root, rotations = convert_poses(frames)
     seconds = max(frames[-1].time - frames[0].time, 1e-3)
     fps = (len(frames) - 1) / seconds
     return Motion(skeleton, root, rotations, fps), frames[0].time + np.arange(len(frames)) / fps

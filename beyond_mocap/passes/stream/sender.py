@@ -11,11 +11,11 @@ from pathlib import Path
 
 from ...base.errors import InputError
 from ...files.bvh import bvh_text
-from .bvh_stream import hierarchy_of
+from .bvh_stream import read_hierarchy
 from .listener import LOOPBACK
 
 FORMS = ("bvh", "neuron")
-WAYS = ("udp", "tcp", "serve")
+CONNECTIONS = ("udp", "tcp", "serve")
 """Send datagrams; connect to a listener; or wait for a listener to connect, as Axis Neuron does."""
 _HEADER_EVERY = 1.0  # s between two hierarchies over UDP
 _TICK = 0.2  # s: longest wait between two checks for a stop
@@ -37,20 +37,20 @@ class Sender:
         InputError: for an unknown connection or form, a file that is no BVH file, or frames larger than a datagram.
     """
 
-    def __init__(self, path, port: int, way: str = "udp", form: str = "bvh", rate: float | None = None,
+    def __init__(self, path, port: int, connection: str = "udp", form: str = "bvh", rate: float | None = None,
                  loop: bool = False):
-        if way not in WAYS or form not in FORMS:
-            raise InputError("stream", f"{way}, {form}", f"one of {', '.join(WAYS)} and one of {', '.join(FORMS)}")
-        text = bvh_text.parse(path)
-        self.path, self.port, self.way, self.form, self.loop = Path(path), int(port), way, form, loop
+        if connection not in CONNECTIONS or form not in FORMS:
+            raise InputError("stream", f"{connection}, {form}", f"one of {', '.join(CONNECTIONS)} and one of {', '.join(FORMS)}")
+        text = bvh_text.read_bvh_text(path)
+        self.path, self.port, self.connection, self.form, self.loop = Path(path), int(port), connection, form, loop
         self.frame_time = text.frame_time if rate is None else 1.0 / rate
-        self.header = f"{hierarchy_of(path)}\nMOTION\nFrames: {len(text.values)}\nFrame Time: {self.frame_time:.6f}\n"
+        self.header = f"{read_hierarchy(path)}\nMOTION\nFrames: {len(text.values)}\nFrame Time: {self.frame_time:.6f}\n"
         lead, end = (_AVATAR, " ||") if form == "neuron" else ("", "\n")
         self.rows = [lead + " ".join(f"{value:.4f}" for value in row) + end for row in text.values]
-        if way == "udp" and max(len(self.header), len(self.rows[0])) > _LARGEST_DATAGRAM:
+        if connection == "udp" and max(len(self.header), len(self.rows[0])) > _LARGEST_DATAGRAM:
             raise InputError(path, "a frame or hierarchy larger than a datagram", "60 kB at most", "send it over TCP")
 
-    def run(self, stopped: Callable[[], bool], told: Callable[[int], None] = lambda frames: None) -> int:
+    def send_file(self, stopped: Callable[[], bool], report: Callable[[int], None] = lambda frames: None) -> int:
         """Send until the end of the file, or with `loop` until stopped.
 
         Args:
@@ -61,27 +61,27 @@ class Sender:
         Raises:
             InputError: if there is no listener.
         """
-        out = self._connected(stopped)
+        out = self._open_socket(stopped)
         if out is None:
             return 0
         with out:
-            return self._send(out, stopped, told)
+            return self._send_frames(out, stopped, report)
 
-    def _connected(self, stopped: Callable[[], bool]) -> socket.socket | None:
+    def _open_socket(self, stopped: Callable[[], bool]) -> socket.socket | None:
         """Open the socket; None if it was stopped before a listener connected."""
-        if self.way == "udp":
+        if self.connection == "udp":
             out = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
             out.connect((LOOPBACK, self.port))
             return out
-        if self.way == "serve":
-            return self._called(stopped)
+        if self.connection == "serve":
+            return self._wait_for_listener(stopped)
         try:
             return socket.create_connection((LOOPBACK, self.port), timeout=5.0)
         except OSError as error:
             found = f"no listener ({error.strerror or error})"
             raise InputError(f"port {self.port}", found, "a listener", "start the stream in Blender first") from None
 
-    def _called(self, stopped: Callable[[], bool]) -> socket.socket | None:
+    def _wait_for_listener(self, stopped: Callable[[], bool]) -> socket.socket | None:
         """Wait for the first connection; None if it was stopped before."""
         with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as server:
             if os.name != "nt":  # on Windows it would let two programs share a port
@@ -98,31 +98,31 @@ class Sender:
                     return client
         return None
 
-    def _send(self, out: socket.socket, stopped: Callable[[], bool], told) -> int:
+    def _send_frames(self, out: socket.socket, stopped: Callable[[], bool], report) -> int:
         """Send frames at their times."""
-        begun, frame, header_due = time.monotonic(), 0, 0.0
+        start, frame, header_due = time.monotonic(), 0, 0.0
         while not stopped() and (self.loop or frame < len(self.rows)):
-            due = begun + frame * self.frame_time
+            due = start + frame * self.frame_time
             early = due - time.monotonic()
             if early > 0.0:
                 time.sleep(min(_TICK, early))
                 continue
             if self.form == "bvh" and due >= header_due:
-                self._put(out, self.header)
-                header_due = due + _HEADER_EVERY if self.way == "udp" else float("inf")
+                self._send_text(out, self.header)
+                header_due = due + _HEADER_EVERY if self.connection == "udp" else float("inf")
             clock = f"# sent {time.time():.6f}\n" if self.form == "bvh" else ""
-            if not self._put(out, clock + self.rows[frame % len(self.rows)]):
+            if not self._send_text(out, clock + self.rows[frame % len(self.rows)]):
                 break
             frame += 1
-            told(frame)
+            report(frame)
         return frame
 
-    def _put(self, out: socket.socket, text: str) -> bool:
+    def _send_text(self, out: socket.socket, text: str) -> bool:
         """Send a text; True if it was sent, or if it is a datagram without a receiver."""
         try:
             out.sendall(text.encode())
             return True
         except (ConnectionRefusedError, BlockingIOError):
-            return self.way == "udp"
+            return self.connection == "udp"
         except OSError:
             return False

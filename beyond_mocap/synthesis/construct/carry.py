@@ -15,18 +15,18 @@ import numpy as np
 from ...annotation.striking import Surface
 from ...base.vectors import skew_matrix
 from ...motion import quaternion
-from ...motion.humanoid import Limb, identify
-from ...motion.limb import inner_angle, two_bone
-from ...motion.motion import pose_kinematics
+from ...motion.humanoid import Limb, identify_joints
+from ...motion.limb import compute_inner_angle, solve_two_bone
+from ...motion.motion import compute_pose
 from ...motion.skeleton import Skeleton
 
-MOST_BEND = {"head": 0.6, "chest": 0.35}  # rad, largest bend of the whole spine, by the part that is moved
-LEAST_ANGLE, MOST_ANGLE = np.radians(35.0), np.radians(170.0)
+MAX_BEND = {"head": 0.6, "chest": 0.35}  # rad, largest bend of the whole spine, by the part that is moved
+MIN_ANGLE, MAX_ANGLE = np.radians(35.0), np.radians(170.0)
 """Radians, smallest and largest inner angle of the knee or elbow of a moved limb, unless the recording has a smaller
 or larger one."""
 
-MOST_SWING = {"foot": np.radians(35.0), "hand": np.radians(60.0)}  # rad, largest turn of a limb about its upper joint
-SOFT = 0.003  # m below full length from which on a limb extends softly
+MAX_SWING = {"foot": np.radians(35.0), "hand": np.radians(60.0)}  # rad, largest turn of a limb about its upper joint
+SOFTENING = 0.003  # m below full length from which on a limb extends softly
 _DAMPING = 1e-3  # of the least squares step: keeps the bend small where bending hardly moves the part
 
 _SOLE, _ROUNDING = 0.02, 0.03  # m: lowest foot joint above the ground, and the range over which it nears that softly
@@ -51,7 +51,7 @@ class Body:
     world: np.ndarray
 
     @classmethod
-    def posed(cls, skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray) -> "Body":
+    def from_pose(cls, skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray) -> "Body":
         """Build a body and compute the world placement of its joints.
 
         Args:
@@ -61,9 +61,9 @@ class Body:
         Returns:
             The body with `places` and `world`.
         """
-        return cls(skeleton, root, rotations, *pose_kinematics(skeleton, root, rotations))
+        return cls(skeleton, root, rotations, *compute_pose(skeleton, root, rotations))
 
-    def line(self, surface: Surface, at) -> tuple[np.ndarray, np.ndarray]:
+    def surface_line(self, surface: Surface, at) -> tuple[np.ndarray, np.ndarray]:
         """Return both ends of a striking surface's line.
 
         Args:
@@ -72,15 +72,15 @@ class Body:
         Returns:
             Two arrays (..., 3) m, world.
         """
-        return surface.line(self.places[at], self.world[at])
+        return surface.compute_line(self.places[at], self.world[at])
 
 
-def leg(limb: Limb) -> tuple[int, int, int]:
+def leg_chain(limb: Limb) -> tuple[int, int, int]:
     """Return the joints of a leg: hip, knee, ankle."""
     return limb.upper_leg, limb.lower_leg, limb.foot
 
 
-def arm(limb: Limb) -> tuple[int, int, int]:
+def arm_chain(limb: Limb) -> tuple[int, int, int]:
     """Return the joints of an arm: shoulder, elbow, wrist."""
     return limb.upper_arm, limb.lower_arm, limb.hand
 
@@ -92,12 +92,12 @@ def limb_chain(skeleton: Skeleton, part: Surface) -> tuple[int, int, int]:
         skeleton: the skeleton.
         part: a striking surface on a limb.
     """
-    limb = getattr(identify(skeleton), part.side)
-    return leg(limb) if part.part == "foot" else arm(limb)
+    limb = getattr(identify_joints(skeleton), part.side)
+    return leg_chain(limb) if part.part == "foot" else arm_chain(limb)
 
 
 @dataclass(frozen=True, eq=False)
-class Resting:
+class LimbReference:
     """A limb solved for the place where its end already is, the reference from which shifts are measured.
 
     A nearly straight limb misses its own place a little, because it extends softly; the difference cancels out.
@@ -113,7 +113,7 @@ class Resting:
     world: dict[int, np.ndarray]
 
     @classmethod
-    def of(cls, body: Body, chain: tuple[int, int, int], soft: float = SOFT) -> "Resting":
+    def from_body(cls, body: Body, chain: tuple[int, int, int], soft: float = SOFTENING) -> "LimbReference":
         """Solve the limb of a body for its own place.
 
         Args:
@@ -122,8 +122,8 @@ class Resting:
             soft: m below full length from which on the limb extends softly.
         """
         end = body.places[:, chain[2]]
-        still = two_bone(body.skeleton, body.root, body.rotations, chain, end, soft=soft).rotations
-        return cls(chain, soft, _limb_world(body, still, chain))
+        still = solve_two_bone(body.skeleton, body.root, body.rotations, chain, end, soft=soft).rotations
+        return cls(chain, soft, _limb_world_rotations(body, still, chain))
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,7 +141,7 @@ class Swing:
     lowered: float = 0.0
 
 
-def swing_to(body: Body, chain: tuple[int, int, int], at: int, place: np.ndarray, most: float, lowered=0.0) -> Swing:
+def solve_swing(body: Body, chain: tuple[int, int, int], at: int, place: np.ndarray, max_turn: float, lowered=0.0) -> Swing:
     """Solve the swing that brings the end of a limb to a place, or as near as the limits let it.
 
     Args:
@@ -156,17 +156,17 @@ def swing_to(body: Body, chain: tuple[int, int, int], at: int, place: np.ndarray
     """
     top, middle, end = body.places[at, list(chain)]
     old, new = end - top, place - top + [0.0, 0.0, lowered]
-    turn = quaternion.to_rotation_vector(quaternion.between(old[None], new[None]))[0]
-    turn *= min(1.0, most / max(np.linalg.norm(turn), 1e-9))
+    turn = quaternion.to_rotation_vector(quaternion.rotation_between(old[None], new[None]))[0]
+    turn *= min(1.0, max_turn / max(np.linalg.norm(turn), 1e-9))
     bones = np.linalg.norm(middle - top), np.linalg.norm(end - middle)
-    own, wanted = (inner_angle(*bones, np.linalg.norm(line)) for line in (old, new))
-    limit = MOST_ANGLE if wanted > own else LEAST_ANGLE
-    left = limit - own
-    bend = 0.0 if left * (wanted - own) <= 0.0 else min((wanted - own) / left, 1.0) * np.sign(left)
+    own_angle, target_angle = (compute_inner_angle(*bones, np.linalg.norm(line)) for line in (old, new))
+    limit = MAX_ANGLE if target_angle > own_angle else MIN_ANGLE
+    left = limit - own_angle
+    bend = 0.0 if left * (target_angle - own_angle) <= 0.0 else min((target_angle - own_angle) / left, 1.0) * np.sign(left)
     return Swing(turn, bend, lowered)
 
 
-def swung(body: Body, chain: tuple[int, int, int], swing: Swing, share: np.ndarray) -> np.ndarray:
+def compute_swing_shift(body: Body, chain: tuple[int, int, int], swing: Swing, share: np.ndarray) -> np.ndarray:
     """Compute how far the end of a limb moves with a share of a swing at each frame.
 
     A limb that bends less than the limit at one frame bends less at all frames, so the knee keeps the speed of the
@@ -184,9 +184,9 @@ def swung(body: Body, chain: tuple[int, int, int], swing: Swing, share: np.ndarr
     line = end - top
     length = np.linalg.norm(line, axis=1)
     bones = np.linalg.norm(middle - top, axis=1), np.linalg.norm(end - middle, axis=1)
-    own = inner_angle(*bones, length)
+    own = compute_inner_angle(*bones, length)
     # the range left to the limit at every frame, and the same share of it everywhere
-    left = np.maximum(MOST_ANGLE - own, 0.0) if swing.bend > 0.0 else np.minimum(LEAST_ANGLE - own, 0.0)
+    left = np.maximum(MAX_ANGLE - own, 0.0) if swing.bend > 0.0 else np.minimum(MIN_ANGLE - own, 0.0)
     angle = own + share * abs(swing.bend) * left
     # law of cosines: distance from the upper joint to the end for this inner angle
     reach = np.sqrt(bones[0] ** 2 + bones[1] ** 2 - 2.0 * bones[0] * bones[1] * np.cos(angle))
@@ -195,8 +195,8 @@ def swung(body: Body, chain: tuple[int, int, int], swing: Swing, share: np.ndarr
     return np.where(share[:, None] > 0.0, moves, 0.0)
 
 
-def limb_carried(
-    body: Body, limb: Resting, shift: np.ndarray, root: np.ndarray | None = None, rotations: np.ndarray | None = None
+def move_limb(
+    body: Body, limb: LimbReference, shift: np.ndarray, root: np.ndarray | None = None, rotations: np.ndarray | None = None
 ) -> np.ndarray:
     """Rotate the joints of a limb so that its end lies at a shift from where `body` has it.
 
@@ -213,8 +213,8 @@ def limb_carried(
     """
     skeleton, chain = body.skeleton, limb.chain
     target = body.places[:, chain[2]] + shift
-    moved = two_bone(skeleton, body.root if root is None else root, body.rotations, chain, target, soft=limb.soft)
-    after = _limb_world(body, moved.rotations, chain)
+    moved = solve_two_bone(skeleton, body.root if root is None else root, body.rotations, chain, target, soft=limb.soft)
+    after = _limb_world_rotations(body, moved.rotations, chain)
     out = (body.rotations if rotations is None else rotations).copy()
     above = body.world[:, skeleton.parents[chain[0]]]
     for joint, turned in after.items():
@@ -222,12 +222,12 @@ def limb_carried(
         change = quaternion.multiply(turned, quaternion.inverse(limb.world[joint]))
         world = quaternion.multiply(change, body.world[:, joint])
         local = quaternion.multiply(quaternion.inverse(above), world)
-        out[:, joint] = quaternion.signed_like(local, body.rotations[:, joint])
+        out[:, joint] = quaternion.match_signs(local, body.rotations[:, joint])
         above = world
     return out
 
 
-def foot_kept(body: Body, limb: Limb, root: np.ndarray, rotations: np.ndarray) -> np.ndarray:
+def hold_foot(body: Body, limb: Limb, root: np.ndarray, rotations: np.ndarray) -> np.ndarray:
     """Hold a foot where `body` has it although the root has moved.
 
     Args:
@@ -238,10 +238,10 @@ def foot_kept(body: Body, limb: Limb, root: np.ndarray, rotations: np.ndarray) -
     Returns:
         (W, J, 4) local rotations.
     """
-    return limb_carried(body, Resting.of(body, leg(limb), soft=1e-3), np.zeros_like(body.root), root, rotations)
+    return move_limb(body, LimbReference.from_body(body, leg_chain(limb), soft=1e-3), np.zeros_like(body.root), root, rotations)
 
 
-def spine_bent(body: Body, surface: Surface, at: int, shift: np.ndarray, weight: np.ndarray) -> np.ndarray:
+def bend_spine(body: Body, surface: Surface, at: int, shift: np.ndarray, weight: np.ndarray) -> np.ndarray:
     """Bend the spine so that the middle of a surface moves by a shift at one frame.
 
     Every joint of the spine (and the neck, for the head) turns by the same rotation: one damped step of the inverse of
@@ -257,17 +257,17 @@ def spine_bent(body: Body, surface: Surface, at: int, shift: np.ndarray, weight:
         (W, J, 4) local rotations.
     """
     skeleton, joint = body.skeleton, surface.start[0]
-    hips = identify(skeleton).hips
-    bending = [j for j in joints_down(skeleton, hips, joint)[1:] if j != joint or surface.part == "head"]
+    hips = identify_joints(skeleton).hips
+    bending = [j for j in list_joint_chain(skeleton, hips, joint)[1:] if j != joint or surface.part == "head"]
     if not bending:
         return body.rotations.copy()
-    middle = np.mean(body.line(surface, at), axis=0)
+    middle = np.mean(body.surface_line(surface, at), axis=0)
     arms = middle - body.places[at, bending]
     # moves @ bend is the mean shift of the middle if each joint turned by `bend`
     moves = np.mean([skew_matrix(a).T for a in arms], axis=0)
     # damped least squares: (M'M + damping I) bend = M' shift
     bend = np.linalg.solve(moves.T @ moves + _DAMPING * np.eye(3), moves.T @ shift)
-    bend *= min(1.0, MOST_BEND[surface.part] / max(np.linalg.norm(bend), 1e-9))
+    bend *= min(1.0, MAX_BEND[surface.part] / max(np.linalg.norm(bend), 1e-9))
     carried = quaternion.rotate(quaternion.inverse(body.world[at, hips]), bend / len(bending))
     turn = quaternion.from_rotation_vector(weight[:, None] * quaternion.rotate(body.world[:, hips], carried))
     out = body.rotations.copy()
@@ -278,7 +278,7 @@ def spine_bent(body: Body, surface: Surface, at: int, shift: np.ndarray, weight:
     return out
 
 
-def above_ground(body: Body, foot: Surface, at, shift: np.ndarray) -> np.ndarray:
+def limit_to_ground(body: Body, foot: Surface, at, shift: np.ndarray) -> np.ndarray:
     """Limit the shift of a foot so that it does not go through the ground, except where it is below it already.
 
     Args:
@@ -289,17 +289,17 @@ def above_ground(body: Body, foot: Surface, at, shift: np.ndarray) -> np.ndarray
     Returns:
         (..., 3) m, world.
     """
-    tip = foot_tip(body.skeleton, getattr(identify(body.skeleton), foot.side), body.places[at], body.world[at])[1]
-    lowest = np.minimum(np.min(body.line(foot, at), axis=0)[..., 2], tip[..., 2])
+    tip = foot_tip_line(body.skeleton, getattr(identify_joints(body.skeleton), foot.side), body.places[at], body.world[at])[1]
+    lowest = np.minimum(np.min(body.surface_line(foot, at), axis=0)[..., 2], tip[..., 2])
     out = shift.copy()
-    least, wish = np.minimum(_SOLE - lowest, 0.0), shift[..., 2]
+    least, requested = np.minimum(_SOLE - lowest, 0.0), shift[..., 2]
     # smooth maximum of wish and least, rounded by up to _ROUNDING; not rounded where the foot does not move
     corner = _ROUNDING * np.minimum(1.0, np.linalg.norm(shift, axis=-1) / (2.0 * _ROUNDING))
-    out[..., 2] = 0.5 * (wish + least + np.hypot(wish - least, corner))
+    out[..., 2] = 0.5 * (requested + least + np.hypot(requested - least, corner))
     return out
 
 
-def foot_tip(skeleton: Skeleton, limb: Limb, places: np.ndarray, world: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def foot_tip_line(skeleton: Skeleton, limb: Limb, places: np.ndarray, world: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return both ends of what lies beyond the foremost joint of a foot; twice the joint where the skeleton has no end
     site.
 
@@ -316,7 +316,7 @@ def foot_tip(skeleton: Skeleton, limb: Limb, places: np.ndarray, world: np.ndarr
     return places[..., toe, :], places[..., toe, :] + quaternion.rotate(world[..., toe, :], offset)
 
 
-def joints_down(skeleton: Skeleton, high: int, low: int) -> list[int]:
+def list_joint_chain(skeleton: Skeleton, high: int, low: int) -> list[int]:
     """List the joints from `high` down to `low`, both included."""
     chain = [low]
     while chain[-1] != high:
@@ -324,9 +324,9 @@ def joints_down(skeleton: Skeleton, high: int, low: int) -> list[int]:
     return chain[::-1]
 
 
-def _limb_world(body: Body, rotations: np.ndarray, chain: tuple[int, int, int]) -> dict[int, np.ndarray]:
+def _limb_world_rotations(body: Body, rotations: np.ndarray, chain: tuple[int, int, int]) -> dict[int, np.ndarray]:
     """Compute world rotations (W, 4) of a limb's joints for other local ones; above the limb all is as in `body`."""
     world, above = {}, body.world[:, body.skeleton.parents[chain[0]]]
-    for joint in joints_down(body.skeleton, chain[0], chain[2]):
+    for joint in list_joint_chain(body.skeleton, chain[0], chain[2]):
         above = world[joint] = quaternion.multiply(above, rotations[:, joint])
     return world

@@ -17,35 +17,35 @@ from functools import cached_property
 
 import numpy as np
 
-from ...annotation import spoken
-from ...annotation.ball_contact import striking_part
-from ...annotation.gaits import wanted_offset
+from ...annotation import sort_labels
+from ...annotation.ball_contact import find_striking_part
+from ...annotation.gaits import compute_heading_offset
 from ...library.library import Library
 from ...motion import quaternion
-from ...motion.foot_plant import Planted, plant
+from ...motion.foot_plant import PlantResult, plant_feet
 from ...motion.track import SampledTrack
-from ..own_size import real_ball
+from ..own_size import scale_ball
 from ..plan import ResolvedPlan
 from ..search.edit_list import EditList
-from ..search.footage import Footage, Shown, overlap
-from ..search.wanted import Wanted, needed
+from ..search.footage import SourceMotion, SourceFrames, fetch_overlap
+from ..search.wanted import SearchRequest, compute_needed_frames
 from ..take import KeyResult
 from .hand_over import OldMotion
 from .on_track import (
     absorb_foot_slide,
-    facing,
+    fit_heading,
     lean_into_curves,
-    missing_lean,
-    pulled_to_track,
-    root_with_sway,
-    turn_to_ball,
-    turning_firmness,
+    compute_missing_lean,
+    pull_to_track,
+    add_sway,
+    compute_turn_to_ball,
+    compute_turning_firmness,
 )
-from .steps import Steps, steps
-from .strike import Touch, strike
-from .transitions import fade_share, faded_rotations, faded_values
+from .steps import Steps, add_steps
+from .strike import Touch, strike_ball
+from .transitions import compute_blend_share, blend_rotations, blend_values
 
-OTHERWISE = 0.4  # s on either side of a key moment without a clip, in which the body reaches for the ball and returns
+REACH_SECONDS = 0.4  # s on either side of a key moment without a clip, in which the body reaches for the ball and returns
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -68,43 +68,43 @@ class Construction:
     library: Library
     plan: ResolvedPlan
     track: SampledTrack
-    source: Footage
+    source: SourceMotion
     touches: Sequence[Touch] = ()
     heading: np.ndarray | None = None
     old: OldMotion | None = None
-    faces_ball: bool = True
-    planned: bool = False
+    turns_to_ball: bool = True
+    is_planned: bool = False
 
     @cached_property
-    def smooth(self) -> Footage:
+    def smooth_source(self) -> SourceMotion:
         """The source frames without jumps: each piece is blended into the next over frames that both recordings show.
 
         The blend lasts half as long as Faustino's window.
         """
         source = self.source
-        over = overlap(self.library, source, 0.25 * self.plan.asked.seam_window * self.plan.fps)
-        weight = fade_share(over.through, over.after)
+        over = fetch_overlap(self.library, source, 0.25 * self.plan.requested.seam_window * self.plan.fps)
+        weight = compute_blend_share(over.through, over.after)
         return replace(
             source,
-            pose=faded_rotations(source.pose, over.at, over.pose, over.through, over.after),
-            height=faded_values(source.height, over.at, over.height, weight),
-            sway=faded_values(source.sway, over.at, over.sway, weight),
+            pose=blend_rotations(source.pose, over.at, over.pose, over.through, over.after),
+            height=blend_values(source.height, over.at, over.height, weight),
+            sway=blend_values(source.sway, over.at, over.sway, weight),
         )
 
-    def lay_out(self) -> tuple[Planted, Steps]:
+    def construct_body(self) -> tuple[PlantResult, Steps]:
         """Construct the body on its track with planted feet.
 
         Returns:
             The planted body (T frames) and the extra steps it takes.
         """
-        heading = self.heading if self.planned else self._solve_heading()
-        ground = root_with_sway(self.track.positions, self.smooth.sway, heading)
-        pose = apply_heading(self.smooth.pose, heading)
-        if not self.planned:
-            ground, pose = self._pull_to_track(ground), self._lean(pose)
-        return self._plant_feet(np.column_stack([ground, self.smooth.height]), pose)
+        heading = self.heading if self.is_planned else self._solve_heading()
+        ground = add_sway(self.track.positions, self.smooth_source.sway, heading)
+        pose = apply_heading(self.smooth_source.pose, heading)
+        if not self.is_planned:
+            ground, pose = self._pull_to_track(ground), self._lean_into_curves(pose)
+        return self._plant_feet(np.column_stack([ground, self.smooth_source.height]), pose)
 
-    def meet_ball(self, planted: Planted, taken: Steps) -> tuple[Planted, np.ndarray]:
+    def solve_ball_contact(self, planted: PlantResult, steps_taken: Steps) -> tuple[PlantResult, np.ndarray]:
         """Bring the striking part to the ball at every touch.
 
         Args:
@@ -115,65 +115,65 @@ class Construction:
         """
         track, size = self.track, self.plan.size
         samples = self.plan.track
-        height = np.interp(track.times, samples.times, samples.ball_height_known.astype(float)) > 0.5
+        is_height_known = np.interp(track.times, samples.times, samples.ball_height_known.astype(float)) > 0.5
         skeleton, root, ball = self.library.skeleton, planted.root, track.ball
         if size != 1.0:  # solved in the player's size: the ball is the same for tall and short players
-            skeleton, root, ball = skeleton.scaled(size), root * size, real_ball(ball, size)
-        struck = strike(skeleton, root, planted.rotations, contacts=taken.standing.any(axis=2), ball=ball,
-                        touches=self.touches, fps=self.plan.fps, measured=track.ball_measured, height_known=height)
-        root, ball = (struck.root, struck.ball) if size == 1.0 else (struck.root / size, struck.ball / size)
-        return replace(planted, root=root, rotations=struck.rotations), ball
+            skeleton, root, ball = skeleton.scale(size), root * size, scale_ball(ball, size)
+        contact = strike_ball(skeleton, root, planted.rotations, contacts=steps_taken.heel_toe_contacts.any(axis=2), ball=ball,
+                        touches=self.touches, fps=self.plan.fps, measured=track.ball_measured, height_known=is_height_known)
+        root, ball = (contact.root, contact.ball) if size == 1.0 else (contact.root / size, contact.ball / size)
+        return replace(planted, root=root, rotations=contact.rotations), ball
 
     def _solve_heading(self) -> np.ndarray:
         """Solve the heading (T,) rad from given values, track and source, turned to the ball at touches."""
-        given = self.heading if self.old is None else self.old.heading_of(self.smooth.pose)
-        heading = solve_heading(self.track, self.smooth, given)
+        given = self.heading if self.old is None else self.old.compute_heading(self.smooth_source.pose)
+        heading = solve_heading(self.track, self.smooth_source, given)
         if self.old is not None:
-            track = self.old.turned_alike(self.track, heading)
-            heading = heading if track is None else solve_heading(track, self.smooth, given)
-        return heading + (1.0 - self._share) * self._turn_to_ball(heading) if self.faces_ball else heading
+            track = self.old.match_turning(self.track, heading)
+            heading = heading if track is None else solve_heading(track, self.smooth_source, given)
+        return heading + (1.0 - self._old_share) * self._turn_to_ball(heading) if self.turns_to_ball else heading
 
     @property
-    def _share(self) -> np.ndarray | float:
+    def _old_share(self) -> np.ndarray | float:
         """(T,) share of the old motion in the result, or 0.0 without one."""
         return 0.0 if self.old is None else self.old.share
 
     def _turn_to_ball(self, heading: np.ndarray) -> np.ndarray:
         """Compute the extra turn (T,) rad to the ball for a heading (T,) rad."""
-        ground = root_with_sway(self.track.positions, self.smooth.sway, heading)
-        root, pose = np.column_stack([ground, self.smooth.height]), apply_heading(self.smooth.pose, heading)
-        return turn_to_ball(self.library.skeleton, root, pose, ball=self.track.ball, touches=self.touches,
+        ground = add_sway(self.track.positions, self.smooth_source.sway, heading)
+        root, pose = np.column_stack([ground, self.smooth_source.height]), apply_heading(self.smooth_source.pose, heading)
+        return compute_turn_to_ball(self.library.skeleton, root, pose, ball=self.track.ball, touches=self.touches,
                             fps=self.track.fps)
 
     def _pull_to_track(self, ground: np.ndarray) -> np.ndarray:
         """Remove the slow drift of the root, ground (T, 2) m, from the track."""
-        window = self.plan.asked.root_window
+        window = self.plan.requested.root_window
         if self.old is not None:
-            return self.old.pulled(ground, self.track, window)
-        return pulled_to_track(ground, self.track.raw, self.plan.fps, window)
+            return self.old.pull_to_track(ground, self.track, window)
+        return pull_to_track(ground, self.track.raw, self.plan.fps, window)
 
-    def _lean(self, pose: np.ndarray) -> np.ndarray:
+    def _lean_into_curves(self, pose: np.ndarray) -> np.ndarray:
         """Lean the body (T, J, 4) into the track's curves by what its source lacks."""
-        track, smooth = self.track, self.smooth
-        lean = missing_lean(track.speed, track.direction, smooth.velocity, turn=smooth.turn, seams=smooth.seams,
+        track, smooth = self.track, self.smooth_source
+        lean = compute_missing_lean(track.speed, track.direction, smooth.velocity, turn=smooth.turn, transitions=smooth.transitions,
                             fps=self.plan.fps)
         return lean_into_curves(self.library.skeleton, pose, track.direction, lean)
 
-    def _plant_feet(self, root: np.ndarray, pose: np.ndarray) -> tuple[Planted, Steps]:
+    def _plant_feet(self, root: np.ndarray, pose: np.ndarray) -> tuple[PlantResult, Steps]:
         """Hold the feet or let them step; add no steps where the ball may be met, nor where the old motion stays."""
-        skeleton, fps, standing = self.library.skeleton, self.plan.fps, self.smooth.standing
-        share, at = np.broadcast_to(self._share, len(root)), np.arange(len(root))
+        skeleton, fps, heel_toe_contacts = self.library.skeleton, self.plan.fps, self.smooth_source.heel_toe_contacts
+        share, at = np.broadcast_to(self._old_share, len(root)), np.arange(len(root))
         free = share == 0.0
         # no steps within the entry and exit of a touch
         for touch in self.touches:
             free &= (at < touch.frame - touch.entry) | (at > touch.frame + touch.leave)
-        kept = None if self.old is None else self.old.kept_steps()
-        taken = steps(skeleton, root, pose, standing=standing, fps=fps, given=kept, free=free)
-        root = root + np.column_stack([(1.0 - share)[:, None] * taken.sway, np.zeros(len(root))])
-        root, pose = self._absorb_foot_slide(root, taken, 1.0 - share)
-        return plant(skeleton, root, pose, taken.standing, fps, moves=taken.moves), taken
+        old_steps = None if self.old is None else self.old.select_old_steps()
+        steps_taken = add_steps(skeleton, root, pose, heel_toe_contacts=heel_toe_contacts, fps=fps, steps_taken=old_steps, free=free)
+        root = root + np.column_stack([(1.0 - share)[:, None] * steps_taken.sway, np.zeros(len(root))])
+        root, pose = self._absorb_foot_slide(root, steps_taken, 1.0 - share)
+        return plant_feet(skeleton, root, pose, steps_taken.heel_toe_contacts, fps, foot_moves=steps_taken.moves), steps_taken
 
-    def _absorb_foot_slide(self, root: np.ndarray, taken: Steps, free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _absorb_foot_slide(self, root: np.ndarray, steps_taken: Steps, free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Move and turn the body a little where its feet would slide.
 
         Args:
@@ -183,10 +183,10 @@ class Construction:
         Returns:
             Root (T, 3) m and local rotations (T, J, 4).
         """
-        move, turn = absorb_foot_slide(self.library.skeleton, root, taken.rotations, taken.standing, self.plan.fps)
-        pulled = pulled_to_track(root[:, :2] + move, self.track.raw, self.plan.fps, self.plan.asked.root_window)
+        move, turn = absorb_foot_slide(self.library.skeleton, root, steps_taken.rotations, steps_taken.heel_toe_contacts, self.plan.fps)
+        pulled = pull_to_track(root[:, :2] + move, self.track.raw, self.plan.fps, self.plan.requested.root_window)
         ground = root[:, :2] + free[:, None] * (pulled - root[:, :2])
-        return np.concatenate([ground, root[:, 2:]], axis=1), apply_heading(taken.rotations, free * turn)
+        return np.concatenate([ground, root[:, 2:]], axis=1), apply_heading(steps_taken.rotations, free * turn)
 
 
 def apply_heading(pose: np.ndarray, heading: np.ndarray) -> np.ndarray:
@@ -199,11 +199,11 @@ def apply_heading(pose: np.ndarray, heading: np.ndarray) -> np.ndarray:
         (T, J, 4) local rotations, the root's in the world frame.
     """
     out = pose.copy()
-    out[:, 0] = quaternion.multiply(quaternion.about_up(heading), pose[:, 0])
+    out[:, 0] = quaternion.multiply(quaternion.from_up_angle(heading), pose[:, 0])
     return out
 
 
-def solve_heading(track: SampledTrack, source: Footage, given: np.ndarray | None = None) -> np.ndarray:
+def solve_heading(track: SampledTrack, source: SourceMotion, given: np.ndarray | None = None) -> np.ndarray:
     """Solve the heading: the compromise between the track's direction and the source's own turning.
 
     Args:
@@ -213,9 +213,9 @@ def solve_heading(track: SampledTrack, source: Footage, given: np.ndarray | None
     Returns:
         (T,) rad, unwrapped.
     """
-    firm = turning_firmness(source.standing, source.height, track.fps)
-    aim = track.direction + wanted_offset(track)
-    return facing(track.direction, track.speed, source.velocity, source.turn, given, firm=firm, aim=aim)
+    firm = compute_turning_firmness(source.heel_toe_contacts, source.height, track.fps)
+    aim = track.direction + compute_heading_offset(track)
+    return fit_heading(track.direction, track.speed, source.velocity, source.turn, given, firm=firm, aim=aim)
 
 
 def find_touches(library: Library, fps: float, edit: EditList, keys: tuple[KeyResult, ...]) -> tuple[Touch, ...]:
@@ -234,19 +234,19 @@ def find_touches(library: Library, fps: float, edit: EditList, keys: tuple[KeyRe
     """
     found, served = [], set()
     for placed in edit.keys:
-        result = keys[placed.wanted]
-        entry, leave = np.multiply(needed(library, placed.key), fps / library.fps)
+        result = keys[placed.number]
+        entry, leave = np.multiply(compute_needed_frames(library, placed.key), fps / library.fps)
         found.append(Touch(result.frame, result.words, float(entry), float(leave)))
-        served.add(placed.wanted)
-    alone = OTHERWISE * fps
+        served.add(placed.number)
+    reach = REACH_SECONDS * fps
     for number, result in enumerate(keys):
-        lacks = result.used_instead is not None and number not in served and not striking_part(result.words)
-        if lacks and all(abs(result.frame - touch.frame) > alone for touch in found):
-            found.append(Touch(result.frame, result.asked.words, alone, alone))
+        is_missing = result.used_instead is not None and number not in served and not find_striking_part(result.words)
+        if is_missing and all(abs(result.frame - touch.frame) > reach for touch in found):
+            found.append(Touch(result.frame, result.requested.words, reach, reach))
     return tuple(found)
 
 
-def key_results(library: Library, fps: float, order: Wanted, edit: EditList, played: Shown) -> tuple[KeyResult, ...]:
+def build_key_results(library: Library, fps: float, request: SearchRequest, edit: EditList, shown_frames: SourceFrames) -> tuple[KeyResult, ...]:
     """Report the result of every key moment of a request.
 
     Args:
@@ -256,24 +256,24 @@ def key_results(library: Library, fps: float, order: Wanted, edit: EditList, pla
         edit: the edit list, at the library's rate.
         shown_frames: the source frames shown, at `fps`.
     """
-    return tuple(_key_result(library, fps, order, edit=edit, played=played, number=number)
-                 for number in range(len(order.keys)))
+    return tuple(_build_key_result(library, fps, request, edit=edit, shown_frames=shown_frames, number=number)
+                 for number in range(len(request.keys)))
 
 
-def _key_result(library: Library, fps: float, order: Wanted, edit: EditList, played: Shown, number: int) -> KeyResult:
+def _build_key_result(library: Library, fps: float, request: SearchRequest, edit: EditList, shown_frames: SourceFrames, number: int) -> KeyResult:
     """Report one key moment: where its clip's key frame is played, or what is shown in its place."""
-    key = order.keys[number]
+    key = request.keys[number]
     at = key.frame * fps / library.fps
-    near = int(np.clip(round(at), 0, len(played.clip) - 1))
-    clip, shown = int(played.clip[near]), float(played.clip_frame[near])
-    placed = next((p for p in edit.keys if p.wanted == number and p.key.clip == clip), None)
-    words = spoken(placed.key.words if placed else library.clips[clip].words_at(shown))
+    near = int(np.clip(round(at), 0, len(shown_frames.clip) - 1))
+    clip, clip_frame = int(shown_frames.clip[near]), float(shown_frames.clip_frame[near])
+    placed = next((p for p in edit.keys if p.number == number and p.key.clip == clip), None)
+    words = sort_labels(placed.key.labels if placed else library.clips[clip].labels_at(clip_frame))
     if placed is not None:
-        inside = np.flatnonzero(played.piece == played.piece[near])
-        if len(inside) > 1 and np.all(np.diff(played.clip_frame[inside]) > 0):
-            at = float(np.interp(placed.key.frame, played.clip_frame[inside], inside))
-        shown = placed.key.frame
+        inside = np.flatnonzero(shown_frames.piece == shown_frames.piece[near])
+        if len(inside) > 1 and np.all(np.diff(shown_frames.clip_frame[inside]) > 0):
+            at = float(np.interp(placed.key.frame, shown_frames.clip_frame[inside], inside))
+        clip_frame = placed.key.frame
     source = library.clips[clip]
     instead = words if key.used_instead and not key.choices else key.used_instead
-    return KeyResult(asked=key.asked, frame=at, clip=source.path, clip_frame=shown, mirrored=source.mirrored,
+    return KeyResult(requested=key.requested, frame=at, clip=source.path, clip_frame=clip_frame, mirrored=source.mirrored,
                      words=words, used_instead=instead)

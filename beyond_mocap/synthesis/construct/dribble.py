@@ -14,15 +14,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...motion.skeleton import Skeleton
-from .dribble_search import SOONEST, Between, Legs, Push, Search
-from .meeting import lead
+from .dribble_search import SOONEST, DribblePart, Legs, Push, DribbleSearch
+from .meeting import move_ball_at
 
 KEY_SECONDS = 0.5  # s from either end of a stretch within which a key moment begins or ends the dribble
 _BEYOND = 0.3  # s beyond an open end of a part in which the ball is still kept out of the body
 
 
 @dataclass(frozen=True, eq=False)
-class Dribbled:
+class DribbleResult:
     """A dribbled ball.
 
     Attributes:
@@ -34,11 +34,11 @@ class Dribbled:
     pushes: tuple[Push, ...]
 
 
-def dribble(
-    skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray, standing: np.ndarray, ball: np.ndarray,
+def plan_dribbles(
+    skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray, foot_contacts: np.ndarray, ball: np.ndarray,
     stretches: Sequence[tuple[float, float]], held: Sequence[tuple[int, int]], fps: float, *,
-    measured: np.ndarray | None = None, turns: Sequence[float] = (),
-) -> Dribbled:
+    measured: np.ndarray | None = None, course_changes: Sequence[float] = (),
+) -> DribbleResult:
     """Replace the ball's trajectory in every dribble by one that is touched step by step.
 
     Frames before and after the stretches change only where the ball has to come to its first touch or leave its last.
@@ -60,26 +60,26 @@ def dribble(
     path, pushes = np.array(ball, dtype=float), []
     measured = np.isfinite(path).all(axis=1) if measured is None else np.asarray(measured, bool)
     for low, high in stretches:
-        for part in _parts(low, high, held, len(path), fps):
+        for part in _split_at_touches(low, high, held, len(path), fps):
             if not np.isfinite(path[part.low : part.high + 1]).all():
                 continue
-            search = Search(skeleton, root, rotations, standing=standing, path=path, measured=measured, part=part,
+            search = DribbleSearch(skeleton, root, rotations, foot_contacts=foot_contacts, path=path, measured=measured, part=part,
                             fps=fps)
             found = search.run()
             if found is None:
                 continue
-            before, after, made = found
+            before, after, part_path = found
             # found: frames counted from the part's first one
-            path[part.low + before : part.low + after + 1] = made
+            path[part.low + before : part.low + after + 1] = part_path
             pushes += [Push(p.first + part.low, p.last + part.low, p.side) for p in search.pushes]
             touched = [*held, *((push.first, push.last) for push in pushes)]
-            others = [*turns, *(edge for pair in touched for edge in pair)]
-            path = _joined(path, ball, part, first=before, last=after, others=others, fps=fps)
-            path = _kept_out(skeleton, root, rotations, path=path, part=part, held=touched, fps=fps)
-    return Dribbled(path, tuple(sorted(pushes, key=lambda push: push.first)))
+            others = [*course_changes, *(edge for pair in touched for edge in pair)]
+            path = _lead_open_ends(path, ball, part, first=before, last=after, others=others, fps=fps)
+            path = _keep_out_of_body(skeleton, root, rotations, path=path, part=part, held=touched, fps=fps)
+    return DribbleResult(path, tuple(sorted(pushes, key=lambda push: push.first)))
 
 
-def _parts(low: float, high: float, held, count: int, fps: float) -> list[Between]:
+def _split_at_touches(low: float, high: float, held, count: int, fps: float) -> list[DribblePart]:
     """Split a stretch where the ball is met; key moments close to its ends become its ends."""
     reach = KEY_SECONDS * fps
     inside = sorted(pair for pair in held if low - reach <= pair[1] and pair[0] <= high + reach)
@@ -91,46 +91,46 @@ def _parts(low: float, high: float, held, count: int, fps: float) -> list[Betwee
         first = open_low if before is None else before[1]
         last = open_high if after is None else after[0]
         if last - first >= SOONEST * fps:
-            out.append(Between(first, last, before is not None, after is not None))
+            out.append(DribblePart(first, last, before is not None, after is not None))
     return out
 
 
-def _joined(path, feed, part: Between, first: int, last: int, others: Sequence[float], fps: float) -> np.ndarray:
+def _lead_open_ends(path, feed, part: DribblePart, first: int, last: int, others: Sequence[float], fps: float) -> np.ndarray:
     """Lead the trajectory to the first touch and away from the last where a part has open ends.
 
     first, last: frames counted from the part's beginning.
     """
     first, last = part.low + first, part.low + last
-    if not part.starts:
+    if not part.is_met_at_start:
         anchor = max((frame for frame in others if frame < first), default=first - int(fps))
-        path = _led_to(path, first, int(anchor), feed)
-    if not part.ends:
+        path = _lead_to_touch(path, first, int(anchor), feed)
+    if not part.is_met_at_end:
         anchor = min((frame for frame in others if frame > last), default=last + int(fps))
-        path = _led_to(path, last, int(anchor), feed)
+        path = _lead_to_touch(path, last, int(anchor), feed)
     return path
 
 
-def _kept_out(
-    skeleton: Skeleton, root, rotations, path: np.ndarray, part: Between, held: Sequence[tuple[int, int]], fps: float
+def _keep_out_of_body(
+    skeleton: Skeleton, root, rotations, path: np.ndarray, part: DribblePart, held: Sequence[tuple[int, int]], fps: float
 ) -> np.ndarray:
     """Lead the trajectory around the body; where the ball is `held` it stays.
 
     At open ends this reaches a little further than the part, so that the ball does not jump there.
     """
     beyond = int(_BEYOND * fps)
-    low = part.low if part.starts else max(part.low - beyond, 0)
-    high = part.high if part.ends else min(part.high + beyond, len(path) - 1)
+    low = part.low if part.is_met_at_start else max(part.low - beyond, 0)
+    high = part.high if part.is_met_at_end else min(part.high + beyond, len(path) - 1)
     span, free = slice(low, high + 1), np.ones(len(path), bool)
     free[[low, high]] = False
     for first, last in held:
         free[max(first, 0) : last + 1] = False
     out = path.copy()
-    out[span] = Legs(skeleton, root[span], rotations[span], fps).kept_out(path[span], free[span])
+    out[span] = Legs(skeleton, root[span], rotations[span], fps).keep_out(path[span], free[span])
     return out
 
 
-def _led_to(path: np.ndarray, frame: int, anchor: int, feed: np.ndarray) -> np.ndarray:
+def _lead_to_touch(path: np.ndarray, frame: int, anchor: int, feed: np.ndarray) -> np.ndarray:
     """Lead the trajectory from or to a touch at `frame`; the touch itself does not move."""
-    out = lead(path, frame, anchor, path[frame] - feed[frame])
+    out = move_ball_at(path, frame, anchor, path[frame] - feed[frame])
     out[frame] = path[frame]
     return out

@@ -9,15 +9,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...annotation.striking import Surface, nearest_on, part_surfaces
-from ...ball.roll import rolls, speeds_of
-from ...base.time_series import runs
-from ...motion.humanoid import heading_from_positions, identify
-from ...motion.motion import pose_kinematics
+from ...annotation.striking import Surface, find_nearest_point, build_part_surfaces
+from ...ball.roll import simulate_rolls, compute_roll_speeds
+from ...base.time_series import find_runs
+from ...motion.humanoid import compute_heading_from_positions, identify_joints
+from ...motion.motion import compute_pose
 from ...motion.skeleton import Skeleton
-from ...motion.track import BALL_RADIUS, zero_phase_hann
-from .carry import foot_tip
-from .meeting import touching_places
+from ...motion.track import BALL_RADIUS, smooth_zero_phase_hann
+from .carry import foot_tip_line
+from .meeting import find_touching_places
 
 SOONEST, _LATEST = 0.2, 1.3  # s, shortest and longest roll from one touch to the next
 _ANGLES = np.radians([0.0, 35.0, -35.0, 65.0, -65.0])  # sides of the ball that are tried, from straight ahead
@@ -37,7 +37,7 @@ _BESIDE, _AHEAD_COST = 0.3, 4.0  # per metre less than this ahead of the pelvis,
 _TOUCH_COST, _LONG, _LONG_COST = 0.04, 0.7, 4.0  # per touch, and per second beyond this to the next touch
 _ACROSS_COST, _BACK_COST, _SPEED_COST, _BRAKE_COST = 0.05, 0.3, 0.05, 0.6  # per m/s that such a foot cannot give
 _ANGLE_COST = 0.3  # per radian off straight ahead
-_STOOD_COST = 0.3  # per touch by a planted foot
+_PLANTED_COST = 0.3  # per touch by a planted foot
 _HEIGHT_COST = 20.0  # per metre of ball above the foot
 _WAIT_COST = 2.5  # per second at an open end without a touch
 _MOST_EXTRA = 2.0  # m/s by which a ball may leave faster than its foot, free of cost
@@ -66,7 +66,7 @@ class Push:
 
 
 @dataclass(frozen=True)
-class Between:
+class DribblePart:
     """A part of a dribble without a key moment inside.
 
     Attributes:
@@ -78,8 +78,8 @@ class Between:
 
     low: int
     high: int
-    starts: bool
-    ends: bool
+    is_met_at_start: bool
+    is_met_at_end: bool
 
 
 class Legs:
@@ -106,22 +106,22 @@ class Legs:
             rotations: (W, J, 4) local.
             fps: frames per second.
         """
-        places, world = pose_kinematics(skeleton, root, rotations)
-        body, self.fps = identify(skeleton), fps
+        places, world = compute_pose(skeleton, root, rotations)
+        body, self.fps = identify_joints(skeleton), fps
         self.pelvis = places[:, body.hips, :2]
-        self.feet: tuple[Surface, ...] = part_surfaces(skeleton, "foot")
-        self.lines = [foot.line(places, world) for foot in self.feet]
+        self.feet: tuple[Surface, ...] = build_part_surfaces(skeleton, "foot")
+        self.lines = [foot.compute_line(places, world) for foot in self.feet]
         solid = [(line, foot.radius) for line, foot in zip(self.lines, self.feet)]
         for limb in (body.left, body.right):
             solid.append(((places[:, limb.lower_leg], places[:, limb.foot]), SHIN_RADIUS))
-            solid.append((foot_tip(skeleton, limb, places, world), TIP_RADIUS))
+            solid.append((foot_tip_line(skeleton, limb, places, world), TIP_RADIUS))
         self.start = np.stack([line[0] for line, _ in solid], axis=1)  # (W, 6, 3)
         self.along = np.stack([line[1] for line, _ in solid], axis=1) - self.start
         self.squared = np.maximum(np.sum(self.along**2, axis=-1), 1e-12)
         self.least = np.array([radius for _, radius in solid]) + BALL_RADIUS
         self.velocity = _smooth_velocity(self.pelvis, fps)
         self.speed = np.linalg.norm(self.velocity, axis=1)
-        angle = heading_from_positions(skeleton, places)
+        angle = compute_heading_from_positions(skeleton, places)
         facing = np.column_stack([np.cos(angle), np.sin(angle)])
         going = self.velocity / np.maximum(self.speed, 1e-9)[:, None]
         self.ahead = np.where((self.speed > SLOW)[:, None], going, facing)
@@ -131,7 +131,7 @@ class Legs:
         middle = np.mean(self.lines[side], axis=0)[:, :2]
         return np.gradient(middle, axis=0) * self.fps
 
-    def gaps(self, balls: np.ndarray, frames: np.ndarray) -> np.ndarray:
+    def measure_gaps(self, balls: np.ndarray, frames: np.ndarray) -> np.ndarray:
         """Measure the gaps between balls and the nearest part of the body.
 
         Args:
@@ -140,9 +140,9 @@ class Legs:
         Returns:
             (N,) m, negative inside the body.
         """
-        return np.min(self._away(balls, frames)[1], axis=1)
+        return np.min(self._offsets_and_gaps(balls, frames)[1], axis=1)
 
-    def kept_out(self, path: np.ndarray, free: np.ndarray) -> np.ndarray:
+    def keep_out(self, path: np.ndarray, free: np.ndarray) -> np.ndarray:
         """Lead a ball's trajectory around the body.
 
         Args:
@@ -153,7 +153,7 @@ class Legs:
         """
         every, aside, free = np.arange(len(path)), np.zeros((len(path), 2)), free[:, None]
         for left in reversed(range(_ROUNDS)):
-            out = self.way_out(path + np.pad(aside, ((0, 0), (0, 1))), every) * free
+            out = self.compute_way_out(path + np.pad(aside, ((0, 0), (0, 1))), every) * free
             if np.abs(out).max(initial=0.0) < _CLOSE:
                 break
             aside += out
@@ -163,7 +163,7 @@ class Legs:
                 aside = free * (0.25 * padded[:-2] + 0.5 * aside + 0.25 * padded[2:])
         return path + np.pad(aside, ((0, 0), (0, 1)))
 
-    def way_out(self, balls: np.ndarray, frames: np.ndarray) -> np.ndarray:
+    def compute_way_out(self, balls: np.ndarray, frames: np.ndarray) -> np.ndarray:
         """Compute the shortest level move out of the part of the body that each ball is deepest in.
 
         Args:
@@ -172,13 +172,13 @@ class Legs:
         Returns:
             (N, 2) m; zero outside the body.
         """
-        away, gaps = self._away(balls, frames)
+        away, gaps = self._offsets_and_gaps(balls, frames)
         rows, part = np.arange(len(balls)), np.argmin(gaps, axis=1)
-        way, level = away[rows, part], np.linalg.norm(away[rows, part, :2], axis=1)
-        wanted = np.sqrt(np.maximum(self.least[part] ** 2 - way[:, 2] ** 2, 0.0))
-        return way[:, :2] * (np.maximum(wanted - level, 0.0) / np.maximum(level, 1e-6))[:, None]
+        offset, level = away[rows, part], np.linalg.norm(away[rows, part, :2], axis=1)
+        needed = np.sqrt(np.maximum(self.least[part] ** 2 - offset[:, 2] ** 2, 0.0))
+        return offset[:, :2] * (np.maximum(needed - level, 0.0) / np.maximum(level, 1e-6))[:, None]
 
-    def _away(self, balls: np.ndarray, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _offsets_and_gaps(self, balls: np.ndarray, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Compute the vectors (N, 6, 3) m from the nearest points of all parts to the balls, and the gaps (N, 6) m."""
         start, along = self.start[frames], self.along[frames]
         to = balls[:, None] - start
@@ -190,17 +190,17 @@ class Legs:
 
 def _smooth_velocity(places: np.ndarray, fps: float) -> np.ndarray:
     """Compute the velocity (W, 2) m/s without the sway of steps (0.6 s Hann window)."""
-    return np.gradient(zero_phase_hann(places, fps, 0.6), axis=0) * fps if len(places) > 2 else np.zeros_like(places)
+    return np.gradient(smooth_zero_phase_hann(places, fps, 0.6), axis=0) * fps if len(places) > 2 else np.zeros_like(places)
 
 
-class Search:
+class DribbleSearch:
     """Search for the touches of one part by dynamic programming.
 
     A node is a foot, a frame and a side of the ball on which the foot may touch it. A push leads from node to node
     within one swing, a roll from the end of a push to the beginning of another.
     """
 
-    def __init__(self, skeleton, root, rotations, standing, path, measured, part: Between, fps: float):
+    def __init__(self, skeleton, root, rotations, foot_contacts, path, measured, part: DribblePart, fps: float):
         """Take the frames of the part and build the nodes.
 
         Args:
@@ -216,11 +216,11 @@ class Search:
         span = slice(part.low, part.high + 1)
         self.part, self.fps, self.count = part, fps, part.high - part.low + 1
         self.body = Legs(skeleton, root[span], rotations[span], fps)
-        self.standing, self.feed, self.measured = standing[span], path[span], measured[span]
+        self.foot_contacts, self.feed, self.measured = foot_contacts[span], path[span], measured[span]
         self.pushes: list[Push] = []
-        self._nodes()
+        self._build_nodes()
 
-    def _nodes(self) -> None:
+    def _build_nodes(self) -> None:
         """Build the N nodes, in order of time.
 
         frame, side, angle, swing, stood: (N,); place (N, 3) m of the ball; normal (N, 2) from foot to ball; velocity
@@ -228,7 +228,7 @@ class Search:
         """
         # one row per frame of each swing and each angle: (frame, side, angle, swing, stood)
         rows = []
-        for side, swing in ((side, swing) for side in (0, 1) for swing in self._swings(side)):
+        for side, swing in ((side, swing) for side in (0, 1) for swing in self._list_swings(side)):
             rows += [(frame, side, angle, *swing[2:]) for frame in range(*swing[:2]) for angle in range(len(_ANGLES))]
         table = np.array(rows, dtype=int).reshape(-1, 5)
         self.frame, self.side, self.angle, self.swing, self.stood = table.T
@@ -243,37 +243,37 @@ class Search:
         start[:, 2] = BALL_RADIUS
         radius = self.body.feet[0].radius
         level = np.column_stack([self.normal, np.zeros(len(table))])
-        self.place = touching_places((line[0][:, None], line[1][:, None]), radius, start, level)
-        usable = np.abs(nearest_on(line, self.place)[:, 2] - BALL_RADIUS) <= _LEVEL
+        self.place = find_touching_places((line[0][:, None], line[1][:, None]), radius, start, level)
+        usable = np.abs(find_nearest_point(line, self.place)[:, 2] - BALL_RADIUS) <= _LEVEL
         velocity = np.stack([self.body.foot_velocity(0), self.body.foot_velocity(1)])
         self.velocity = velocity[self.side, self.frame]
         forward = np.sum((self.velocity - self.body.velocity[self.frame]) * ahead, axis=1)
         before = np.sum((np.mean(line, axis=0)[:, :2] - self.body.pelvis[self.frame]) * ahead, axis=1)
         # a foot in the air has to swing forward and be ahead of the pelvis; a planted foot always counts
         usable &= (forward > _RETURNING) & (before > _BEHIND) | (self.stood > 0)
-        self._keep(usable)
-        self.held = self._at(self.place, self.frame)
-        self.touch = _TOUCH_COST + _ANGLE_COST * np.abs(_ANGLES[self.angle]) + _STOOD_COST * self.stood
+        self._keep_nodes(usable)
+        self.held = self._evaluate_places(self.place, self.frame)
+        self.touch = _TOUCH_COST + _ANGLE_COST * np.abs(_ANGLES[self.angle]) + _PLANTED_COST * self.stood
 
-    def _keep(self, usable: np.ndarray) -> None:
+    def _keep_nodes(self, usable: np.ndarray) -> None:
         """Keep the usable nodes, sorted by frame (ties in the order they were built)."""
         order = np.flatnonzero(usable)
         order = order[np.argsort(self.frame[order], kind="stable")]
         for name in ("frame", "side", "angle", "swing", "stood", "normal", "place", "velocity"):
             setattr(self, name, getattr(self, name)[order])
 
-    def _swings(self, side: int) -> list[tuple[int, int, int, int]]:
+    def _list_swings(self, side: int) -> list[tuple[int, int, int, int]]:
         """List the swings of a foot as (first, end, number, 0).
 
         Where the player hardly moves, frames in contact are added as (frame, frame + 1, number, 1): there the foot may
         touch the ball without a swing. Numbers are unique over both feet.
         """
-        air = [(first, end, 2 * number + side, 0) for number, (first, end) in enumerate(runs(~self.standing[:, side]))]
+        air = [(first, end, 2 * number + side, 0) for number, (first, end) in enumerate(find_runs(~self.foot_contacts[:, side]))]
         step = max(int(_STANDING_STEP * self.fps), 1)
-        still = [f for f in range(0, self.count, step) if self.standing[f, side] and self.body.speed[f] < SLOW]
+        still = [f for f in range(0, self.count, step) if self.foot_contacts[f, side] and self.body.speed[f] < SLOW]
         return [*air, *((frame, frame + 1, 2 * (self.count + frame) + side, 1) for frame in still)]
 
-    def _at(self, balls: np.ndarray, frames: np.ndarray) -> np.ndarray:
+    def _evaluate_places(self, balls: np.ndarray, frames: np.ndarray) -> np.ndarray:
         """Compute what it costs that balls are at places.
 
         Args:
@@ -287,7 +287,7 @@ class Search:
         fit = _FIT_COST * np.maximum(np.hypot(off[:, 0], off[:, 1]) - _NEAR, 0.0) * self.measured[frames]
         ahead = np.einsum("nk,nk->n", balls[:, :2] - self.body.pelvis[frames], self.body.ahead[frames])
         beside = _AHEAD_COST * np.maximum(_BESIDE - ahead, 0.0)
-        inside = _INSIDE_COST * _RATE * np.maximum(-self.body.gaps(balls, frames), 0.0)
+        inside = _INSIDE_COST * _RATE * np.maximum(-self.body.measure_gaps(balls, frames), 0.0)
         return (fit + beside + inside) / self.fps
 
     def run(self) -> tuple[int, int, np.ndarray] | None:
@@ -299,80 +299,80 @@ class Search:
         """
         count = len(self.frame)
         # per node: lowest cost of a roll that ends here, and the node where that roll began
-        self.into, self.came = np.full(count, np.inf), np.full(count, _START)
+        self.roll_cost, self.roll_source = np.full(count, np.inf), np.full(count, _START)
         # per node: lowest cost of a push that ends here, and the node where that push began
-        self.out, self.pushed = np.full(count, np.inf), np.full(count, _START)
-        self.arrives = np.zeros((count, 2))  # m/s of the ball at the end of the cheapest roll
-        self.best, self.last = np.inf, _START
-        self.sources = [_START] if self.part.starts else []
+        self.push_cost, self.push_source = np.full(count, np.inf), np.full(count, _START)
+        self.arrival_velocity = np.zeros((count, 2))  # m/s of the ball at the end of the cheapest roll
+        self.best_cost, self.last_node = np.inf, _START
+        self.sources = [_START] if self.part.is_met_at_start else []
         if not count:  # no foot comes near: the ball rolls from end to end, if it is met at both
-            return self._path() if self.part.starts and self.part.ends else None
-        if not self.part.starts:
+            return self._trace_path() if self.part.is_met_at_start and self.part.is_met_at_end else None
+        if not self.part.is_met_at_start:
             # an open beginning: any touch soon after it may be the first; before that the ball follows the samples
             soon = np.flatnonzero(self.frame <= _FROM_END * self.fps)
-            self.into[soon] = _WAIT_COST * self.frame[soon] / self.fps + _FIT_COST * self._off(soon)
-            self.into[soon] += np.append(0.0, np.cumsum(self._untouched()))[self.frame[soon]]
+            self.roll_cost[soon] = _WAIT_COST * self.frame[soon] / self.fps + _FIT_COST * self._sample_distance(soon)
+            self.roll_cost[soon] += np.append(0.0, np.cumsum(self._evaluate_samples()))[self.frame[soon]]
         # nodes are sorted by frame, so all rolls and pushes into a node come from nodes that are complete
         for frame in sorted(set(self.frame.tolist())):
             here = np.flatnonzero(self.frame == frame)
-            self._rolled_to(here, frame)
+            self._find_rolls(here, frame)
             for node in here.tolist():
-                self._push(node)
+                self._find_push(node)
                 self._keep_source(node)
-        self._end()
-        return self._path() if np.isfinite(self.best) else None
+        self._find_end()
+        return self._trace_path() if np.isfinite(self.best_cost) else None
 
     def _keep_source(self, node: int) -> None:
         """Keep a node as a source of rolls if its push is among the best _KEPT of its swing so far."""
         swing = [other for other in self.sources if other != _START and self.swing[other] == self.swing[node]]
         if len(swing) == _KEPT:
-            worst = max(swing, key=lambda other: self.out[other])
-            if self.out[node] >= self.out[worst]:
+            worst = max(swing, key=lambda other: self.push_cost[other])
+            if self.push_cost[node] >= self.push_cost[worst]:
                 return
             self.sources.remove(worst)
-        if np.isfinite(self.out[node]):
+        if np.isfinite(self.push_cost[node]):
             self.sources.append(node)
 
-    def _off(self, nodes) -> np.ndarray:
+    def _sample_distance(self, nodes) -> np.ndarray:
         """Measure the distance (N,) m from the ball's sample to where a foot has the ball."""
         return np.linalg.norm(self.place[nodes, :2] - self.feed[self.frame[nodes], :2], axis=-1)
 
-    def _untouched(self) -> np.ndarray:
+    def _evaluate_samples(self) -> np.ndarray:
         """Compute the cost (W,) of a ball that follows its samples."""
-        return self._at(self.feed, np.arange(self.count))
+        return self._evaluate_places(self.feed, np.arange(self.count))
 
-    def _end(self) -> None:
+    def _find_end(self) -> None:
         """Find the cheapest end: a roll to where the ball is met, or, at an open end, any touch near it."""
-        if self.part.ends:
-            sources = self._sources(self.count - 1)
+        if self.part.is_met_at_end:
+            sources = self._list_sources(self.count - 1)
             if len(sources):
-                costs, whence, _ = self._cheapest(sources, self.feed[-1:], self.count - 1)
-                self.best, self.last = costs[0], whence[0]
+                costs, origins, _ = self._find_cheapest_rolls(sources, self.feed[-1:], self.count - 1)
+                self.best_cost, self.last_node = costs[0], origins[0]
             return
         left = (self.count - 1 - self.frame) / self.fps
         # after[n]: cost of following the samples from the frame behind node n to the end
-        after = np.append(np.cumsum(self._untouched()[::-1])[::-1], 0.0)[self.frame + 1]
-        whole = self.out + after + _WAIT_COST * left + _FIT_COST * self._off(slice(None))
+        after = np.append(np.cumsum(self._evaluate_samples()[::-1])[::-1], 0.0)[self.frame + 1]
+        whole = self.push_cost + after + _WAIT_COST * left + _FIT_COST * self._sample_distance(slice(None))
         whole = np.where(left <= _FROM_END, whole, np.inf)
         if len(whole):
-            self.best, self.last = whole.min(), int(np.argmin(whole))
+            self.best_cost, self.last_node = whole.min(), int(np.argmin(whole))
 
-    def _push(self, node: int) -> None:
+    def _find_push(self, node: int) -> None:
         """Find the cheapest push that ends here: the ball has just rolled here, or has been pushed for a few frames."""
         longest = int(_PUSH_SECONDS * self.fps)
         ago = self.frame[node] - self.frame
-        since = np.flatnonzero(self._alike(node) & (ago >= 0) & (ago <= longest))[::-1]
+        since = np.flatnonzero(self._is_same_touch(node) & (ago >= 0) & (ago <= longest))[::-1]
         since = since[ago[since] == np.arange(len(since))]  # same foot, side and swing, no frame missing, newest first
         # a push that began `k` frames ago costs the roll into it, k + 1 held frames, and one touch
-        costs = self.into[since] + np.cumsum(self.held[since]) + self.touch[node]
+        costs = self.roll_cost[since] + np.cumsum(self.held[since]) + self.touch[node]
         best = int(np.argmin(costs))
-        self.out[node], self.pushed[node] = costs[best], since[best]
+        self.push_cost[node], self.push_source[node] = costs[best], since[best]
 
-    def _alike(self, node: int) -> np.ndarray:
+    def _is_same_touch(self, node: int) -> np.ndarray:
         """Return (N,) bool: nodes with the same foot, swing and side of the ball as this one."""
         return (self.side == self.side[node]) & (self.angle == self.angle[node]) & (self.swing == self.swing[node])
 
-    def _sources(self, frame: int) -> np.ndarray:
+    def _list_sources(self, frame: int) -> np.ndarray:
         """List the nodes from which the ball may roll to a frame: those within _LATEST, or else the latest ones."""
         found = np.array(self.sources, dtype=int)
         since = frame - np.where(found == _START, 0, self.frame[found])
@@ -380,17 +380,17 @@ class Search:
         soon = enough & (since <= _LATEST * self.fps)
         return found[soon if soon.any() else enough & (since == since[enough].min(initial=frame + 1))]
 
-    def _rolled_to(self, nodes: np.ndarray, frame: int) -> None:
+    def _find_rolls(self, nodes: np.ndarray, frame: int) -> None:
         """Find the cheapest rolls that end in `nodes`, all of one frame."""
-        sources = self._sources(frame)
+        sources = self._list_sources(frame)
         if not len(sources):
             return
-        costs, whence, arrives = self._cheapest(sources, self.place[nodes], frame, self.swing[nodes])
-        better = costs < self.into[nodes]
-        self.into[nodes[better]], self.came[nodes[better]] = costs[better], whence[better]
-        self.arrives[nodes[better]] = arrives[better]
+        costs, origins, arrives = self._find_cheapest_rolls(sources, self.place[nodes], frame, self.swing[nodes])
+        better = costs < self.roll_cost[nodes]
+        self.roll_cost[nodes[better]], self.roll_source[nodes[better]] = costs[better], origins[better]
+        self.arrival_velocity[nodes[better]] = arrives[better]
 
-    def _cheapest(self, sources: np.ndarray, ends: np.ndarray, frame: int, swing: np.ndarray | None = None):
+    def _find_cheapest_rolls(self, sources: np.ndarray, ends: np.ndarray, frame: int, swing: np.ndarray | None = None):
         """Find the cheapest roll to each of several ends.
 
         The cost beside the trajectory is computed for all rolls; it is a lower bound. The trajectory only adds to it,
@@ -406,14 +406,14 @@ class Search:
         """
         starts = np.where((sources == _START)[:, None], self.feed[0], self.place[sources])
         frames = frame - np.where(sources == _START, 0, self.frame[sources])
-        speeds = speeds_of(starts[:, None], ends, frames[:, None] / self.fps)
-        least = np.where(sources == _START, 0.0, self.out[sources])[:, None] + self._sent(sources, speeds.leaves)
+        speeds = compute_roll_speeds(starts[:, None], ends, frames[:, None] / self.fps)
+        least = np.where(sources == _START, 0.0, self.push_cost[sources])[:, None] + self._evaluate_launch(sources, speeds.start_velocity)
         least += _LONG_COST * np.maximum(frames / self.fps - _LONG, 0.0)[:, None]
         if swing is not None:
             least[(self.swing[sources][:, None] == swing) & (sources != _START)[:, None]] = np.inf
         order = np.argsort(least, axis=0, kind="stable")
         every = np.arange(len(ends))
-        costs, whence = np.full(len(ends), np.inf), np.full(len(ends), _START)
+        costs, origins = np.full(len(ends), np.inf), np.full(len(ends), _START)
         arrives = np.zeros((len(ends), 2))
         for first in range(0, len(sources), _AT_ONCE):
             # tried (_AT_ONCE, N): row r holds for each end the source with its next lowest bound
@@ -423,15 +423,15 @@ class Search:
             target, row = target[hopeful], row[hopeful]
             if not len(row):
                 break
-            whole = least[row, target] + self._way(starts[row], ends[target], frame - frames[row], frames[row])
+            whole = least[row, target] + self._evaluate_rolls(starts[row], ends[target], frame - frames[row], frames[row])
             # from the most expensive to the cheapest, so that the cheapest is written last
             for one in np.argsort(whole, kind="stable")[::-1]:
                 if whole[one] < costs[target[one]]:
-                    costs[target[one]], whence[target[one]] = whole[one], sources[row[one]]
-                    arrives[target[one]] = speeds.arrives[row[one], target[one]]
-        return costs, whence, arrives
+                    costs[target[one]], origins[target[one]] = whole[one], sources[row[one]]
+                    arrives[target[one]] = speeds.end_velocity[row[one], target[one]]
+        return costs, origins, arrives
 
-    def _way(self, starts: np.ndarray, ends: np.ndarray, since: np.ndarray, frames: np.ndarray) -> np.ndarray:
+    def _evaluate_rolls(self, starts: np.ndarray, ends: np.ndarray, since: np.ndarray, frames: np.ndarray) -> np.ndarray:
         """Compute the cost (P,) of the trajectories of P rolls.
 
         Args:
@@ -440,13 +440,13 @@ class Search:
             since: (P,) frame where each begins.
             frames: (P,) number of frames that each takes.
         """
-        rolled = rolls(starts, ends, frames, self.fps)
+        rolled = simulate_rolls(starts, ends, frames, self.fps)
         # all frames strictly between the ends, as (roll, step) pairs; `bincount` adds their costs up per roll
         pair, step = np.nonzero(np.arange(1, frames.max() + 1) < frames[:, None])
-        passed = self._at(rolled.balls[pair, step], since[pair] + 1 + step)
-        return np.bincount(pair, passed, len(frames)) + _HEIGHT_COST * rolled.missed
+        passed = self._evaluate_places(rolled.balls[pair, step], since[pair] + 1 + step)
+        return np.bincount(pair, passed, len(frames)) + _HEIGHT_COST * rolled.height_error
 
-    def _sent(self, sources: np.ndarray, leaves: np.ndarray) -> np.ndarray:
+    def _evaluate_launch(self, sources: np.ndarray, leaves: np.ndarray) -> np.ndarray:
         """Compute what it costs that feet, as they move, send the ball off with the velocities `leaves`.
 
         Args:
@@ -456,46 +456,46 @@ class Search:
             (S, N) cost.
         """
         normal = self.normal[sources][:, None]
-        change = leaves - self.arrives[self.pushed[sources]][:, None]
+        change = leaves - self.arrival_velocity[self.push_source[sources]][:, None]
         # split the change of velocity into the part along the foot's normal and the part across it
         pushed = np.sum(change * normal, axis=-1)
         across = np.linalg.norm(change - pushed[..., None] * normal, axis=-1)
-        extra = np.sum(leaves * normal, axis=-1) - self._pushing(sources)[:, None]
+        extra = np.sum(leaves * normal, axis=-1) - self._push_speed(sources)[:, None]
         costs = (
             _ACROSS_COST * across + _BACK_COST * np.maximum(-pushed, 0.0)
             + _SPEED_COST * np.maximum(extra - _MOST_EXTRA, 0.0) + _BRAKE_COST * np.maximum(-extra - _LEAST_EXTRA, 0.0)
         )  # fmt: skip
         return np.where((sources == _START)[:, None], 0.0, costs)
 
-    def _pushing(self, nodes: np.ndarray) -> np.ndarray:
+    def _push_speed(self, nodes: np.ndarray) -> np.ndarray:
         """Compute the speed (S,) m/s at which feet push the ball away: the foot's, or the ball's over the push."""
         speed = np.sum(self.velocity[nodes] * self.normal[nodes], axis=-1)
-        begun = self.pushed[nodes]
-        frames = np.maximum(self.frame[nodes] - self.frame[begun], 1)
-        way = np.sum((self.place[nodes] - self.place[begun])[:, :2] * self.normal[nodes], axis=-1)
-        return np.where(begun == nodes, speed, np.maximum(speed, way * self.fps / frames))
+        push_start = self.push_source[nodes]
+        frames = np.maximum(self.frame[nodes] - self.frame[push_start], 1)
+        distance = np.sum((self.place[nodes] - self.place[push_start])[:, :2] * self.normal[nodes], axis=-1)
+        return np.where(push_start == nodes, speed, np.maximum(speed, distance * self.fps / frames))
 
-    def _path(self) -> tuple[int, int, np.ndarray]:
+    def _trace_path(self) -> tuple[int, int, np.ndarray]:
         """Trace the cheapest path back from its end and collect the pushes."""
         path = np.array(self.feed)
-        last = self.count - 1 if self.part.ends else int(self.frame[self.last])
-        node, (to, there) = self.last, (last, self.feed[-1]) if self.part.ends else (None, None)
+        last = self.count - 1 if self.part.is_met_at_end else int(self.frame[self.last_node])
+        node, (to, there) = self.last_node, (last, self.feed[-1]) if self.part.is_met_at_end else (None, None)
         while True:
             frame = 0 if node == _START else int(self.frame[node])
             place = self.feed[0] if node == _START else self.place[node]
             # the roll from this push to the one behind it fills the frames between
             if to is not None:
-                rolled = rolls(place[None], there[None], np.array([to - frame]), self.fps).balls[0]
+                rolled = simulate_rolls(place[None], there[None], np.array([to - frame]), self.fps).balls[0]
                 path[frame + 1 : to] = rolled[: to - frame - 1]
             if node == _START:
                 return 0, last, path[: last + 1]
             # go back to the start of this push, then to the node from which the ball rolled here
-            entered = int(self.pushed[node])
+            entered = int(self.push_source[node])
             first = int(self.frame[entered])
-            held = np.flatnonzero(self._alike(node) & (self.frame >= first) & (self.frame <= frame))
+            held = np.flatnonzero(self._is_same_touch(node) & (self.frame >= first) & (self.frame <= frame))
             path[self.frame[held]] = self.place[held]
             self.pushes.insert(0, Push(first, frame, ("left", "right")[self.side[node]]))
             to, there = first, self.place[entered]
-            node = int(self.came[entered])
-            if node == _START and not self.part.starts:
+            node = int(self.roll_source[entered])
+            if node == _START and not self.part.is_met_at_start:
                 return first, last, path[first : last + 1]

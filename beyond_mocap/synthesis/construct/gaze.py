@@ -15,20 +15,20 @@ import numpy as np
 from ...base.easing import smoothstep
 from ...base.vectors import arctan2, unit_vectors
 from ...motion import quaternion
-from ...motion.humanoid import heading_from_positions, identify
+from ...motion.humanoid import compute_heading_from_positions, identify_joints
 from ...motion.motion import Motion, forward_kinematics
-from ...motion.track import zero_phase_hann
+from ...motion.track import smooth_zero_phase_hann
 
-MOST_YAW, MOST_UP, MOST_DOWN = np.radians(75.0), np.radians(50.0), np.radians(55.0)  # from straight ahead of the body
-CHEST, NECK = 0.12, 0.35  # shares of a turn that chest and neck take; the head takes the rest
-SECONDS = 0.4  # s, window over which the head's turning is smoothed
+MAX_YAW, MAX_UP, MAX_DOWN = np.radians(75.0), np.radians(50.0), np.radians(55.0)  # from straight ahead of the body
+CHEST_SHARE, NECK_SHARE = 0.12, 0.35  # shares of a turn that chest and neck take; the head takes the rest
+SMOOTHING_SECONDS = 0.4  # s, window over which the head's turning is smoothed
 _OVERHEAD = 0.5  # level length of a unit direction below which its side counts less and less
 _BEHIND = 0.5  # cosine from straight behind beyond which the head begins to turn back
 
 
-def following(
+def follow_with_gaze(
     motion: Motion, places: np.ndarray, look: np.ndarray, share: np.ndarray | float = 1.0,
-    chest: np.ndarray | float = CHEST,
+    chest: np.ndarray | float = CHEST_SHARE,
 ) -> Motion:
     """Turn the head of a motion so that it follows a moving place.
 
@@ -44,22 +44,22 @@ def following(
     known = np.isfinite(places).all(axis=1)
     if not known.any():
         return motion
-    body = identify(motion.skeleton)
+    body = identify_joints(motion.skeleton)
     joints, world = forward_kinematics(motion)
     head = body.head_or_neck
-    facing = heading_from_positions(motion.skeleton, joints)
+    facing = compute_heading_from_positions(motion.skeleton, joints)
     # the place as seen from the head, in the body's facing frame
-    seen = quaternion.rotate(quaternion.about_up(-facing), _held(places, known) - joints[:, head])
-    yaw, pitch = zero_phase_hann(head_angles(seen), motion.fps, SECONDS).T
-    wanted = np.column_stack([np.cos(pitch) * np.cos(yaw), np.cos(pitch) * np.sin(yaw), np.sin(pitch)])
-    wanted = quaternion.rotate(quaternion.about_up(facing), wanted)
-    sight = quaternion.rotate(world[:, head], np.broadcast_to(look, wanted.shape))
-    turn = quaternion.to_rotation_vector(quaternion.between(sight, wanted))
-    eased = np.broadcast_to(share, len(known)) * _eased_in(known, motion.fps)
-    return _turned(motion, world, head, eased[:, None] * turn, np.broadcast_to(chest, len(known)))
+    seen = quaternion.rotate(quaternion.from_up_angle(-facing), _fill_gaps(places, known) - joints[:, head])
+    yaw, pitch = smooth_zero_phase_hann(compute_head_angles(seen), motion.fps, SMOOTHING_SECONDS).T
+    target = np.column_stack([np.cos(pitch) * np.cos(yaw), np.cos(pitch) * np.sin(yaw), np.sin(pitch)])
+    target = quaternion.rotate(quaternion.from_up_angle(facing), target)
+    sight = quaternion.rotate(world[:, head], np.broadcast_to(look, target.shape))
+    turn = quaternion.to_rotation_vector(quaternion.rotation_between(sight, target))
+    eased = np.broadcast_to(share, len(known)) * _ease_in(known, motion.fps)
+    return _turn_head(motion, world, head, eased[:, None] * turn, np.broadcast_to(chest, len(known)))
 
 
-def head_angles(seen: np.ndarray) -> np.ndarray:
+def compute_head_angles(seen: np.ndarray) -> np.ndarray:
     """Compute the angles by which a head turns to look in a direction; continuous except straight up and down.
 
     Args:
@@ -71,25 +71,25 @@ def head_angles(seen: np.ndarray) -> np.ndarray:
     level = np.hypot(unit[:, 0], unit[:, 1])
     back = np.maximum(-unit[:, 0] - _BEHIND * level, 0.0) / (1.0 - _BEHIND)
     side = arctan2(unit[:, 1], np.maximum(unit[:, 0], back))
-    yaw = _limited(side, MOST_YAW) * smoothstep(level / _OVERHEAD)
+    yaw = _limit_softly(side, MAX_YAW) * smoothstep(level / _OVERHEAD)
     pitch = arctan2(unit[:, 2], level)
-    return np.column_stack([yaw, np.where(pitch > 0.0, _limited(pitch, MOST_UP), _limited(pitch, MOST_DOWN))])
+    return np.column_stack([yaw, np.where(pitch > 0.0, _limit_softly(pitch, MAX_UP), _limit_softly(pitch, MAX_DOWN))])
 
 
-def _limited(angle: np.ndarray, most: float) -> np.ndarray:
+def _limit_softly(angle: np.ndarray, limit: float) -> np.ndarray:
     """Limit angles (N,) softly to `limit`: up to three quarters of it they do not change."""
-    free = 0.75 * most
+    free = 0.75 * limit
     over = np.maximum(np.abs(angle) - free, 0.0)
-    return np.sign(angle) * (np.minimum(np.abs(angle), free) + (most - free) * np.tanh(over / (most - free)))
+    return np.sign(angle) * (np.minimum(np.abs(angle), free) + (limit - free) * np.tanh(over / (limit - free)))
 
 
-def _held(places: np.ndarray, known: np.ndarray) -> np.ndarray:
+def _fill_gaps(places: np.ndarray, known: np.ndarray) -> np.ndarray:
     """Fill unknown places (T, 3) with the last known one, or with the first known one before it."""
     at = np.flatnonzero(known)
     return places[at[np.clip(np.searchsorted(at, np.arange(len(known)), side="right") - 1, 0, None)]]
 
 
-def _eased_in(known: np.ndarray, fps: float) -> np.ndarray:
+def _ease_in(known: np.ndarray, fps: float) -> np.ndarray:
     """Compute the weight (T,) of the gaze: 1 where a place is known, fading within SMOOTHING_SECONDS beside gaps."""
     if known.all():
         return np.ones(len(known))
@@ -97,18 +97,18 @@ def _eased_in(known: np.ndarray, fps: float) -> np.ndarray:
     # distance to the nearest frame without a place, before and behind
     after = np.searchsorted(without, frames)
     beside = (without[np.clip(after - back, 0, len(without) - 1)] for back in (0, 1))
-    return smoothstep(np.minimum(*(np.abs(frames - other) for other in beside)) / (SECONDS * fps))
+    return smoothstep(np.minimum(*(np.abs(frames - other) for other in beside)) / (SMOOTHING_SECONDS * fps))
 
 
-def _turned(motion: Motion, world: np.ndarray, head: int, turn: np.ndarray, chest: np.ndarray) -> Motion:
+def _turn_head(motion: Motion, world: np.ndarray, head: int, turn: np.ndarray, chest: np.ndarray) -> Motion:
     """Turn the head by rotation vectors (T, 3) in the world; neck and chest (T,) take their shares of them."""
-    body, parents = identify(motion.skeleton), motion.skeleton.parents
+    body, parents = identify_joints(motion.skeleton), motion.skeleton.parents
     # shares add up along the spine: each joint carries what the joints below it have taken
-    shares, taken = {}, np.zeros(len(turn))
-    for joint, own in ((body.chest, chest), (body.neck, NECK)):
+    shares, cumulated = {}, np.zeros(len(turn))
+    for joint, own in ((body.chest, chest), (body.neck, NECK_SHARE)):
         if joint is not None and joint not in (head, body.hips):
-            taken = taken + own
-            shares[joint] = taken
+            cumulated = cumulated + own
+            shares[joint] = cumulated
     shares[head] = np.ones(len(turn))
     rotations, moved = np.array(motion.rotations), turn.any(axis=1)
     for joint, part in shares.items():
@@ -119,6 +119,6 @@ def _turned(motion: Motion, world: np.ndarray, head: int, turn: np.ndarray, ches
         below = world[:, parents[joint]] if joint else np.broadcast_to(quaternion.IDENTITY, (len(turn), 4))
         below = quaternion.multiply(quaternion.from_rotation_vector(carried[:, None] * turn), below)
         own = quaternion.multiply(quaternion.from_rotation_vector(part[:, None] * turn), world[:, joint])
-        local = quaternion.signed_like(quaternion.multiply(quaternion.inverse(below), own), rotations[:, joint])
+        local = quaternion.match_signs(quaternion.multiply(quaternion.inverse(below), own), rotations[:, joint])
         rotations[:, joint] = np.where(moved[:, None], local, rotations[:, joint])
     return replace(motion, rotations=rotations)

@@ -15,22 +15,22 @@ import numpy as np
 
 from ...base.easing import quintic_step_by_powers
 from ...motion import quaternion
-from ...motion.foot_plant import plant, shift
-from ...motion.humanoid import Limb, identify
-from ...motion.motion import pose_kinematics, world_rotation
+from ...motion.foot_plant import plant_feet, solve_shift
+from ...motion.humanoid import Limb, identify_joints
+from ...motion.motion import compute_pose, compute_world_rotation
 from ...motion.skeleton import Skeleton
 from ...motion.track import SampledTrack
 from ...motion.track.sampling import MOVING_SPEED
-from .carry import Body, Resting, leg, limb_carried
-from .on_track import pulled_to_track
-from .steps import steps
+from .carry import Body, LimbReference, leg_chain, move_limb
+from .on_track import pull_to_track
+from .steps import add_steps
 
 Pose = tuple[np.ndarray, np.ndarray]
 
-_MOST_TURN = 1.5 * np.pi  # rad, largest turn on the spot to keep the old direction of turning
+_MAX_TURN = 1.5 * np.pi  # rad, largest turn on the spot to keep the old direction of turning
 _OFFSET_SECONDS = 1.0  # s from an end of the stretch over which the root's offset to the old one fades
 _AROUND = 0.5  # s on either side of the stretch that are solved with it
-_JOINS = 0.12  # s at either end of the stretch in which the planted motion is blended into the old one
+_BLEND_SECONDS = 0.12  # s at either end of the stretch in which the planted motion is blended into the old one
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -52,11 +52,11 @@ class OldMotion:
     stretch: tuple[int, int]
 
     @property
-    def stays(self) -> np.ndarray:
+    def is_old(self) -> np.ndarray:
         """(W,) bool: frames in which some of the old motion stays."""
         return self.share > 0.0
 
-    def heading_of(self, pose: np.ndarray) -> np.ndarray:
+    def compute_heading(self, pose: np.ndarray) -> np.ndarray:
         """Compute the heading with which poses face as the old motion does.
 
         Args:
@@ -64,11 +64,11 @@ class OldMotion:
         Returns:
             (W,) rad, NaN where the new motion is free.
         """
-        heading = quaternion.yaw(quaternion.multiply(self.rotation, quaternion.inverse(pose[:, 0])))
-        heading[~self.stays] = np.nan
+        heading = quaternion.to_yaw(quaternion.multiply(self.rotation, quaternion.inverse(pose[:, 0])))
+        heading[~self.is_old] = np.nan
         return heading
 
-    def turned_alike(self, track: SampledTrack, heading: np.ndarray) -> SampledTrack | None:
+    def match_turning(self, track: SampledTrack, heading: np.ndarray) -> SampledTrack | None:
         """Change the track's direction so that a body turns in the same sense as the old one.
 
         Args:
@@ -78,7 +78,7 @@ class OldMotion:
             The track with another direction; None where both turn alike, or where the body is nowhere slow enough for
             both directions of turning to be possible.
         """
-        old = np.unwrap(quaternion.yaw(self.rotation))
+        old = np.unwrap(quaternion.to_yaw(self.rotation))
         first, end = max(self.stretch[0] - 1, 0), min(self.stretch[1], len(heading) - 1)
         turns = np.round((heading[end] - heading[first] - old[end] + old[first]) / (2.0 * np.pi))
         slow = track.speed < MOVING_SPEED
@@ -88,12 +88,12 @@ class OldMotion:
         # the slow stretch around the slowest frame: only there full turns may be added or removed
         fast = np.flatnonzero(~slow[first : end + 1]) + first
         low, high = max(fast[fast < middle], default=first), min(fast[fast > middle], default=end)
-        if abs(heading[high] - heading[low] - 2.0 * np.pi * turns) > _MOST_TURN:
+        if abs(heading[high] - heading[low] - 2.0 * np.pi * turns) > _MAX_TURN:
             return None
         ramp = quintic_step_by_powers((np.arange(len(heading)) - low) / max(high - low, 1))
         return replace(track, direction=track.direction - 2.0 * np.pi * turns * ramp)
 
-    def pulled(self, ground: np.ndarray, track: SampledTrack, window: float) -> np.ndarray:
+    def pull_to_track(self, ground: np.ndarray, track: SampledTrack, window: float) -> np.ndarray:
         """Pull the constructed root onto the track between the frames that stay.
 
         Near these it starts from the old root.
@@ -105,7 +105,7 @@ class OldMotion:
         Returns:
             (W, 2) m, world.
         """
-        old, stays = self.root[:, :2], self.stays
+        old, stays = self.root[:, :2], self.is_old
         first, end = self.stretch
         at, fade = np.arange(len(ground)), max(1.0, min(_OFFSET_SECONDS * track.fps, end - first))
         root = ground.copy()
@@ -114,21 +114,21 @@ class OldMotion:
             near = quintic_step_by_powers(1.0 - np.abs(at - edge) / fade)[:, None]
             root += np.where(stays[:, None], 0.0, near * (old - ground)[edge])
         root = np.where(stays[:, None], old, root)
-        pulled = pulled_to_track(root, track.raw, track.fps, window)
+        pulled = pull_to_track(root, track.raw, track.fps, window)
         return pulled + self.share[:, None] * (old - pulled)
 
-    def kept_steps(self) -> np.ndarray:
+    def select_old_steps(self) -> np.ndarray:
         """Return (W, 2) bool: the steps that are taken, in whole or in part, where the old motion stays."""
-        kept = np.zeros_like(self.stepped)
-        for side in range(kept.shape[1]):
+        old_steps = np.zeros_like(self.stepped)
+        for side in range(old_steps.shape[1]):
             stepped = self.stepped[:, side]
             # number each step of the foot, then keep those numbers that occur where the motion stays
             number = np.cumsum(np.diff(stepped, prepend=False)) * stepped
-            kept[:, side] = stepped & np.isin(number, number[self.stays & stepped])
-        return kept
+            old_steps[:, side] = stepped & np.isin(number, number[self.is_old & stepped])
+        return old_steps
 
 
-def old_share(count: int, stretch: tuple[int, int], frames: int) -> np.ndarray:
+def compute_old_share(count: int, stretch: tuple[int, int], frames: int) -> np.ndarray:
     """Compute the share (count,) of the old motion: 0 within the stretch, 1 from `frames` around it on.
 
     Args:
@@ -141,7 +141,7 @@ def old_share(count: int, stretch: tuple[int, int], frames: int) -> np.ndarray:
     return quintic_step_by_powers(away)
 
 
-def handed_over(skeleton: Skeleton, new: Pose, old: Pose, share: np.ndarray, standing: np.ndarray, fps: float) -> Pose:
+def blend_with_old(skeleton: Skeleton, new: Pose, old: Pose, share: np.ndarray, heel_toe_contacts: np.ndarray, fps: float) -> Pose:
     """Blend a new motion into an old one without sliding feet.
 
     Args:
@@ -155,24 +155,24 @@ def handed_over(skeleton: Skeleton, new: Pose, old: Pose, share: np.ndarray, sta
         Root (T, 3) m and local rotations (T, J, 4).
     """
     root = new[0] + share[:, None] * (old[0] - new[0])
-    rotations = quaternion.slerp(_signed_like(new[1], old[1], share), old[1], share[:, None])
-    body = Body.posed(skeleton, root, rotations)
-    fresh, stays = pose_kinematics(skeleton, *new), pose_kinematics(skeleton, *old)
-    legs = identify(skeleton)
+    rotations = quaternion.slerp(_match_signs(new[1], old[1], share), old[1], share[:, None])
+    body = Body.from_pose(skeleton, root, rotations)
+    new_joints, old_joints = compute_pose(skeleton, *new), compute_pose(skeleton, *old)
+    legs = identify_joints(skeleton)
     for side, limb in enumerate((legs.left, legs.right)):
-        carries = standing[:, side].any(axis=1).astype(float)[:, None]
-        moved, turned = _offsets([values[:, limb.foot] for values in (*fresh, *stays)], share, carries, fps)
-        chain, foot = leg(limb), quaternion.multiply(turned, fresh[1][:, limb.foot])
-        place = fresh[0][:, limb.foot] + moved
-        place[:, 2] += _sunk(skeleton, limb, place, foot=foot, motions=[fresh[0], stays[0]], share=share)
+        carries = heel_toe_contacts[:, side].any(axis=1).astype(float)[:, None]
+        moved, turned = _solve_foot_offsets([values[:, limb.foot] for values in (*new_joints, *old_joints)], share, carries, fps)
+        chain, foot = leg_chain(limb), quaternion.multiply(turned, new_joints[1][:, limb.foot])
+        place = new_joints[0][:, limb.foot] + moved
+        place[:, 2] += _measure_sinking(skeleton, limb, place, foot=foot, motions=[new_joints[0], old_joints[0]], share=share)
         away = place - body.places[:, limb.foot]
-        rotations = limb_carried(body, Resting.of(body, chain), away, rotations=rotations)
-        above = quaternion.inverse(world_rotation(skeleton, rotations, skeleton.parents[limb.foot]))
-        rotations[:, limb.foot] = quaternion.signed_like(quaternion.multiply(above, foot), rotations[:, limb.foot])
+        rotations = move_limb(body, LimbReference.from_body(body, chain), away, rotations=rotations)
+        above = quaternion.inverse(compute_world_rotation(skeleton, rotations, skeleton.parents[limb.foot]))
+        rotations[:, limb.foot] = quaternion.match_signs(quaternion.multiply(above, foot), rotations[:, limb.foot])
     return root, rotations
 
 
-def stepped_over(skeleton: Skeleton, pose: Pose, standing: np.ndarray, stretch: tuple[int, int], fps: float) -> Pose:
+def step_over(skeleton: Skeleton, pose: Pose, heel_toe_contacts: np.ndarray, stretch: tuple[int, int], fps: float) -> Pose:
     """Plant the feet and let them step within a stretch; all other frames stay bit for bit.
 
     Args:
@@ -185,18 +185,18 @@ def stepped_over(skeleton: Skeleton, pose: Pose, standing: np.ndarray, stretch: 
         Root (T, 3) m and local rotations (T, J, 4).
     """
     first, end = stretch
-    around, joins = int(_AROUND * fps), max(int(round(_JOINS * fps)), 1)
+    around, joins = int(_AROUND * fps), max(int(round(_BLEND_SECONDS * fps)), 1)
     if end - first < 2 * joins + 3:
         return pose
     low, high = max(first - around, 0), min(end + around, len(pose[0]))
     root, rotations = pose[0][low:high], pose[1][low:high]
     inside = (np.arange(low, high) >= first) & (np.arange(low, high) < end)
-    taken = steps(skeleton, root, rotations, standing[low:high], fps, free=inside)
-    swayed = root + np.column_stack([taken.sway, np.zeros(len(root))])
-    found = plant(skeleton, swayed, taken.rotations, taken.standing, fps, moves=taken.moves, levels=False)
-    share = old_share(high - low, (first + joins - low, end - joins - low), joins)
+    steps_taken = add_steps(skeleton, root, rotations, heel_toe_contacts[low:high], fps, free=inside)
+    swayed = root + np.column_stack([steps_taken.sway, np.zeros(len(root))])
+    found = plant_feet(skeleton, swayed, steps_taken.rotations, steps_taken.heel_toe_contacts, fps, foot_moves=steps_taken.moves, level_feet=False)
+    share = compute_old_share(high - low, (first + joins - low, end - joins - low), joins)
     share[~inside] = 1.0
-    new = handed_over(skeleton, (found.root, found.rotations), (root, rotations), share=share, standing=taken.standing,
+    new = blend_with_old(skeleton, (found.root, found.rotations), (root, rotations), share=share, heel_toe_contacts=steps_taken.heel_toe_contacts,
                       fps=fps)
     changed = pose[0].copy(), pose[1].copy()
     for whole, part in zip(changed, new):
@@ -204,7 +204,7 @@ def stepped_over(skeleton: Skeleton, pose: Pose, standing: np.ndarray, stretch: 
     return changed
 
 
-def _sunk(skeleton: Skeleton, limb: Limb, place, foot, motions: list[np.ndarray], share) -> np.ndarray:
+def _measure_sinking(skeleton: Skeleton, limb: Limb, place, foot, motions: list[np.ndarray], share) -> np.ndarray:
     """Compute how far (T,) m a foot's joints lie below the ground (height 0) and below where either motion has them.
 
     The shift and turn of a foot in contact fade as it lifts, and may take its toes down.
@@ -218,7 +218,7 @@ def _sunk(skeleton: Skeleton, limb: Limb, place, foot, motions: list[np.ndarray]
     return np.maximum(allowed - np.min(ends, axis=0), 0.0)
 
 
-def _offsets(feet: list[np.ndarray], share: np.ndarray, carries: np.ndarray, fps: float) -> Pose:
+def _solve_foot_offsets(feet: list[np.ndarray], share: np.ndarray, is_planted: np.ndarray, fps: float) -> Pose:
     """Compute the shift (T, 3) m and turn (T, 4) that bring a new foot to where the old one is, wherever that is known.
 
     feet: place and rotation of the new foot and of the old one.
@@ -226,16 +226,16 @@ def _offsets(feet: list[np.ndarray], share: np.ndarray, carries: np.ndarray, fps
     place, turn, old_place, old_turn = feet
     known = share > 0.0
     away = quaternion.to_rotation_vector(quaternion.multiply(old_turn, quaternion.inverse(turn)))
-    kept = np.where(known[:, None], np.column_stack([old_place - place, away]), np.nan)
+    known_offsets = np.where(known[:, None], np.column_stack([old_place - place, away]), np.nan)
     # six columns, metres and radians, solved together: they stay constant while the foot is in contact
-    found = shift(np.zeros((len(place) - 1, 6)), carries, 30.0 / fps, kept)
-    found[known] = kept[known]
+    found = solve_shift(np.zeros((len(place) - 1, 6)), is_planted, 30.0 / fps, known_offsets)
+    found[known] = known_offsets[known]
     return found[:, :3], quaternion.from_rotation_vector(found[:, 3:])
 
 
-def _signed_like(rotations: np.ndarray, old: np.ndarray, share: np.ndarray) -> np.ndarray:
+def _match_signs(rotations: np.ndarray, old: np.ndarray, share: np.ndarray) -> np.ndarray:
     """Make rotations (T, J, 4) continuous in sign, with the sign of the old ones where these begin to count."""
-    rotations = quaternion.continuous(rotations)
+    rotations = quaternion.unify_signs(rotations)
     known = np.flatnonzero(share > 0.0)
     if not len(known):
         return rotations

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...annotation.striking import ball_gap, nearest_on
+from ...annotation.striking import measure_ball_gap, find_nearest_point
 from ...base.easing import quintic_step_by_powers
 from ...base.vectors import unit_vectors
-from ...motion.quaternion import turned_about_up
+from ...motion.quaternion import rotate_about_up
 from ...motion.track import BALL_RADIUS
 
 BALL_SECONDS = 0.3  # s before and after a key moment over which the ball's shift grows and fades
@@ -29,7 +29,7 @@ Line = tuple[np.ndarray, np.ndarray]
 
 
 @dataclass(frozen=True)
-class Room:
+class BallRange:
     """How far the ball may be moved.
 
     Attributes:
@@ -37,8 +37,8 @@ class Room:
         vertical: m of that, up or down.
     """
 
-    whole: float
-    upright: float
+    total: float
+    vertical: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +55,7 @@ class Aim:
 
 
 @dataclass(frozen=True, eq=False)
-class Meeting:
+class ContactSolution:
     """A ball and a part brought together by each of N aims.
 
     Attributes:
@@ -67,8 +67,8 @@ class Meeting:
     need: np.ndarray
 
 
-def best_aim(
-    line: Line, radius: float, direction: np.ndarray, rise: float, ball: np.ndarray, room: Room,
+def choose_aim(
+    line: Line, radius: float, direction: np.ndarray, rise: float, ball: np.ndarray, ball_range: BallRange,
     avoid: Sequence[tuple[Line, float]], possible: Callable[[np.ndarray], np.ndarray],
 ) -> Aim:
     """Choose the aim that needs the least of the body, within 60 degrees of a direction: inside, instep or outside.
@@ -84,13 +84,13 @@ def best_aim(
         possible: returns, for a move (3,) m of the part, the move that the body can make.
     """
     shares = _ALONG[: 1 if rise else None]
-    aims = [Aim(turned_about_up(direction, angle), along) for angle in _ANGLES for along in shares]
-    found = meetings(line, radius, aims, rise=rise, ball=ball, room=room, avoid=avoid)
+    aims = [Aim(rotate_about_up(direction, angle), along) for angle in _ANGLES for along in shares]
+    found = solve_contacts(line, radius, aims, rise=rise, ball=ball, ball_range=ball_range, avoid=avoid)
     least = np.linalg.norm(found.need, axis=1)
     least += _ANGLE_COST * np.abs(np.repeat(_ANGLES, len(aims) // len(_ANGLES)))
     least += _ALONG_COST * np.abs([aim.along - 0.5 for aim in aims])
     for other, own in avoid:
-        least += _INSIDE_COST * np.maximum(-ball_gap(other, own, found.ball), 0.0)
+        least += _INSIDE_COST * np.maximum(-measure_ball_gap(other, own, found.ball), 0.0)
     best, cost = aims[0], np.inf
     # from the lowest bound on: `possible` is expensive and only adds cost, so stop where no bound is lower
     for number in np.argsort(least, kind="stable"):
@@ -102,10 +102,10 @@ def best_aim(
     return best
 
 
-def meetings(
-    line: Line, radius: float, aims: Sequence[Aim], rise: float, ball: np.ndarray, room: Room,
+def solve_contacts(
+    line: Line, radius: float, aims: Sequence[Aim], rise: float, ball: np.ndarray, ball_range: BallRange,
     avoid: Sequence[tuple[Line, float]] = (),
-) -> Meeting:
+) -> ContactSolution:
     """Bring ball and part together by each of N aims.
 
     The ball moves as far as it may, and out of what it must avoid; the part moves the rest.
@@ -122,7 +122,7 @@ def meetings(
     along = np.array([aim.along for aim in aims])[:, None]
     start = line[0] + along * (line[1] - line[0])
     above = rise * (radius + BALL_RADIUS)
-    height = np.clip(start[:, 2] + above, ball[2] - room.upright, ball[2] + room.upright)
+    height = np.clip(start[:, 2] + above, ball[2] - ball_range.vertical, ball[2] + ball_range.vertical)
     height = np.maximum(height, BALL_RADIUS)
     # what the height lacks after the ball has moved up or down: within _SLACK it is ignored, beyond it the part
     # rises
@@ -130,24 +130,24 @@ def meetings(
     lift = np.stack([0.0 * lift, 0.0 * lift, lift - np.clip(lift, -_SLACK, _SLACK)], axis=1)
     raised = tuple((end + lift)[:, None] for end in line)
     start[:, 2] = height
-    touching = touching_places(raised, radius, start, np.array([aim.direction for aim in aims]))
+    touching = find_touching_places(raised, radius, start, np.array([aim.direction for aim in aims]))
     # the part of `ball_range.total` that is left for level moves
-    level = np.sqrt(np.maximum(room.whole**2 - (height - ball[2]) ** 2, 0.0))
+    level = np.sqrt(np.maximum(ball_range.total**2 - (height - ball[2]) ** 2, 0.0))
     away = touching[:, :2] - ball[:2]
-    places = np.concatenate([ball[:2] + _within(away, level), height[:, None]], axis=1)
+    places = np.concatenate([ball[:2] + _limit_length(away, level), height[:, None]], axis=1)
     for other, own in avoid:
-        out = unit_vectors((places - nearest_on(other, places))[:, :2])
-        places[:, :2] += np.maximum(-ball_gap(other, own, places), 0.0)[:, None] * out
-        places[:, :2] = ball[:2] + _within(places[:, :2] - ball[:2], level)
-    return Meeting(places, places - touching + lift)
+        out = unit_vectors((places - find_nearest_point(other, places))[:, :2])
+        places[:, :2] += np.maximum(-measure_ball_gap(other, own, places), 0.0)[:, None] * out
+        places[:, :2] = ball[:2] + _limit_length(places[:, :2] - ball[:2], level)
+    return ContactSolution(places, places - touching + lift)
 
 
-def _within(way: np.ndarray, most: np.ndarray) -> np.ndarray:
+def _limit_length(move: np.ndarray, limit: np.ndarray) -> np.ndarray:
     """Limit level moves (N, 2) m to lengths `limit` (N,) m."""
-    return way * np.minimum(1.0, most / np.maximum(np.linalg.norm(way, axis=1), 1e-12))[:, None]
+    return move * np.minimum(1.0, limit / np.maximum(np.linalg.norm(move, axis=1), 1e-12))[:, None]
 
 
-def touching_places(line: Line, radius: float, start: np.ndarray, direction: np.ndarray) -> np.ndarray:
+def find_touching_places(line: Line, radius: float, start: np.ndarray, direction: np.ndarray) -> np.ndarray:
     """Find the centres of balls that touch surfaces, on rays that begin inside them.
 
     Searched on three grids, each 64 times finer, to some micrometres within a metre.
@@ -162,14 +162,14 @@ def touching_places(line: Line, radius: float, start: np.ndarray, direction: np.
     """
     near, step = np.zeros(len(start)), 1.0
     for _ in range(3):
-        ways = near[:, None] + step * np.linspace(0.0, 1.0, 65)
-        outside = ball_gap(line, radius, start[:, None] + ways[..., None] * direction[:, None]) >= 0.0
+        distances = near[:, None] + step * np.linspace(0.0, 1.0, 65)
+        outside = measure_ball_gap(line, radius, start[:, None] + distances[..., None] * direction[:, None]) >= 0.0
         first = np.maximum(np.argmax(outside, axis=1) - 1, 0)
         near, step = near + first * step / 64, step / 64
     return start + (near + step)[:, None] * direction
 
 
-def held_meeting(hands: np.ndarray, radius: float, ball: np.ndarray, room: Room) -> tuple[np.ndarray, np.ndarray]:
+def place_between_hands(hands: np.ndarray, radius: float, ball: np.ndarray, ball_range: BallRange) -> tuple[np.ndarray, np.ndarray]:
     """Place a ball between both hands.
 
     Args:
@@ -182,15 +182,15 @@ def held_meeting(hands: np.ndarray, radius: float, ball: np.ndarray, room: Room)
     """
     places = np.array([0.5 * (start + end) for start, end in hands])
     middle = places.mean(axis=0)
-    height = max(np.clip(middle[2], ball[2] - room.upright, ball[2] + room.upright), BALL_RADIUS)
-    level = np.sqrt(max(room.whole**2 - (height - ball[2]) ** 2, 0.0))
+    height = max(np.clip(middle[2], ball[2] - ball_range.vertical, ball[2] + ball_range.vertical), BALL_RADIUS)
+    level = np.sqrt(max(ball_range.total**2 - (height - ball[2]) ** 2, 0.0))
     away = middle[:2] - ball[:2]
     place = np.array([*(ball[:2] + away * min(1.0, level / max(np.linalg.norm(away), 1e-12))), height])
     out = unit_vectors(places - middle)
     return place, place + (radius + BALL_RADIUS) * out - places
 
 
-def lofted(ball: np.ndarray, frame: float, height: float, free: np.ndarray, fps: float) -> np.ndarray:
+def add_flight_arc(ball: np.ndarray, frame: float, height: float, free: np.ndarray, fps: float) -> np.ndarray:
     """Give the ball's trajectory an arc of free flight through a height where its height is not known.
 
     Args:
@@ -209,7 +209,7 @@ def lofted(ball: np.ndarray, frame: float, height: float, free: np.ndarray, fps:
     return out
 
 
-def shifted(
+def shift_ball_eased(
     ball: np.ndarray, held: tuple[int, int], places: np.ndarray, bounds: tuple[int, int], fps: float
 ) -> np.ndarray:
     """Lead the ball's trajectory through two places, and ease it back to where it was.
@@ -226,7 +226,7 @@ def shifted(
     reach = BALL_SECONDS * fps
     low, high = max(held[0] - reach, bounds[0]), min(held[1] + reach, bounds[1])
     frames = np.arange(max(int(np.ceil(low)), 0), min(int(high), len(ball) - 1) + 1)
-    share = eased_around(frames, low, *held, high)
+    share = ease_around(frames, low, *held, high)
     ends = places - ball[list(held)]
     out = ball.copy()
     out[frames] += share[:, None] * np.where(frames[:, None] <= held[0], ends[0], ends[1])
@@ -234,7 +234,7 @@ def shifted(
     return out
 
 
-def led(ball: np.ndarray, held: tuple[int, int], places: np.ndarray, bounds: tuple[int, int]) -> np.ndarray:
+def lead_ball_through(ball: np.ndarray, held: tuple[int, int], places: np.ndarray, bounds: tuple[int, int]) -> np.ndarray:
     """Lead the ball's trajectory through two places, from and to frames at which it changes its course anyway.
 
     Between them its velocity changes by the same at every frame, so that a flying ball keeps flying and a rolling one
@@ -247,12 +247,12 @@ def led(ball: np.ndarray, held: tuple[int, int], places: np.ndarray, bounds: tup
         bounds: frames before and after at which the course changes.
     """
     shifts = places - ball[list(held)]
-    out = lead(lead(ball, held[0], bounds[0], shifts[0]), held[1], bounds[1], shifts[1])
+    out = move_ball_at(move_ball_at(ball, held[0], bounds[0], shifts[0]), held[1], bounds[1], shifts[1])
     out[list(held)] = places
     return out
 
 
-def lead(ball: np.ndarray, frame: int, anchor: int, shift: np.ndarray) -> np.ndarray:
+def move_ball_at(ball: np.ndarray, frame: int, anchor: int, shift: np.ndarray) -> np.ndarray:
     """Move the ball's trajectory at a frame, fading evenly to nothing at an anchor frame.
 
     Args:
@@ -277,7 +277,7 @@ def lead(ball: np.ndarray, frame: int, anchor: int, shift: np.ndarray) -> np.nda
     return out
 
 
-def eased(rising: np.ndarray, falling: np.ndarray) -> np.ndarray:
+def ease_in_out(rising: np.ndarray, falling: np.ndarray) -> np.ndarray:
     """Ease 0 .. 1 .. 0, twice continuously differentiable.
 
     Args:
@@ -287,6 +287,6 @@ def eased(rising: np.ndarray, falling: np.ndarray) -> np.ndarray:
     return quintic_step_by_powers(np.minimum(rising, falling))
 
 
-def eased_around(frames: np.ndarray, low: float, first: float, last: float, high: float) -> np.ndarray:
+def ease_around(frames: np.ndarray, low: float, first: float, last: float, high: float) -> np.ndarray:
     """Ease 0 .. 1 .. 0, twice differentiable: 1 in frames first .. last, 0 up to `low` and from `high` on."""
-    return eased((frames - low) / max(first - low, 1e-9), (high - frames) / max(high - last, 1e-9))
+    return ease_in_out((frames - low) / max(first - low, 1e-9), (high - frames) / max(high - last, 1e-9))

@@ -12,33 +12,33 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...annotation.ball_contact import surfaces
-from ...annotation.striking import faster_middle
+from ...annotation.ball_contact import build_surfaces
+from ...annotation.striking import trace_fastest_surface
 from ...base.banded_least_squares import BandedLeastSquares
-from ...base.time_series import runs
+from ...base.time_series import find_runs
 from ...base.vectors import arctan2
 from ...motion import quaternion
-from ...motion.foot_plant import firmness
-from ...motion.humanoid import identify
-from ...motion.motion import pose_kinematics, world_rotation
+from ...motion.foot_plant import compute_contact_weights
+from ...motion.humanoid import identify_joints
+from ...motion.motion import compute_pose, compute_world_rotation
 from ...motion.skeleton import Skeleton
-from ...motion.track import zero_phase_hann
+from ...motion.track import smooth_zero_phase_hann
 from .strike import Touch
 
 TURN_WEIGHT = 12.0  # weight of the recording's own turning per frame, against the direction of travel
-OFF_THE_FEET = 40.0  # factor on it where the body flies, lies or kneels and so cannot turn at will
+AIRBORNE_FIRMNESS = 40.0  # factor on it where the body flies, lies or kneels and so cannot turn at will
 _FLIGHT_SECONDS = 0.3  # s without a foot on the ground that count as flight; the flights of running are shorter
 _LOW = 0.6  # share of the usual height of the hips below which a body lies or kneels
-STANDS = 0.3  # m/s below which a direction of travel says nothing about the heading
+IN_PLACE_SPEED = 0.3  # m/s below which a direction of travel says nothing about the heading
 
-FAINT, AIM = 1e-4, 0.004
+FAINT_AIM_WEIGHT, AIM_WEIGHT = 1e-4, 0.004
 """Weights of the pull to where a body in place would turn: at any speed, and at rest (half of the turn in 1.3 s)."""
 
-HOLD = 1e6  # weight of a given heading, so large that it stays
+GIVEN_HEADING_WEIGHT = 1e6  # weight of a given heading, so large that it stays
 ROOT_WINDOW = 1.5  # s, the window through which the root lies on the track
 
-MOST_TURN_TO_BALL = np.radians(60.0)
-_REACHED = 0.25  # m between ball and part that the ball's noise and the limb make up for (`strike`)
+MAX_TURN_TO_BALL = np.radians(60.0)
+_REACH = 0.25  # m between ball and part that the ball's noise and the limb make up for (`strike`)
 _BALL_TURN_SECONDS = 0.5  # s before and after the key frame over which the turn grows and fades
 _NEAR, _CLEAR = 0.1, 0.35  # m from the hips: below the first a direction has no weight, above the second all
 
@@ -46,7 +46,7 @@ GRAVITY = 9.81
 LEGS_LEAN, TRUNK_LEAN = 0.5, 0.2
 """Share of a / g by which legs and trunk lean; recorded legs lean by 0.7 to 0.8 of it and the trunk by a quarter."""
 
-MOST_LEAN = 0.2  # rad, largest lean that is added to the legs
+MAX_LEAN = 0.2  # rad, largest lean that is added to the legs
 UPRIGHT_SPEED = (1.5, 3.0)  # m/s: no lean below the first, all of it from the second on
 _LEAN_SECONDS = 0.6  # s, window that smooths the lean
 
@@ -58,8 +58,8 @@ _STIFF, _STAY = (2.0, 0.2), (0.02, 5e-4)
 _ROOT_X, _ROOT_Y, _TURN, _UNKNOWNS = 0, 1, 2, 3
 
 
-def facing(
-    direction: np.ndarray, speed: np.ndarray, velocity: np.ndarray, turn: np.ndarray, kept: np.ndarray | None = None,
+def fit_heading(
+    direction: np.ndarray, speed: np.ndarray, velocity: np.ndarray, turn: np.ndarray, given: np.ndarray | None = None,
     firm: np.ndarray | float = 1.0, aim: np.ndarray | None = None,
 ) -> np.ndarray:
     """Solve the heading: the least squares compromise between travel and the recording's own turning.
@@ -81,11 +81,11 @@ def facing(
     """
     # the heading that keeps the recorded angle between travel and facing
     goal = direction - arctan2(velocity[:, 1], velocity[:, 0])
-    trust = _moving(speed) ** 2 * _moving(np.linalg.norm(velocity, axis=1)) ** 2
-    goal, trust = _with_aim(goal, trust, speed, aim, turn)
-    if kept is not None:
-        goal, trust = np.where(np.isnan(kept), goal, kept), np.where(np.isnan(kept), trust, HOLD)
-    return follow_turning(_unwrapped(goal, turn), trust, turn, firm)
+    trust = _motion_weight(speed) ** 2 * _motion_weight(np.linalg.norm(velocity, axis=1)) ** 2
+    goal, trust = _add_aim(goal, trust, speed, aim, turn)
+    if given is not None:
+        goal, trust = np.where(np.isnan(given), goal, given), np.where(np.isnan(given), trust, GIVEN_HEADING_WEIGHT)
+    return follow_turning(_unwrap_to_turn(goal, turn), trust, turn, firm)
 
 
 def follow_turning(
@@ -105,11 +105,11 @@ def follow_turning(
         return goal
     squares = BandedLeastSquares(len(goal), reach=1)
     squares.add_value(trust, goal=goal)
-    squares.add({1: 1.0, 0: -1.0}, TURN_WEIGHT * np.broadcast_to(firm, len(goal))[1:], turn[1:])
+    squares.add_terms({1: 1.0, 0: -1.0}, TURN_WEIGHT * np.broadcast_to(firm, len(goal))[1:], turn[1:])
     return squares.solve()[:, 0]
 
 
-def turning_firmness(standing: np.ndarray, height: np.ndarray, fps: float) -> np.ndarray:
+def compute_turning_firmness(heel_toe_contacts: np.ndarray, height: np.ndarray, fps: float) -> np.ndarray:
     """Compute how firmly the recording's turning is followed: AIRBORNE_FIRMNESS in flight or with low hips, else 1.
 
     Args:
@@ -119,36 +119,36 @@ def turning_firmness(standing: np.ndarray, height: np.ndarray, fps: float) -> np
     Returns:
         (T,) factor.
     """
-    off = ~standing.any(axis=(1, 2))
-    out = np.where(height < _LOW * np.median(height), OFF_THE_FEET, 1.0)
-    for first, last in runs(off):
+    off = ~heel_toe_contacts.any(axis=(1, 2))
+    out = np.where(height < _LOW * np.median(height), AIRBORNE_FIRMNESS, 1.0)
+    for first, last in find_runs(off):
         if last - first >= _FLIGHT_SECONDS * fps:
-            out[first:last] = OFF_THE_FEET
+            out[first:last] = AIRBORNE_FIRMNESS
     return out
 
 
-def _moving(speed: np.ndarray) -> np.ndarray:
+def _motion_weight(speed: np.ndarray) -> np.ndarray:
     """Compute how much a velocity says about where a body moves: (T,) 0 in place, 1 from 1 m/s on."""
-    return np.clip((speed - STANDS) / (1.0 - STANDS), 0.0, 1.0)
+    return np.clip((speed - IN_PLACE_SPEED) / (1.0 - IN_PLACE_SPEED), 0.0, 1.0)
 
 
-def _with_aim(goal: np.ndarray, trust: np.ndarray, speed: np.ndarray, aim: np.ndarray | None, turn: np.ndarray):
+def _add_aim(goal: np.ndarray, trust: np.ndarray, speed: np.ndarray, aim: np.ndarray | None, turn: np.ndarray):
     """Add the pull towards `aim` to goals (T,) and their weights; it has an effect only where little else is known."""
     if aim is None:
-        return goal, trust + FAINT
-    pull = FAINT + AIM * np.clip(1.0 - speed, 0.0, 1.0) ** 2
-    goal, aim = _unwrapped(goal, turn), _unwrapped(aim, turn)
+        return goal, trust + FAINT_AIM_WEIGHT
+    pull = FAINT_AIM_WEIGHT + AIM_WEIGHT * np.clip(1.0 - speed, 0.0, 1.0) ** 2
+    goal, aim = _unwrap_to_turn(goal, turn), _unwrap_to_turn(aim, turn)
     aim = aim + 2.0 * np.pi * np.round((goal - aim) / (2.0 * np.pi))
     return (trust * goal + pull * aim) / (trust + pull), trust + pull
 
 
-def _unwrapped(goal: np.ndarray, turn: np.ndarray) -> np.ndarray:
+def _unwrap_to_turn(goal: np.ndarray, turn: np.ndarray) -> np.ndarray:
     """Unwrap angles: remove full turns against what the recording's own turning lets one expect."""
     expected = np.cumsum(turn)
     return np.unwrap(goal - expected) + expected
 
 
-def root_with_sway(place: np.ndarray, sway: np.ndarray, angle: np.ndarray) -> np.ndarray:
+def add_sway(place: np.ndarray, sway: np.ndarray, angle: np.ndarray) -> np.ndarray:
     """Add the sway to a path.
 
     Args:
@@ -158,10 +158,10 @@ def root_with_sway(place: np.ndarray, sway: np.ndarray, angle: np.ndarray) -> np
     Returns:
         (T, 2) m, root on the ground, world.
     """
-    return place + quaternion.turned_level(sway, angle)
+    return place + quaternion.rotate_level(sway, angle)
 
 
-def pulled_to_track(
+def pull_to_track(
     root: np.ndarray, track: np.ndarray, fps: float, window: float = ROOT_WINDOW, rounds: int = 4
 ) -> np.ndarray:
     """Remove the slow drift of a root from its track.
@@ -178,13 +178,13 @@ def pulled_to_track(
     Returns:
         (T, 2) m, world.
     """
-    smooth = zero_phase_hann(track, fps, window)
+    smooth = smooth_zero_phase_hann(track, fps, window)
     for _ in range(rounds):
-        root = root - (zero_phase_hann(root, fps, window) - smooth)
+        root = root - (smooth_zero_phase_hann(root, fps, window) - smooth)
     return root
 
 
-def turn_to_ball(
+def compute_turn_to_ball(
     skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray, ball: np.ndarray, touches: Sequence[Touch], fps: float
 ) -> np.ndarray:
     """Compute the turn of the body about its root that points the striking foot at the ball.
@@ -214,27 +214,27 @@ def turn_to_ball(
 def _turn_at_touch(skeleton: Skeleton, root, rotations, ball, touch: Touch) -> float:
     """Compute the turn, rad, at one touch; 0 without a foot that strikes or a known ball."""
     frame = int(np.clip(round(touch.frame), 1, len(root) - 2)) if len(root) > 2 else 0
-    found = [surface for surface in surfaces(skeleton, touch.words) if surface.part == "foot"]
+    found = [surface for surface in build_surfaces(skeleton, touch.words) if surface.part == "foot"]
     if len(root) < 3 or not found or not np.isfinite(ball[frame]).all():
         return 0.0
-    places, world = pose_kinematics(skeleton, root[frame - 1 : frame + 2], rotations[frame - 1 : frame + 2])
-    part, goal = faster_middle(found, places, world)[1, :2] - root[frame, :2], ball[frame, :2] - root[frame, :2]
+    places, world = compute_pose(skeleton, root[frame - 1 : frame + 2], rotations[frame - 1 : frame + 2])
+    part, goal = trace_fastest_surface(found, places, world)[1, :2] - root[frame, :2], ball[frame, :2] - root[frame, :2]
     clear = np.clip((min(np.linalg.norm(part), np.linalg.norm(goal)) - _NEAR) / (_CLEAR - _NEAR), 0.0, 1.0)
     apart = np.arctan2(part[0] * goal[1] - part[1] * goal[0], part @ goal)
-    return float(clear * np.clip(_least_turn(part, goal, apart), -MOST_TURN_TO_BALL, MOST_TURN_TO_BALL))
+    return float(clear * np.clip(_least_turn(part, goal, apart), -MAX_TURN_TO_BALL, MAX_TURN_TO_BALL))
 
 
 def _least_turn(part: np.ndarray, goal: np.ndarray, apart: float) -> float:
     """Compute the smallest part of `apart` that brings a part (2,) within _REACH of its goal (2,), or all of it."""
     p, g = float(np.linalg.norm(part)), float(np.linalg.norm(goal))
     # law of cosines: the angle at which part and goal are _REACH apart
-    free = np.arccos(np.clip((p * p + g * g - _REACHED**2) / max(2.0 * p * g, 1e-9), 0.0, 1.0))
+    free = np.arccos(np.clip((p * p + g * g - _REACH**2) / max(2.0 * p * g, 1e-9), 0.0, 1.0))
     return float(np.sign(apart) * max(0.0, abs(apart) - free))
 
 
-def missing_lean(
-    speed: np.ndarray, direction: np.ndarray, velocity: np.ndarray, turn: np.ndarray, seams: np.ndarray, fps: float,
-    slow: tuple[float, float] = UPRIGHT_SPEED,
+def compute_missing_lean(
+    speed: np.ndarray, direction: np.ndarray, velocity: np.ndarray, turn: np.ndarray, transitions: np.ndarray, fps: float,
+    upright_speed: tuple[float, float] = UPRIGHT_SPEED,
 ) -> np.ndarray:
     """Compute the lean that the track needs beyond what the recording has, limited softly.
 
@@ -252,13 +252,13 @@ def missing_lean(
     own_speed = np.linalg.norm(velocity, axis=1)
     # turning of the recording's direction of travel, per frame: of the facing plus of the angle between the two
     own_turn = turn + np.diff(arctan2(velocity[:, 1], velocity[:, 0]), prepend=arctan2(*velocity[:1, ::-1].T))
-    own_turn[seams] = own_turn[np.minimum(seams + 1, len(turn) - 1)]
-    asked = speed * quaternion.wrapped(np.diff(direction, prepend=direction[:1]))
-    fast = np.clip((np.minimum(speed, own_speed) - slow[0]) / (slow[1] - slow[0]), 0.0, 1.0)
+    own_turn[transitions] = own_turn[np.minimum(transitions + 1, len(turn) - 1)]
+    track_turn = speed * quaternion.wrap_angle(np.diff(direction, prepend=direction[:1]))
+    fast = np.clip((np.minimum(speed, own_speed) - upright_speed[0]) / (upright_speed[1] - upright_speed[0]), 0.0, 1.0)
     # speed times turning per frame is lateral acceleration; what the recording has is taken off
-    turns = asked - own_speed * quaternion.wrapped(own_turn)
-    lean = zero_phase_hann((fast * np.clip(turns * fps / GRAVITY, -1.0, 1.0))[:, None], fps, _LEAN_SECONDS)[:, 0]
-    most = MOST_LEAN / LEGS_LEAN
+    turns = track_turn - own_speed * quaternion.wrap_angle(own_turn)
+    lean = smooth_zero_phase_hann((fast * np.clip(turns * fps / GRAVITY, -1.0, 1.0))[:, None], fps, _LEAN_SECONDS)[:, 0]
+    most = MAX_LEAN / LEGS_LEAN
     return most * np.tanh(lean / most)
 
 
@@ -292,23 +292,23 @@ def lean_into_curves(skeleton: Skeleton, rotations: np.ndarray, direction: np.nd
         (T, J, 4) local.
     """
     out, axis = rotations.copy(), np.column_stack([np.cos(direction), np.sin(direction), np.zeros(len(direction))])
-    out[:, 0] = quaternion.multiply(quaternion.about_axis(axis, -LEGS_LEAN * lean), rotations[:, 0])
+    out[:, 0] = quaternion.multiply(quaternion.from_axis_angle(axis, -LEGS_LEAN * lean), rotations[:, 0])
     _turn_trunk(skeleton, rotations, axis, (LEGS_LEAN - TRUNK_LEAN) * lean, out)
     return out
 
 
 def _turn_trunk(skeleton: Skeleton, rotations: np.ndarray, axis: np.ndarray, angle: np.ndarray, out: np.ndarray):
     """Turn the first joint of the spine about world axes (T, 3) by angle (T,), written into `out`."""
-    spine = identify(skeleton).spine
+    spine = identify_joints(skeleton).spine
     if spine:
-        above = world_rotation(skeleton, rotations, skeleton.parents[spine[0]])
-        turn = quaternion.about_axis(quaternion.rotate(quaternion.inverse(above), axis), angle)
+        above = compute_world_rotation(skeleton, rotations, skeleton.parents[spine[0]])
+        turn = quaternion.from_axis_angle(quaternion.rotate(quaternion.inverse(above), axis), angle)
         out[:, spine[0]] = quaternion.multiply(turn, rotations[:, spine[0]])
 
 
 
 def absorb_foot_slide(
-    skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray, standing: np.ndarray, fps: float
+    skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray, heel_toe_contacts: np.ndarray, fps: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Move the root and turn the body a little so that planted feet slide less.
 
@@ -326,21 +326,21 @@ def absorb_foot_slide(
     Returns:
         (T, 2) m by which the root moves, and (T,) rad by which the body turns about it.
     """
-    body = identify(skeleton)
-    places, _ = pose_kinematics(skeleton, root, rotations)
+    body = identify_joints(skeleton)
+    places, _ = compute_pose(skeleton, root, rotations)
     count, scale = len(root), 30.0 / fps
     squares = BandedLeastSquares(count, _UNKNOWNS)
     for side, limb in enumerate((body.left, body.right)):
-        firm = firmness(standing[:, side])
+        firm = compute_contact_weights(heel_toe_contacts[:, side])
         for point, joint in enumerate((limb.foot, limb.toe_or_foot)):
             place = places[:, joint, :2]
             arm, moves = (place - root[:, :2])[:-1], np.diff(place, axis=0)
             weight = _FOOT_WEIGHT * np.minimum(firm[1:, point], firm[:-1, point])
-            one = np.ones(len(weight))
+            ones = np.ones(len(weight))
             for axis, swing in ((_ROOT_X, -arm[:, 1]), (_ROOT_Y, arm[:, 0])):
                 # unknown r (axis) and t (_TURN) of frame k with -1, of frame k + 1 (offset _UNKNOWNS) with +1
-                stencil = {axis: -one, _TURN: -swing, axis + _UNKNOWNS: one, _TURN + _UNKNOWNS: swing}
-                squares.add(stencil, weight, -moves[:, axis])
+                stencil = {axis: -ones, _TURN: -swing, axis + _UNKNOWNS: ones, _TURN + _UNKNOWNS: swing}
+                squares.add_terms(stencil, weight, -moves[:, axis])
     for axis, kind in ((_ROOT_X, 0), (_ROOT_Y, 0), (_TURN, 1)):
         squares.add_difference(3, _STIFF[kind] / scale**4, axis)
         squares.add_value(_STAY[kind] * scale**2, axis)

@@ -15,37 +15,37 @@ from functools import partial
 
 import numpy as np
 
-from ...annotation.ball_contact import by_both_hands, contact_gap, met_within, surfaces
+from ...annotation.ball_contact import uses_both_hands, measure_contact_gap, find_contact_window, build_surfaces
 from ...annotation.labels import list_labels
-from ...annotation.striking import Surface, ball_gap, part_surfaces
+from ...annotation.striking import Surface, measure_ball_gap, build_part_surfaces
 from ...base.vectors import unit_vector
-from ...motion.humanoid import heading_from_positions, identify
-from ...motion.motion import pose_kinematics
+from ...motion.humanoid import compute_heading_from_positions, identify_joints
+from ...motion.motion import compute_pose
 from ...motion.skeleton import Skeleton
 from ...motion.track import BALL_RADIUS
 from .carry import (
-    MOST_ANGLE,
-    MOST_SWING,
+    MAX_ANGLE,
+    MAX_SWING,
     Body,
-    Resting,
+    LimbReference,
     Swing,
-    above_ground,
-    foot_kept,
-    limb_carried,
+    limit_to_ground,
+    hold_foot,
+    move_limb,
     limb_chain,
-    spine_bent,
-    swing_to,
-    swung,
+    bend_spine,
+    solve_swing,
+    compute_swing_shift,
 )
-from .meeting import Aim, Room, best_aim, eased_around, held_meeting, lofted, meetings, shifted
+from .meeting import Aim, BallRange, choose_aim, ease_around, place_between_hands, add_flight_arc, solve_contacts, shift_ball_eased
 
 BALL_NOISE, FILLED_NOISE = 0.3, 1.0
 """Metres that the ball may be moved from its place, where it was measured and where the feed has filled it in."""
 
-MOST_MOVED = {"foot": 0.45, "hand": 0.4, "head": 0.2, "chest": 0.12}  # m, largest move of a part from the recording
+MAX_SHIFT = {"foot": 0.45, "hand": 0.4, "head": 0.2, "chest": 0.12}  # m, largest move of a part from the recording
 PELVIS_RANGE = (0.20, 0.64)  # m on the ground from pelvis to striking foot in measured kicks, unless recorded further
 OUT_OF_REACH = 0.15  # m of remaining gap above which the body does not reach at all, and plays as recorded
-MOST_DROP = 0.04  # m, largest drop of the pelvis
+MAX_DROP = 0.04  # m, largest drop of the pelvis
 _LONGEST_EASE, _SHORTEST_EASE = 0.5, 0.12  # s before and after a strike in which the body is eased
 _RISE = {"foot": 0.0, "hand": 0.0, "head": 0.6, "chest": 0.0}  # sine of the ball's elevation as seen from the part
 _IN_THE_AIR = 0.2  # m above which a ball may be met higher or lower
@@ -73,7 +73,7 @@ class Touch:
 
 
 @dataclass(frozen=True, eq=False)
-class Struck:
+class StrikeResult:
     """A motion with the ball met at every touch.
 
     Attributes:
@@ -94,10 +94,10 @@ class Struck:
     moved: np.ndarray
 
 
-def strike(
+def strike_ball(
     skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray, contacts: np.ndarray, ball: np.ndarray,
     touches: Sequence[Touch], fps: float, *, measured: np.ndarray | None = None, height_known: np.ndarray | None = None,
-) -> Struck:
+) -> StrikeResult:
     """Bring ball and body together at every touch, within the reach of a body.
 
     Frames outside the touches' windows stay bit for bit.
@@ -118,34 +118,34 @@ def strike(
     count = len(root)
     measured, height_known = (np.ones(count, bool) if flags is None else np.asarray(flags, bool)
                               for flags in (measured, height_known))
-    root, rotations, feed = (np.array(values, dtype=float) for values in (root, rotations, ball))
-    path, moved = feed.copy(), np.full(len(touches), np.nan)
-    touches = [_when_met(skeleton, root, rotations, feed=feed, touch=touch, fps=fps) for touch in touches]
-    for number, moment in _moments(skeleton, touches, count, fps):
-        if not np.isfinite(feed[list(moment.held)]).all():
+    root, rotations, samples = (np.array(values, dtype=float) for values in (root, rotations, ball))
+    path, moved = samples.copy(), np.full(len(touches), np.nan)
+    touches = [_move_to_contact(skeleton, root, rotations, feed=samples, touch=touch, fps=fps) for touch in touches]
+    for number, moment in _iter_touch_frames(skeleton, touches, count, fps):
+        if not np.isfinite(samples[list(moment.held)]).all():
             continue
         span = slice(max(moment.low, 0), min(moment.high, count - 1) + 1)
-        body = Body.posed(skeleton, root[span], rotations[span])
-        scene = _scene(body, moment, span.start, contacts=contacts[span], path=path, measured=measured,
+        body = Body.from_pose(skeleton, root[span], rotations[span])
+        scene = _build_problem(body, moment, span.start, contacts=contacts[span], path=path, measured=measured,
                        height_known=height_known, fps=fps)
-        struck, moved[number] = _reached(scene, body)
-        root[span], rotations[span] = struck.root, struck.rotations
-        places = [scene.ball_and_needs(scene.lines(struck, frame), frame)[0] for frame in moment.held]
-        path = shifted(scene.ball, moment.held, np.array(places), moment.bounds, fps)
-    gap, shift = _gaps_and_shifts(skeleton, root, rotations, feed=feed, path=path, touches=touches)
-    return Struck(root, rotations, path, gap=gap, ball_shift=shift, moved=moved)
+        reached, moved[number] = _reach_ball(scene, body)
+        root[span], rotations[span] = reached.root, reached.rotations
+        places = [scene.solve_ball(scene.surface_lines(reached, frame), frame)[0] for frame in moment.held]
+        path = shift_ball_eased(scene.ball, moment.held, np.array(places), moment.bounds, fps)
+    gap, shift = _measure_gaps(skeleton, root, rotations, feed=samples, path=path, touches=touches)
+    return StrikeResult(root, rotations, path, gap=gap, ball_shift=shift, moved=moved)
 
 
-def _when_met(skeleton: Skeleton, root, rotations, feed, touch: Touch, fps: float) -> Touch:
+def _move_to_contact(skeleton: Skeleton, root, rotations, feed, touch: Touch, fps: float) -> Touch:
     """Move a touch to the frame at which a hand passes the ball nearest.
 
     Only where the labels allow for that and the ball is out of reach at the key moment itself.
     """
-    first, last = _nearest(touch.frame, len(root)), _nearest(touch.frame + met_within(touch.words) * fps, len(root))
+    first, last = _nearest_frame(touch.frame, len(root)), _nearest_frame(touch.frame + find_contact_window(touch.words) * fps, len(root))
     if first == last or not np.isfinite(feed[first : last + 1]).all():
         return touch
-    places, world = pose_kinematics(skeleton, root[first : last + 1], rotations[first : last + 1])
-    gaps = contact_gap(skeleton, places, world, touch.words, feed[first : last + 1])
+    places, world = compute_pose(skeleton, root[first : last + 1], rotations[first : last + 1])
+    gaps = measure_contact_gap(skeleton, places, world, touch.words, feed[first : last + 1])
     later = int(np.argmin(gaps))
     if not later or gaps[0] < BALL_NOISE:
         return touch
@@ -153,7 +153,7 @@ def _when_met(skeleton: Skeleton, root, rotations, feed, touch: Touch, fps: floa
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Moment:
+class _TouchFrames:
     """A touch in frames.
 
     Attributes:
@@ -173,10 +173,10 @@ class _Moment:
     bounds: tuple[int, int]
 
 
-def _moments(skeleton: Skeleton, touches: Sequence[Touch], count: int, fps: float):
+def _iter_touch_frames(skeleton: Skeleton, touches: Sequence[Touch], count: int, fps: float):
     """Generate (number, moment) of every touch that some part can serve, in order of time."""
     shortest, longest = _SHORTEST_EASE * fps, _LONGEST_EASE * fps
-    order = sorted((t.frame, k) for k, t in enumerate(touches) if surfaces(skeleton, t.words))
+    order = sorted((t.frame, k) for k, t in enumerate(touches) if build_surfaces(skeleton, t.words))
     held = [held_frames(frame, count) for frame, _ in order]
     # held frames of all touches, with sentinels far outside on both sides, so ends[place + 1] is this touch
     ends = [(-count, -count), *held, (2 * count, 2 * count)]
@@ -185,11 +185,11 @@ def _moments(skeleton: Skeleton, touches: Sequence[Touch], count: int, fps: floa
         before, after = ends[place][1], ends[place + 2][0]
         low = max(int(first - np.clip(touch.entry, shortest, longest)), before)
         high = min(int(np.ceil(last + np.clip(touch.leave, shortest, longest))), after)
-        yield number, _Moment(words=frozenset(touch.words), frame=_nearest(frame, count), held=held[place], low=low,
+        yield number, _TouchFrames(words=frozenset(touch.words), frame=_nearest_frame(frame, count), held=held[place], low=low,
                               high=high, bounds=(before, after))
 
 
-def _nearest(frame: float, count: int) -> int:
+def _nearest_frame(frame: float, count: int) -> int:
     """Return the whole frame, of `count`, nearest to a fractional one."""
     return int(np.clip(np.rint(frame), 0, count - 1))
 
@@ -199,13 +199,13 @@ def held_frames(frame: float, count: int) -> tuple[int, int]:
 
     Twice the same where the frame is nearly whole.
     """
-    if abs(frame - _nearest(frame, count)) < 0.02:
-        frame = _nearest(frame, count)
-    return _nearest(np.floor(frame), count), _nearest(np.ceil(frame), count)
+    if abs(frame - _nearest_frame(frame, count)) < 0.02:
+        frame = _nearest_frame(frame, count)
+    return _nearest_frame(np.floor(frame), count), _nearest_frame(np.ceil(frame), count)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class _Scene:
+class _TouchProblem:
     """What a touch is solved with.
 
     Attributes:
@@ -219,7 +219,7 @@ class _Scene:
         origin: the first of the body's W frames.
     """
 
-    moment: _Moment
+    moment: _TouchFrames
     parts: tuple[Surface, ...]
     shares: tuple[np.ndarray, ...]
     ball: np.ndarray
@@ -233,84 +233,84 @@ class _Scene:
         """Frame of the moment among the body's frames."""
         return self.moment.frame - self.origin
 
-    def lines(self, body: Body, frame: int) -> np.ndarray:
+    def surface_lines(self, body: Body, frame: int) -> np.ndarray:
         """Return both ends (P, 2, 3) m of every part's line."""
-        return np.array([body.line(part, frame - self.origin) for part in self.parts])
+        return np.array([body.surface_line(part, frame - self.origin) for part in self.parts])
 
-    def ball_and_needs(self, lines: np.ndarray, frame: int) -> tuple[np.ndarray, np.ndarray]:
+    def solve_ball(self, lines: np.ndarray, frame: int) -> tuple[np.ndarray, np.ndarray]:
         """Compute the new place of the ball (3,) m, and what each part then lacks (P, 3) m to touch it.
 
         Args:
             lines: (P, 2, 3) m, the parts' lines.
             frame: output frame.
         """
-        part, ball, room = self.parts[0], self.ball[frame], self.room(frame)
+        part, ball, room = self.parts[0], self.ball[frame], self.ball_range(frame)
         if len(lines) == 2:
-            return held_meeting(lines, part.radius, ball, room)
-        met = meetings(lines[0], part.radius, [self.aim], rise=_RISE[part.part], ball=ball, room=room, avoid=self.avoid)
-        return met.ball[0], met.need
+            return place_between_hands(lines, part.radius, ball, room)
+        solved = solve_contacts(lines[0], part.radius, [self.aim], rise=_RISE[part.part], ball=ball, ball_range=room, avoid=self.avoid)
+        return solved.ball[0], solved.need
 
-    def room(self, frame: int) -> Room:
+    def ball_range(self, frame: int) -> BallRange:
         """Return how far the ball may move; a ball on the ground stays there."""
         whole = BALL_NOISE if self.measured[frame] else FILLED_NOISE
-        return Room(whole, BALL_NOISE if self.ball[frame, 2] > _IN_THE_AIR else 0.0)
+        return BallRange(whole, BALL_NOISE if self.ball[frame, 2] > _IN_THE_AIR else 0.0)
 
 
-def _scene(body: Body, moment: _Moment, origin: int, contacts, path, measured, height_known, fps: float) -> _Scene:
+def _build_problem(body: Body, moment: _TouchFrames, origin: int, contacts, path, measured, height_known, fps: float) -> _TouchProblem:
     """Build the scene of a touch: choose parts and aim."""
-    at, choices = moment.frame - origin, surfaces(body.skeleton, moment.words)
-    if choices[0].part == "hand" and _together(body, choices, at, moment.words):
+    at, choices = moment.frame - origin, build_surfaces(body.skeleton, moment.words)
+    if choices[0].part == "hand" and _use_both_hands(body, choices, at, moment.words):
         parts = choices
     else:
-        parts = (_likeliest(body, choices, at, contacts=contacts, ball=path[moment.frame], fps=fps),)
-    shares = tuple(_share(moment, origin, len(body.root), _standing(contacts, part), fps) for part in parts)
-    line, radius = body.line(parts[0], at), parts[0].radius
+        parts = (_choose_part(body, choices, at, contacts=contacts, ball=path[moment.frame], fps=fps),)
+    shares = tuple(_compute_share(moment, origin, len(body.root), _is_in_contact(contacts, part), fps) for part in parts)
+    line, radius = body.surface_line(parts[0], at), parts[0].radius
     if parts[0].part != "foot" or _HIGH & moment.words:
         # without a measured height the ball flies through the part's height
         height = 0.5 * (line[0] + line[1])[2] + _RISE[parts[0].part] * (radius + BALL_RADIUS)
-        path = lofted(path, moment.frame, float(height), ~height_known, fps)
-    ahead = _direction(body, parts[0], moment, at=at, path=path, fps=fps)
-    avoid = _other_leg(body, parts[0], at) if parts[0].part == "foot" else []
-    scene = _Scene(moment=moment, parts=parts, shares=shares, ball=path, measured=measured, aim=Aim(ahead), avoid=avoid,
+        path = add_flight_arc(path, moment.frame, float(height), ~height_known, fps)
+    ahead = _choose_direction(body, parts[0], moment, at=at, path=path, fps=fps)
+    avoid = _other_leg_lines(body, parts[0], at) if parts[0].part == "foot" else []
+    scene = _TouchProblem(moment=moment, parts=parts, shares=shares, ball=path, measured=measured, aim=Aim(ahead), avoid=avoid,
                    origin=origin)
     if len(parts) == 2:
         return scene
-    aim = best_aim(line, radius, ahead, rise=_RISE[parts[0].part], ball=path[moment.frame],
-                   room=scene.room(moment.frame), avoid=avoid, possible=partial(_bounded, body, parts[0], at))
+    aim = choose_aim(line, radius, ahead, rise=_RISE[parts[0].part], ball=path[moment.frame],
+                   ball_range=scene.ball_range(moment.frame), avoid=avoid, possible=partial(_limit_shift, body, parts[0], at))
     return replace(scene, aim=aim)
 
 
-def _other_leg(body: Body, foot: Surface, at: int) -> list[tuple]:
+def _other_leg_lines(body: Body, foot: Surface, at: int) -> list[tuple]:
     """Return line and radius of the foot and the shin that do not strike."""
-    other = next(part for part in part_surfaces(body.skeleton, "foot") if part.side != foot.side)
+    other = next(part for part in build_part_surfaces(body.skeleton, "foot") if part.side != foot.side)
     knee, ankle = body.places[at, list(limb_chain(body.skeleton, other)[1:])]
-    return [(body.line(other, at), other.radius), ((knee, ankle), other.radius)]
+    return [(body.surface_line(other, at), other.radius), ((knee, ankle), other.radius)]
 
 
-def _together(body: Body, hands: Sequence[Surface], at: int, words: frozenset[str]) -> bool:
+def _use_both_hands(body: Body, hands: Sequence[Surface], at: int, words: frozenset[str]) -> bool:
     """Return whether all labelled hands reach for the ball: in a dive only to catch it, and if close together."""
-    middles = [np.mean(body.line(hand, at), axis=0) for hand in hands]
+    middles = [np.mean(body.surface_line(hand, at), axis=0) for hand in hands]
     near = np.linalg.norm(middles[0] - middles[-1]) < _HANDS_APART
-    return not met_within(words) or bool(near and by_both_hands(words))
+    return not find_contact_window(words) or bool(near and uses_both_hands(words))
 
 
-def _likeliest(body: Body, choices: Sequence[Surface], at: int, contacts, ball: np.ndarray, fps: float) -> Surface:
+def _choose_part(body: Body, choices: Sequence[Surface], at: int, contacts, ball: np.ndarray, fps: float) -> Surface:
     """Choose the part nearest to the ball, a swinging foot before one in contact."""
     def cost(part: Surface) -> float:
-        gap = float(ball_gap(body.line(part, at), part.radius, ball))
-        return gap + 0.3 * _standing(contacts, part)[at] - 0.05 * np.linalg.norm(_velocity(body, part, at, fps))
+        gap = float(measure_ball_gap(body.surface_line(part, at), part.radius, ball))
+        return gap + 0.3 * _is_in_contact(contacts, part)[at] - 0.05 * np.linalg.norm(_part_velocity(body, part, at, fps))
 
     return min(choices, key=cost)
 
 
-def _standing(contacts: np.ndarray, part: Surface) -> np.ndarray:
+def _is_in_contact(contacts: np.ndarray, part: Surface) -> np.ndarray:
     """Return (W,) bool: whether the part is a foot in contact."""
     if part.part != "foot":
         return np.zeros(len(contacts), bool)
     return contacts[:, ("left", "right").index(part.side)]
 
 
-def _share(moment: _Moment, origin: int, count: int, standing: np.ndarray, fps: float) -> np.ndarray:
+def _compute_share(moment: _TouchFrames, origin: int, count: int, is_in_contact: np.ndarray, fps: float) -> np.ndarray:
     """Compute the share (W,) of its shift that a part has at each frame.
 
     It is 1 while the touch is held, 0 outside the clip's entry and exit and while the foot is in contact, except for
@@ -318,79 +318,79 @@ def _share(moment: _Moment, origin: int, count: int, standing: np.ndarray, fps: 
     """
     first, last = (frame - origin for frame in moment.held)
     # contact frames before the touch, without a contact that lasts up to the touch itself; the same behind it
-    before = np.flatnonzero(standing[:first] & ~np.logical_and.accumulate(standing[:first][::-1])[::-1])
-    after = np.flatnonzero(standing[last + 1 :] & ~np.logical_and.accumulate(standing[last + 1 :]))
+    before = np.flatnonzero(is_in_contact[:first] & ~np.logical_and.accumulate(is_in_contact[:first][::-1])[::-1])
+    after = np.flatnonzero(is_in_contact[last + 1 :] & ~np.logical_and.accumulate(is_in_contact[last + 1 :]))
     lift, land = before[-1] if len(before) else -np.inf, last + 1 + after[0] if len(after) else np.inf
     least = _SHORTEST_EASE * fps
     low = max(moment.low - origin, min(lift, first - least))
     high = min(moment.high - origin, max(land, last + least))
-    return eased_around(np.arange(count), low, first, last, high)
+    return ease_around(np.arange(count), low, first, last, high)
 
 
-def _velocity(body: Body, part: Surface, at: int, fps: float) -> np.ndarray:
+def _part_velocity(body: Body, part: Surface, at: int, fps: float) -> np.ndarray:
     """Compute the velocity (3,) m/s of the part's middle."""
-    middle = np.mean(body.line(part, slice(max(at - 1, 0), at + 2)), axis=0)
+    middle = np.mean(body.surface_line(part, slice(max(at - 1, 0), at + 2)), axis=0)
     return (middle[-1] - middle[0]) * fps / max(len(middle) - 1, 1)
 
 
-def _direction(body: Body, part: Surface, moment: _Moment, at: int, path: np.ndarray, fps: float) -> np.ndarray:
+def _choose_direction(body: Body, part: Surface, moment: _TouchFrames, at: int, path: np.ndarray, fps: float) -> np.ndarray:
     """Choose the direction (3,) level, unit, in which a part strikes.
 
     A kick drives the ball where the foot moves, corrected towards where it is seen to fly; a player who stops a ball
     has it on the side from which it comes; head, chest and hands have it ahead.
     """
-    angle = heading_from_positions(body.skeleton, body.places[at])
+    angle = compute_heading_from_positions(body.skeleton, body.places[at])
     ahead = np.array([np.cos(angle), np.sin(angle), 0.0])
     near, reach = moment.frame, max(int(round(0.1 * fps)), 1)
-    coming = _flat(path[near] - path[max(near - reach, 0)]) / 0.1
-    leaving = _flat(path[min(near + reach, len(path) - 1)] - path[near]) / 0.1
-    if part.part == "hand" and met_within(moment.words):
+    coming = _level_vector(path[near] - path[max(near - reach, 0)]) / 0.1
+    leaving = _level_vector(path[min(near + reach, len(path) - 1)] - path[near]) / 0.1
+    if part.part == "hand" and find_contact_window(moment.words):
         return unit_vector(-coming, ahead)
     if part.part != "foot":
         return ahead
     # towards the incoming ball, or towards a slow ball's place, mixed with straight ahead
     if _STOPPING & moment.words:
-        middle = np.mean(body.line(part, at), axis=0)
-        wish = -coming if np.linalg.norm(coming) > 1.0 else _flat(path[moment.frame] - middle)
-        return unit_vector(unit_vector(wish, ahead) + 0.8 * ahead, ahead)
-    swing = _flat(_velocity(body, part, at, fps))
+        middle = np.mean(body.surface_line(part, at), axis=0)
+        incoming = -coming if np.linalg.norm(coming) > 1.0 else _level_vector(path[moment.frame] - middle)
+        return unit_vector(unit_vector(incoming, ahead) + 0.8 * ahead, ahead)
+    swing = _level_vector(_part_velocity(body, part, at, fps))
     along = unit_vector(swing, ahead) if np.linalg.norm(swing) > 1.0 else ahead
     return unit_vector(along + 0.5 * unit_vector(leaving, along), along) if np.linalg.norm(leaving) > 3.0 else along
 
 
-def _flat(v: np.ndarray) -> np.ndarray:
+def _level_vector(v: np.ndarray) -> np.ndarray:
     """Return a vector (3,) without its height."""
     return v * [1.0, 1.0, 0.0]
 
 
-def _reached(scene: _Scene, body: Body) -> tuple[Body, float]:
+def _reach_ball(scene: _TouchProblem, body: Body) -> tuple[Body, float]:
     """Bring the parts of a body to the ball, within their reach; also return how far they were moved, m.
 
     Requested shifts and what the body can do are solved alternately, since a nearly straight limb yields softly and a
     spine moves on an arc.
     """
-    own = scene.lines(body, scene.moment.frame)
-    if np.linalg.norm(scene.ball_and_needs(own, scene.moment.frame)[1]) < _CLOSE:
+    own = scene.surface_lines(body, scene.moment.frame)
+    if np.linalg.norm(scene.solve_ball(own, scene.moment.frame)[1]) < _CLOSE:
         return body, 0.0
-    limbs = [Resting.of(body, limb_chain(body.skeleton, part)) for part in scene.parts if part.part in MOST_SWING]
-    shifts, struck, lines = np.zeros((len(scene.parts), 3)), body, own
+    limbs = [LimbReference.from_body(body, limb_chain(body.skeleton, part)) for part in scene.parts if part.part in MAX_SWING]
+    shifts, moved_body, lines = np.zeros((len(scene.parts), 3)), body, own
     for _ in range(_ROUNDS):
-        wished = _wished(scene, body, lines, shifts)
-        if np.linalg.norm(wished - shifts) < _CLOSE:
+        requested = _solve_shifts(scene, body, lines, shifts)
+        if np.linalg.norm(requested - shifts) < _CLOSE:
             break
-        struck, shifts = _moved(scene, body, limbs, wished), wished
-        lines = scene.lines(struck, scene.moment.frame)
-    if np.linalg.norm(scene.ball_and_needs(lines, scene.moment.frame)[1], axis=1).min() > OUT_OF_REACH:
+        moved_body, shifts = _move_parts(scene, body, limbs, requested), requested
+        lines = scene.surface_lines(moved_body, scene.moment.frame)
+    if np.linalg.norm(scene.solve_ball(lines, scene.moment.frame)[1], axis=1).min() > OUT_OF_REACH:
         return body, 0.0
     moved = np.linalg.norm(np.mean(lines, axis=1) - np.mean(own, axis=1), axis=1).max()
-    if not np.array_equal(struck.root, body.root):  # the pelvis has sunk, the foot that does not strike stays
-        human = identify(body.skeleton)
+    if not np.array_equal(moved_body.root, body.root):  # the pelvis has sunk, the foot that does not strike stays
+        human = identify_joints(body.skeleton)
         other = human.right if scene.parts[0].side == "left" else human.left
-        struck = Body.posed(body.skeleton, struck.root, foot_kept(body, other, struck.root, struck.rotations))
-    return struck, float(moved)
+        moved_body = Body.from_pose(body.skeleton, moved_body.root, hold_foot(body, other, moved_body.root, moved_body.rotations))
+    return moved_body, float(moved)
 
 
-def _wished(scene: _Scene, body: Body, lines: np.ndarray, shifts: np.ndarray) -> np.ndarray:
+def _solve_shifts(scene: _TouchProblem, body: Body, lines: np.ndarray, shifts: np.ndarray) -> np.ndarray:
     """Compute the shifts that bring parts to the ball, within what a body can do.
 
     Args:
@@ -399,74 +399,74 @@ def _wished(scene: _Scene, body: Body, lines: np.ndarray, shifts: np.ndarray) ->
     Returns:
         (P, 3) m.
     """
-    wished = shifts
+    requested = shifts
     for _ in range(_ROUNDS):
-        _, needs = scene.ball_and_needs(lines + (wished - shifts)[:, None], scene.moment.frame)
+        _, needs = scene.solve_ball(lines + (requested - shifts)[:, None], scene.moment.frame)
         if np.linalg.norm(needs) < _CLOSE:
             break
-        pairs, before = zip(scene.parts, wished, needs), wished
-        wished = np.array([_bounded(body, part, scene.at, shift + need) for part, shift, need in pairs])
-        if np.linalg.norm(wished - before) < _CLOSE:
+        pairs, before = zip(scene.parts, requested, needs), requested
+        requested = np.array([_limit_shift(body, part, scene.at, shift + need) for part, shift, need in pairs])
+        if np.linalg.norm(requested - before) < _CLOSE:
             break
-    return wished
+    return requested
 
 
-def _bounded(body: Body, part: Surface, at: int, shift: np.ndarray) -> np.ndarray:
+def _limit_shift(body: Body, part: Surface, at: int, shift: np.ndarray) -> np.ndarray:
     """Limit a shift (3,) m to what a body can do: not too far, no limb below the ground or beyond its joints."""
-    shift = shift * min(1.0, MOST_MOVED[part.part] / max(np.linalg.norm(shift), 1e-9))
+    shift = shift * min(1.0, MAX_SHIFT[part.part] / max(np.linalg.norm(shift), 1e-9))
     if part.part == "foot":
-        shift = above_ground(body, part, at, _beside_pelvis(body, part, at, shift))
-    if part.part in MOST_SWING and None not in (chain := limb_chain(body.skeleton, part)):
-        shift = swung(body, chain, _swing(body, part, at, shift), np.arange(len(body.root)) == at)[at]
+        shift = limit_to_ground(body, part, at, _limit_pelvis_distance(body, part, at, shift))
+    if part.part in MAX_SWING and None not in (chain := limb_chain(body.skeleton, part)):
+        shift = compute_swing_shift(body, chain, _solve_part_swing(body, part, at, shift), np.arange(len(body.root)) == at)[at]
     return shift
 
 
-def _beside_pelvis(body: Body, part: Surface, at: int, shift: np.ndarray) -> np.ndarray:
+def _limit_pelvis_distance(body: Body, part: Surface, at: int, shift: np.ndarray) -> np.ndarray:
     """Limit the shift (3,) m of a foot to PELVIS_RANGE from the pelvis on the ground."""
-    pelvis, middle = body.places[at, identify(body.skeleton).hips], np.mean(body.line(part, at), axis=0)
-    away = _flat(middle + shift - pelvis)
-    own, wanted = np.linalg.norm(_flat(middle - pelvis)), np.linalg.norm(away)
-    ranged = np.clip(wanted, min(PELVIS_RANGE[0], float(own)), max(PELVIS_RANGE[1], float(own)))
-    return shift + away * (ranged / max(wanted, 1e-9) - 1.0)
+    pelvis, middle = body.places[at, identify_joints(body.skeleton).hips], np.mean(body.surface_line(part, at), axis=0)
+    away = _level_vector(middle + shift - pelvis)
+    own, requested = np.linalg.norm(_level_vector(middle - pelvis)), np.linalg.norm(away)
+    ranged = np.clip(requested, min(PELVIS_RANGE[0], float(own)), max(PELVIS_RANGE[1], float(own)))
+    return shift + away * (ranged / max(requested, 1e-9) - 1.0)
 
 
-def _swing(body: Body, part: Surface, at: int, shift: np.ndarray) -> Swing:
+def _solve_part_swing(body: Body, part: Surface, at: int, shift: np.ndarray) -> Swing:
     """Solve the limb's swing that moves a part by `shift` (3,) m; the pelvis sinks where its leg is too short."""
     chain = limb_chain(body.skeleton, part)
     place = body.places[at, chain[2]] + shift
-    lowered = _drop(body, chain, at, place) if part.part == "foot" else 0.0
-    return swing_to(body, chain, at, place=place, most=MOST_SWING[part.part], lowered=lowered)
+    lowered = _compute_drop(body, chain, at, place) if part.part == "foot" else 0.0
+    return solve_swing(body, chain, at, place=place, max_turn=MAX_SWING[part.part], lowered=lowered)
 
 
-def _drop(body: Body, chain: tuple[int, int, int], at: int, ankle: np.ndarray) -> float:
+def _compute_drop(body: Body, chain: tuple[int, int, int], at: int, ankle: np.ndarray) -> float:
     """Compute how far the pelvis sinks so that the leg reaches the place (3,) of its ankle, m, at most MAX_DROP."""
     hip, knee, own = body.places[at, list(chain)]
     upper, lower = np.linalg.norm(knee - hip), np.linalg.norm(own - knee)
     # law of cosines: length of the leg at its largest knee angle
-    length = np.sqrt(upper**2 + lower**2 - 2.0 * upper * lower * np.cos(MOST_ANGLE))
-    length, level = max(length, np.linalg.norm(own - hip)), np.linalg.norm(_flat(ankle - hip))
-    return float(np.clip(hip[2] - ankle[2] - np.sqrt(max(length**2 - level**2, 0.0)), 0.0, MOST_DROP))
+    length = np.sqrt(upper**2 + lower**2 - 2.0 * upper * lower * np.cos(MAX_ANGLE))
+    length, level = max(length, np.linalg.norm(own - hip)), np.linalg.norm(_level_vector(ankle - hip))
+    return float(np.clip(hip[2] - ankle[2] - np.sqrt(max(length**2 - level**2, 0.0)), 0.0, MAX_DROP))
 
 
-def _moved(scene: _Scene, body: Body, limbs: Sequence[Resting], shifts: np.ndarray) -> Body:
+def _move_parts(scene: _TouchProblem, body: Body, limbs: Sequence[LimbReference], shifts: np.ndarray) -> Body:
     """Move each part of the body by its shift (3,) m, weighted by its share."""
     root, rotations = body.root, body.rotations
     if not limbs:
-        rotations = spine_bent(body, scene.parts[0], scene.at, shifts[0], scene.shares[0])
+        rotations = bend_spine(body, scene.parts[0], scene.at, shifts[0], scene.shares[0])
     for part, limb, shift, share in zip(scene.parts, limbs, shifts, scene.shares):
-        swing = _swing(body, part, scene.at, shift)
-        moves = swung(body, limb.chain, swing, share)
-        moves = above_ground(body, part, slice(None), moves) if part.part == "foot" else moves
+        swing = _solve_part_swing(body, part, scene.at, shift)
+        moves = compute_swing_shift(body, limb.chain, swing, share)
+        moves = limit_to_ground(body, part, slice(None), moves) if part.part == "foot" else moves
         root = root - share[:, None] * [0.0, 0.0, swing.lowered]
-        rotations = limb_carried(body, limb, moves, root, rotations)
-    return Body.posed(body.skeleton, root, rotations)
+        rotations = move_limb(body, limb, moves, root, rotations)
+    return Body.from_pose(body.skeleton, root, rotations)
 
 
-def _gaps_and_shifts(skeleton: Skeleton, root, rotations, feed, path, touches) -> tuple[np.ndarray, np.ndarray]:
+def _measure_gaps(skeleton: Skeleton, root, rotations, feed, path, touches) -> tuple[np.ndarray, np.ndarray]:
     """Measure gap (K,) m and level shift of the ball (K,) m at the frame nearest to each touch."""
-    frames = np.array([_nearest(touch.frame, len(root)) for touch in touches], dtype=int)
-    places, world = pose_kinematics(skeleton, root[frames], rotations[frames])
+    frames = np.array([_nearest_frame(touch.frame, len(root)) for touch in touches], dtype=int)
+    places, world = compute_pose(skeleton, root[frames], rotations[frames])
     rows = zip(places, world, touches, path[frames])
-    gaps = [contact_gap(skeleton, place, turn, touch.words, ball) for place, turn, touch, ball in rows]
+    gaps = [measure_contact_gap(skeleton, place, turn, touch.words, ball) for place, turn, touch, ball in rows]
     shift = np.linalg.norm((path - feed)[frames, :2], axis=1)
     return np.abs(np.array(gaps, dtype=float)), np.where(np.isfinite(gaps), shift, np.nan)

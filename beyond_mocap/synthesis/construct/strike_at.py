@@ -13,30 +13,30 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...annotation.striking import Surface, ball_gap, nearest_on
-from ...motion.humanoid import identify
+from ...annotation.striking import Surface, measure_ball_gap, find_nearest_point
+from ...motion.humanoid import identify_joints
 from ...motion.motion import Motion
 from .carry import (
-    MOST_SWING,
+    MAX_SWING,
     Body,
-    Resting,
-    above_ground,
-    foot_kept,
-    limb_carried,
+    LimbReference,
+    limit_to_ground,
+    hold_foot,
+    move_limb,
     limb_chain,
-    spine_bent,
-    swing_to,
-    swung,
+    bend_spine,
+    solve_swing,
+    compute_swing_shift,
 )
-from .meeting import eased_around
+from .meeting import ease_around
 
-LONGEST, SHORTEST = 0.5, 0.12  # s before and after a strike within which the part comes to the ball and returns
-MOST = 0.35  # m, largest move of a part
+LONGEST_EASE, SHORTEST_EASE = 0.5, 0.12  # s before and after a strike within which the part comes to the ball and returns
+MAX_SHIFT = 0.35  # m, largest move of a part
 _ROUNDS, _CLOSE = 6, 2e-4  # most rounds of the iteration, and m at which it ends
 
 
 @dataclass(frozen=True, eq=False)
-class Meeting:
+class FixedStrike:
     """One strike.
 
     Attributes:
@@ -57,7 +57,7 @@ class Meeting:
 
 
 @dataclass(frozen=True, eq=False)
-class Met:
+class FixedStrikeResult:
     """A motion with its strikes solved.
 
     Attributes:
@@ -71,7 +71,7 @@ class Met:
     moved: np.ndarray
 
 
-def met_at(motion: Motion, standing: np.ndarray, meetings: Sequence[Meeting], grounded: bool = False) -> Met:
+def strike_fixed_ball(motion: Motion, foot_contacts: np.ndarray, strikes: Sequence[FixedStrike], has_ground: bool = False) -> FixedStrikeResult:
     """Bring the parts of a motion to the ball at every strike, within the reach of a body.
 
     Frames away from the strikes stay bit for bit.
@@ -83,77 +83,77 @@ def met_at(motion: Motion, standing: np.ndarray, meetings: Sequence[Meeting], gr
         has_ground: whether the ground is at height 0 and no foot goes through it.
     """
     root, rotations = np.array(motion.root_positions), np.array(motion.rotations)
-    gap, moved = np.full(len(meetings), np.nan), np.full(len(meetings), np.nan)
+    gap, moved = np.full(len(strikes), np.nan), np.full(len(strikes), np.nan)
     count = len(motion)
-    for number, meeting in enumerate(meetings):
-        if not np.all(np.isfinite(meeting.ball)):
+    for number, strike in enumerate(strikes):
+        if not np.all(np.isfinite(strike.ball)):
             continue
-        at = int(np.clip(round(meeting.frame), 0, count - 1))
-        share = _share(meeting, at, count, standing, motion.fps)
+        at = int(np.clip(round(strike.frame), 0, count - 1))
+        share = _compute_share(strike, at, count, foot_contacts, motion.fps)
         span = np.flatnonzero(share > 0.0)
         low, high = span[0], span[-1] + 1
-        body = Body.posed(motion.skeleton, root[low:high], rotations[low:high])
-        struck, moved[number], gap[number] = _reached(body, meeting, at - low, share[low:high], grounded)
-        root[low:high], rotations[low:high] = struck.root, struck.rotations
-    return Met(replace(motion, root_positions=root, rotations=rotations), gap, moved)
+        body = Body.from_pose(motion.skeleton, root[low:high], rotations[low:high])
+        reached, moved[number], gap[number] = _reach_ball(body, strike, at - low, share[low:high], has_ground)
+        root[low:high], rotations[low:high] = reached.root, reached.rotations
+    return FixedStrikeResult(replace(motion, root_positions=root, rotations=rotations), gap, moved)
 
 
-def _share(meeting: Meeting, at: int, count: int, standing: np.ndarray, fps: float) -> np.ndarray:
+def _compute_share(strike: FixedStrike, at: int, count: int, foot_contacts: np.ndarray, fps: float) -> np.ndarray:
     """Compute the share (T,) of the shift that the part has.
 
     It is 1 at the strike, 0 outside entry and exit and while the foot is in contact, except for the shortest ease that
     a body needs.
     """
-    low = at - np.clip(meeting.entry, SHORTEST * fps, LONGEST * fps)
-    high = at + np.clip(meeting.leave, SHORTEST * fps, LONGEST * fps)
-    if meeting.surface.part == "foot":
-        stands = standing[:, ("left", "right").index(meeting.surface.side)]
-        before, after = np.flatnonzero(stands[:at]), np.flatnonzero(stands[at + 1 :])
+    low = at - np.clip(strike.entry, SHORTEST_EASE * fps, LONGEST_EASE * fps)
+    high = at + np.clip(strike.leave, SHORTEST_EASE * fps, LONGEST_EASE * fps)
+    if strike.surface.part == "foot":
+        in_contact = foot_contacts[:, ("left", "right").index(strike.surface.side)]
+        before, after = np.flatnonzero(in_contact[:at]), np.flatnonzero(in_contact[at + 1 :])
         lift, land = before[-1] if len(before) else -np.inf, at + 1 + after[0] if len(after) else np.inf
-        low, high = max(low, min(lift, at - SHORTEST * fps)), min(high, max(land, at + SHORTEST * fps))
-    return eased_around(np.arange(count), low, at, at, high)
+        low, high = max(low, min(lift, at - SHORTEST_EASE * fps)), min(high, max(land, at + SHORTEST_EASE * fps))
+    return ease_around(np.arange(count), low, at, at, high)
 
 
-def _reached(body: Body, meeting: Meeting, at: int, share: np.ndarray, grounded: bool) -> tuple[Body, float, float]:
+def _reach_ball(body: Body, strike: FixedStrike, at: int, share: np.ndarray, has_ground: bool) -> tuple[Body, float, float]:
     """Bring the part to the ball; return the body, how far the part was moved, and the gap that is left, m."""
-    shift, struck, best = np.zeros(3), body, (body, 0.0, abs(_gap(body, meeting, at)))
+    shift, moved_body, best = np.zeros(3), body, (body, 0.0, abs(_measure_gap(body, strike, at)))
     for _ in range(_ROUNDS):
-        line = struck.line(meeting.surface, at)
-        way = meeting.ball - nearest_on(line, meeting.ball)
-        far = np.linalg.norm(way)
-        need = way * (1.0 - (meeting.surface.radius + meeting.radius) / max(far, 1e-9))
+        line = moved_body.surface_line(strike.surface, at)
+        offset = strike.ball - find_nearest_point(line, strike.ball)
+        far = np.linalg.norm(offset)
+        need = offset * (1.0 - (strike.surface.radius + strike.radius) / max(far, 1e-9))
         if np.linalg.norm(need) < _CLOSE:
             break
         shift = shift + need
-        shift *= min(1.0, MOST / max(np.linalg.norm(shift), 1e-9))
-        if grounded and meeting.surface.part == "foot":
-            shift = above_ground(body, meeting.surface, at, shift)
-        struck = _carried(body, meeting.surface, at, shift=shift, share=share, grounded=grounded)
-        left = abs(_gap(struck, meeting, at))
+        shift *= min(1.0, MAX_SHIFT / max(np.linalg.norm(shift), 1e-9))
+        if has_ground and strike.surface.part == "foot":
+            shift = limit_to_ground(body, strike.surface, at, shift)
+        moved_body = _move_part(body, strike.surface, at, shift=shift, share=share, has_ground=has_ground)
+        left = abs(_measure_gap(moved_body, strike, at))
         if left < best[2]:
-            best = struck, float(np.linalg.norm(shift)), left
+            best = moved_body, float(np.linalg.norm(shift)), left
     return best
 
 
-def _gap(body: Body, meeting: Meeting, at: int) -> float:
+def _measure_gap(body: Body, strike: FixedStrike, at: int) -> float:
     """Measure the gap, m, between part and ball."""
-    return float(ball_gap(body.line(meeting.surface, at), meeting.surface.radius, meeting.ball, meeting.radius))
+    return float(measure_ball_gap(body.surface_line(strike.surface, at), strike.surface.radius, strike.ball, strike.radius))
 
 
-def _carried(body: Body, surface: Surface, at: int, shift: np.ndarray, share: np.ndarray, grounded: bool) -> Body:
+def _move_part(body: Body, surface: Surface, at: int, shift: np.ndarray, share: np.ndarray, has_ground: bool) -> Body:
     """Move the surface by `shift` (3,) m at frame `at`, by its share (W,) around it."""
     root, rotations = body.root, body.rotations
     if surface.part in ("foot", "hand", "tool"):
-        chain, most = limb_chain(body.skeleton, surface), MOST_SWING["foot" if surface.part == "foot" else "hand"]
-        swing = swing_to(body, chain, at, body.places[at, chain[2]] + shift, most)
-        moves = swung(body, chain, swing, share)
-        if grounded and surface.part == "foot":
-            moves = above_ground(body, surface, slice(None), moves)
-        rotations = limb_carried(body, Resting.of(body, chain), moves)
+        chain, most = limb_chain(body.skeleton, surface), MAX_SWING["foot" if surface.part == "foot" else "hand"]
+        swing = solve_swing(body, chain, at, body.places[at, chain[2]] + shift, most)
+        moves = compute_swing_shift(body, chain, swing, share)
+        if has_ground and surface.part == "foot":
+            moves = limit_to_ground(body, surface, slice(None), moves)
+        rotations = move_limb(body, LimbReference.from_body(body, chain), moves)
     elif surface.part in ("head", "chest"):
-        rotations = spine_bent(body, surface, at, shift, share)
+        rotations = bend_spine(body, surface, at, shift, share)
     else:
-        root, human = root + share[:, None] * shift, identify(body.skeleton)
+        root, human = root + share[:, None] * shift, identify_joints(body.skeleton)
         for limb in (human.left, human.right):
-            rotations = foot_kept(body, limb, root, rotations)
-    return Body.posed(body.skeleton, root, rotations)
+            rotations = hold_foot(body, limb, root, rotations)
+    return Body.from_pose(body.skeleton, root, rotations)

@@ -11,22 +11,22 @@ import numpy as np
 from ...base.vectors import unit_vectors
 from ...library.library import Library
 from ...motion import quaternion
-from ...motion.foot_plant import Planted
-from ...motion.humanoid import identify
-from ...motion.motion import pose_kinematics
+from ...motion.foot_plant import PlantResult
+from ...motion.humanoid import identify_joints
+from ...motion.motion import compute_pose
 from ...motion.track import SampledTrack
 from ..plan import ResolvedPlan
-from ..search.footage import Footage
-from ..search.locomotion import travelled_distance
+from ..search.footage import SourceMotion
+from ..search.locomotion import compute_travelled_distance
 from .construction import Construction, apply_heading
-from .on_track import facing, root_with_sway
+from .on_track import fit_heading, add_sway
 from .steps import Steps
 from .transitions import spread_rotations, spread_values
 
-UPRIGHT = np.cos(np.radians(50.0))  # height of the trunk's unit vector below which a body is not upright (§3.2.6)
+UPRIGHT_COSINE = np.cos(np.radians(50.0))  # height of the trunk's unit vector below which a body is not upright (§3.2.6)
 
 
-def lay_out_blocks(construction: Construction, travelled: np.ndarray | None) -> tuple[Planted, Steps]:
+def construct_blocks(construction: Construction, travelled: np.ndarray | None) -> tuple[PlantResult, Steps]:
     """Construct the motion of T source frames as the thesis does: no foot is planted.
 
     Args:
@@ -36,29 +36,29 @@ def lay_out_blocks(construction: Construction, travelled: np.ndarray | None) -> 
     track, source = construction.track, construction.source
     smooth = _spread_transitions(construction.plan, source)
     if travelled is None:
-        heading, ground = root_by_integration(construction.library, source, smooth, track)
+        heading, ground = integrate_root(construction.library, source, smooth, track)
     else:
-        heading, ground = root_at_distance(track, smooth, travelled)
+        heading, ground = place_root_at_distance(track, smooth, travelled)
     pose, none = apply_heading(smooth.pose, heading), np.zeros((len(ground), 2))
-    planted = Planted(np.concatenate([ground, smooth.height[:, None]], axis=1), pose, none, none)
-    return planted, Steps.none(pose, source.standing)
+    planted = PlantResult(np.concatenate([ground, smooth.height[:, None]], axis=1), pose, none, none)
+    return planted, Steps.empty(pose, source.heel_toe_contacts)
 
 
-def _spread_transitions(plan: ResolvedPlan, source: Footage) -> Footage:
+def _spread_transitions(plan: ResolvedPlan, source: SourceMotion) -> SourceMotion:
     """Spread the jump at each transition over the frames around it.
 
     Source: Faustino 2024, §3.3.1, eq. 25.
     """
-    reach = 0.5 * plan.asked.seam_window * plan.fps
+    reach = 0.5 * plan.requested.seam_window * plan.fps
     return replace(
         source,
-        pose=spread_rotations(source.pose, source.seams, source.ahead_pose, reach),
-        height=spread_values(source.height, source.seams, source.ahead_height, reach),
-        sway=spread_values(source.sway, source.seams, source.ahead_sway, reach),
+        pose=spread_rotations(source.pose, source.transitions, source.ahead_pose, reach),
+        height=spread_values(source.height, source.transitions, source.ahead_height, reach),
+        sway=spread_values(source.sway, source.transitions, source.ahead_sway, reach),
     )
 
 
-def root_at_distance(track: SampledTrack, smooth: Footage, travelled: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def place_root_at_distance(track: SampledTrack, smooth_source: SourceMotion, travelled: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Place the root where the track has travelled a given distance.
 
     Args:
@@ -68,13 +68,13 @@ def root_at_distance(track: SampledTrack, smooth: Footage, travelled: np.ndarray
     Returns:
         Heading (T,) rad and root (T, 2) m, world.
     """
-    place, direction = place_along(track, travelled)
+    place, direction = find_places_along(track, travelled)
     speed = np.abs(np.gradient(travelled)) * track.fps if len(travelled) > 1 else np.zeros(1)
-    heading = facing(direction, speed, smooth.velocity, smooth.turn)
-    return heading, root_with_sway(place, smooth.sway, heading)
+    heading = fit_heading(direction, speed, smooth_source.velocity, smooth_source.turn)
+    return heading, add_sway(place, smooth_source.sway, heading)
 
 
-def place_along(track: SampledTrack, travelled: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def find_places_along(track: SampledTrack, travelled: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Find the places on the track's path after a travelled distance.
 
     Beyond the track's end the last direction is kept.
@@ -88,15 +88,15 @@ def place_along(track: SampledTrack, travelled: np.ndarray) -> tuple[np.ndarray,
         distance; since both lie on the same path, the steps add up to the path itself. (As printed the difference
         points backwards.)
     """
-    path = travelled_distance(track) + 1e-6 * np.arange(len(track.times))
+    path = compute_travelled_distance(track) + 1e-6 * np.arange(len(track.times))
     place = np.stack([np.interp(travelled, path, track.positions[:, axis]) for axis in (0, 1)], axis=1)
     direction = np.interp(travelled, path, track.direction)
     beyond = np.maximum(travelled - path[-1], 0.0)[:, None]
     return place + beyond * np.stack([np.cos(direction), np.sin(direction)], axis=1), direction
 
 
-def root_by_integration(
-    library: Library, source: Footage, smooth: Footage, track: SampledTrack
+def integrate_root(
+    library: Library, source: SourceMotion, smooth_source: SourceMotion, track: SampledTrack
 ) -> tuple[np.ndarray, np.ndarray]:
     """Integrate the root from the track's first place and direction on, wherever the clips lead.
 
@@ -109,21 +109,21 @@ def root_by_integration(
         Heading (T,) rad and root (T, 2) m, world.
     """
     turn = source.turn.copy()
-    torso, expected = _torso(library, source.pose), _torso(library, source.ahead_pose)
-    turn[source.seams] += torso_corrections(torso, source.seams, expected)
-    heading = chained_facing(float(track.direction[0]), turn)
-    return heading, chained_root(track.positions[0], smooth.velocity, smooth.sway, heading, track.fps)
+    torso, expected = _torso_vectors(library, source.pose), _torso_vectors(library, source.ahead_pose)
+    turn[source.transitions] += compute_torso_corrections(torso, source.transitions, expected)
+    heading = integrate_heading(float(track.direction[0]), turn)
+    return heading, integrate_path(track.positions[0], smooth_source.velocity, smooth_source.sway, heading, track.fps)
 
 
-def _torso(library: Library, pose: np.ndarray) -> np.ndarray:
+def _torso_vectors(library: Library, pose: np.ndarray) -> np.ndarray:
     """Compute the unit vectors (T, 3) from hips to chest or neck in the facing frame."""
-    body = identify(library.skeleton)
+    body = identify_joints(library.skeleton)
     top = body.neck if body.neck is not None else body.chest
-    places, _ = pose_kinematics(library.skeleton, np.zeros((len(pose), 3)), pose)
+    places, _ = compute_pose(library.skeleton, np.zeros((len(pose), 3)), pose)
     return unit_vectors(places[:, top] - places[:, body.hips])
 
 
-def chained_facing(start: float, turn: np.ndarray) -> np.ndarray:
+def integrate_heading(start: float, turn: np.ndarray) -> np.ndarray:
     """Add up the recorded turning to a heading.
 
     Args:
@@ -136,7 +136,7 @@ def chained_facing(start: float, turn: np.ndarray) -> np.ndarray:
     return start + np.cumsum(turn) - turn[0]
 
 
-def torso_corrections(up: np.ndarray, seams: np.ndarray, expected: np.ndarray) -> np.ndarray:
+def compute_torso_corrections(up: np.ndarray, transitions: np.ndarray, expected: np.ndarray) -> np.ndarray:
     """Compute by how much more a piece has to turn at each transition because the body is not upright there.
 
     Heading says little about a body that lies or dives: where both torsos lean more than 50 degrees, the piece is
@@ -150,14 +150,14 @@ def torso_corrections(up: np.ndarray, seams: np.ndarray, expected: np.ndarray) -
         (S,) rad.
     Source: Faustino 2024, §3.2.6, the extra check on the spine.
     """
-    out = np.zeros(len(seams))
-    for number, (after, before) in enumerate(zip(up[seams], expected)):
-        if before[2] < UPRIGHT and after[2] < UPRIGHT:
-            out[number] = quaternion.wrapped(np.arctan2(before[1], before[0]) - np.arctan2(after[1], after[0]))
+    out = np.zeros(len(transitions))
+    for number, (after, before) in enumerate(zip(up[transitions], expected)):
+        if before[2] < UPRIGHT_COSINE and after[2] < UPRIGHT_COSINE:
+            out[number] = quaternion.wrap_angle(np.arctan2(before[1], before[0]) - np.arctan2(after[1], after[0]))
     return out
 
 
-def chained_root(
+def integrate_path(
     place: np.ndarray, velocity: np.ndarray, sway: np.ndarray, facing: np.ndarray, fps: float
 ) -> np.ndarray:
     """Integrate the root on the ground.
@@ -174,7 +174,7 @@ def chained_root(
         (T, 2) m, world.
     Source: Faustino 2024, eq. 24.
     """
-    turn = quaternion.about_up(facing)
+    turn = quaternion.from_up_angle(facing)
     step, away = (quaternion.rotate(turn, np.pad(flat, ((0, 0), (0, 1))))[:, :2] for flat in (velocity, sway))
     path = place + np.concatenate([np.zeros((1, 2)), np.cumsum(step[:-1] / fps, axis=0)])
     return path + away

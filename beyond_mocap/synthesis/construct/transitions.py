@@ -21,7 +21,7 @@ from ...motion import quaternion
 LONGEST_SPREAD = 12  # frames to either side of a jump
 
 
-def fade_share(through: np.ndarray, after: np.ndarray) -> np.ndarray:
+def compute_blend_share(through: np.ndarray, after: np.ndarray) -> np.ndarray:
     """Compute the share that the other piece has in each frame of a blend.
 
     Args:
@@ -30,11 +30,11 @@ def fade_share(through: np.ndarray, after: np.ndarray) -> np.ndarray:
     Returns:
         (R,) 0 to 1.
     """
-    begun = quintic_step(through)
-    return np.where(after, 1.0 - begun, begun)
+    rising = quintic_step(through)
+    return np.where(after, 1.0 - rising, rising)
 
 
-def faded_values(values: np.ndarray, at: np.ndarray, other: np.ndarray, weight: np.ndarray) -> np.ndarray:
+def blend_values(values: np.ndarray, at: np.ndarray, other: np.ndarray, weight: np.ndarray) -> np.ndarray:
     """Blend values with those of the other piece.
 
     Args:
@@ -50,7 +50,7 @@ def faded_values(values: np.ndarray, at: np.ndarray, other: np.ndarray, weight: 
     return out
 
 
-def faded_rotations(
+def blend_rotations(
     rotations: np.ndarray, at: np.ndarray, other: np.ndarray, through: np.ndarray, after: np.ndarray
 ) -> np.ndarray:
     """Blend rotations with those of the other piece by their `compute_blend_share`.
@@ -72,7 +72,7 @@ def faded_rotations(
     ends = np.where(after[:, None, None], other, out[at])
     begins = np.where(after[:, None, None], out[at], other)
     arc = _steady_arc(quaternion.multiply(quaternion.inverse(ends), begins), through)
-    part = np.where(after, -1.0, 1.0) * fade_share(through, after)
+    part = np.where(after, -1.0, 1.0) * compute_blend_share(through, after)
     out[at] = quaternion.multiply(out[at], quaternion.from_rotation_vector(part[:, None, None] * arc))
     return out
 
@@ -96,7 +96,7 @@ def _steady_arc(turn: np.ndarray, through: np.ndarray) -> np.ndarray:
     return np.where(length > 1e-9, angle / np.maximum(length, 1e-9), 2.0) * turn[..., 1:]
 
 
-def spread_share(offset: np.ndarray, reach: float) -> np.ndarray:
+def compute_spread_share(offset: np.ndarray, reach: float) -> np.ndarray:
     """Compute how much of a discontinuity is added at an offset from it.
 
     It grows to 1/2 just before the discontinuity, jumps to -1/2 at it and shrinks to 0, with a continuous slope
@@ -115,7 +115,7 @@ def spread_share(offset: np.ndarray, reach: float) -> np.ndarray:
     return np.where((offset < -reach) | (offset > reach), 0.0, np.where(offset < 0, rising, falling))
 
 
-def spread_reaches(seams: np.ndarray, count: int, longest: float = LONGEST_SPREAD) -> np.ndarray:
+def compute_spread_reaches(transitions: np.ndarray, count: int, longest: float = LONGEST_SPREAD) -> np.ndarray:
     """Compute the reach of each transition: half of the shorter neighbouring piece, so that windows never overlap.
 
     Args:
@@ -125,12 +125,12 @@ def spread_reaches(seams: np.ndarray, count: int, longest: float = LONGEST_SPREA
     Returns:
         (S,) frames, s of eq. 25.
     """
-    lengths = np.diff(np.concatenate([[0], seams, [count]]))
+    lengths = np.diff(np.concatenate([[0], transitions, [count]]))
     return np.minimum(np.minimum(lengths[:-1], lengths[1:]) / 2.0, longest)
 
 
 def spread_values(
-    values: np.ndarray, seams: np.ndarray, ahead: np.ndarray, longest: float = LONGEST_SPREAD
+    values: np.ndarray, transitions: np.ndarray, ahead: np.ndarray, longest: float = LONGEST_SPREAD
 ) -> np.ndarray:
     """Spread the jumps of values at transitions.
 
@@ -143,14 +143,14 @@ def spread_values(
         (T, ...) without jumps.
     """
     out = np.array(values, dtype=float)
-    for seam, expected, reach in zip(seams, ahead, spread_reaches(seams, len(values), longest)):
-        at, weight = _window(seam, reach, len(values))
-        out[at] += weight.reshape(-1, *[1] * (out.ndim - 1)) * (values[seam] - expected)
+    for transition, expected, reach in zip(transitions, ahead, compute_spread_reaches(transitions, len(values), longest)):
+        at, weight = _spread_window(transition, reach, len(values))
+        out[at] += weight.reshape(-1, *[1] * (out.ndim - 1)) * (values[transition] - expected)
     return out
 
 
 def spread_rotations(
-    rotations: np.ndarray, seams: np.ndarray, ahead: np.ndarray, longest: float = LONGEST_SPREAD
+    rotations: np.ndarray, transitions: np.ndarray, ahead: np.ndarray, longest: float = LONGEST_SPREAD
 ) -> np.ndarray:
     """Spread the jumps of rotations at transitions.
 
@@ -168,15 +168,15 @@ def spread_rotations(
     Source: Faustino 2024, eq. 26.
     """
     out = np.array(rotations, dtype=float)
-    for seam, expected, reach in zip(seams, ahead, spread_reaches(seams, len(rotations), longest)):
-        at, weight = _window(seam, reach, len(rotations))
-        jump = quaternion.to_rotation_vector(quaternion.multiply(quaternion.inverse(expected), rotations[seam]))
+    for transition, expected, reach in zip(transitions, ahead, compute_spread_reaches(transitions, len(rotations), longest)):
+        at, weight = _spread_window(transition, reach, len(rotations))
+        jump = quaternion.to_rotation_vector(quaternion.multiply(quaternion.inverse(expected), rotations[transition]))
         turn = quaternion.from_rotation_vector(weight[:, None, None] * jump)
         out[at] = quaternion.multiply(out[at], turn)
     return out
 
 
-def _window(seam: int, reach: float, count: int) -> tuple[slice, np.ndarray]:
+def _spread_window(transition: int, reach: float, count: int) -> tuple[slice, np.ndarray]:
     """Return the frames around a transition as a slice, and the share of the jump in each."""
-    low, high = max(0, int(np.ceil(seam - reach))), min(count, int(np.floor(seam + reach)) + 1)
-    return slice(low, high), spread_share(np.arange(low, high) - seam, reach)
+    low, high = max(0, int(np.ceil(transition - reach))), min(count, int(np.floor(transition + reach)) + 1)
+    return slice(low, high), compute_spread_share(np.arange(low, high) - transition, reach)

@@ -8,17 +8,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...annotation import KeyMoment
-from ...annotation.ball_contact import contact_gap, meeting_words, met_within
-from ...annotation.striking import part_surfaces, smallest_gap
+from ...annotation.ball_contact import measure_contact_gap, choose_contact_labels, find_contact_window
+from ...annotation.striking import build_part_surfaces, measure_smallest_gap
 from ...library.library import Library
-from ...library.made import MADE_FOLDER
+from ...library.made import SYNTHETIC_FOLDER
 from ...motion.track import Track
 from ..take import DribbleTouch
-from .played import Played, find_transitions, number_pieces
+from .played import Playback, find_transitions, number_pieces
 
 
 @dataclass(frozen=True, kw_only=True)
-class Moment:
+class KeyMomentResult:
     """How one key moment was served.
 
     Attributes:
@@ -33,7 +33,7 @@ class Moment:
         used_instead: the labels used where the library lacks the requested ones, else None.
     """
 
-    asked: KeyMoment
+    requested: KeyMoment
     frame: int
     clip: str | None
     clip_frame: float | None
@@ -44,7 +44,7 @@ class Moment:
     used_instead: tuple[str, ...] | None
 
 
-def moments(played: Played, keys: tuple[KeyMoment, ...], stride: np.ndarray, library: Library | None) -> list[Moment]:
+def evaluate_moments(played: Playback, keys: tuple[KeyMoment, ...], stride: np.ndarray, library: Library | None) -> list[KeyMomentResult]:
     """Evaluate every requested key moment as it was played.
 
     Args:
@@ -55,62 +55,62 @@ def moments(played: Played, keys: tuple[KeyMoment, ...], stride: np.ndarray, lib
     """
     starts = find_transitions(played.clip, played.mirrored, played.clip_frame, stride)
     number = number_pieces(len(played.clip), starts)
-    results = {result.asked: result for result in played.keys}
-    library = with_made(library, played)
-    return [_moment(played, key, number, results.get(key), library) for key in keys]
+    results = {result.requested: result for result in played.keys}
+    library = extend_with_synthetic(library, played)
+    return [_evaluate_moment(played, key, number, results.get(key), library) for key in keys]
 
 
-def with_made(library: Library | None, played: Played) -> Library | None:
+def extend_with_synthetic(library: Library | None, played: Playback) -> Library | None:
     """Return the library that was played: with its synthetic clips where one of them is shown."""
-    if library is None or not any(path.startswith(MADE_FOLDER) for path in played.clips):
+    if library is None or not any(path.startswith(SYNTHETIC_FOLDER) for path in played.clips):
         return library
-    return library.extended
+    return library.with_synthetic_clips
 
 
-def _moment(played: Played, key: KeyMoment, number: np.ndarray, result, library: Library | None) -> Moment:
+def _evaluate_moment(played: Playback, key: KeyMoment, number: np.ndarray, result, library: Library | None) -> KeyMomentResult:
     """Evaluate one key moment."""
-    frame = _frame_at(played, (key.in_force - played.start_time) * played.motion.fps)
-    run = np.flatnonzero(number == number[frame if result is None else _frame_at(played, result.frame)])
+    frame = _nearest_frame(played, (key.resolved_time - played.start_time) * played.motion.fps)
+    run = np.flatnonzero(number == number[frame if result is None else _nearest_frame(played, result.frame)])
     words = () if played.words is None else tuple(played.words[frame])
-    found = _key_in_run(played, run, frame, key, library)
-    instead = _instead(key, words if found is None else found.words, result)
+    found = _find_key(played, run, frame, key, library)
+    instead = _choose_used_instead(key, words if found is None else found.labels, result)
     if found is None:
         known = played.clip[frame] >= 0
         clip, source = (played.clips[played.clip[frame]], float(played.clip_frame[frame])) if known else (None, None)
-        return Moment(asked=key, frame=frame, clip=clip, clip_frame=source, played_at=np.nan, words=words, entry=frame,
+        return KeyMomentResult(requested=key, frame=frame, clip=clip, clip_frame=source, played_at=np.nan, words=words, entry=frame,
                       exit=frame, used_instead=instead)
     inside = run[(played.clip_frame[run] >= found.start) & (played.clip_frame[run] <= found.end)]
     entry, leave = (inside[0], inside[-1]) if len(inside) else (frame, frame)
-    at = crossing(played.clip_frame[run], played.times[run], found.frame)
+    at = find_crossing(played.clip_frame[run], played.times[run], found.frame)
     clip = played.clips[played.clip[run[0]]]
-    return Moment(asked=key, frame=frame, clip=clip, clip_frame=found.frame, played_at=at, words=words,
+    return KeyMomentResult(requested=key, frame=frame, clip=clip, clip_frame=found.frame, played_at=at, words=words,
                   entry=int(entry), exit=int(leave), used_instead=instead)
 
 
-def _frame_at(played: Played, frame: float) -> int:
+def _nearest_frame(played: Playback, frame: float) -> int:
     """Return the output frame nearest to a fractional one."""
     return int(np.clip(np.rint(frame), 0, len(played.motion) - 1))
 
 
-def _key_in_run(played: Played, run: np.ndarray, frame: int, key: KeyMoment, library: Library | None):
+def _find_key(played: Playback, run: np.ndarray, frame: int, key: KeyMoment, library: Library | None):
     """Find the library key that the run plays: with the requested labels if any, then nearest to `frame`."""
     if library is None or played.clip[run[0]] < 0:
         return None
     path, side = played.clips[played.clip[run[0]]], bool(played.mirrored[run[0]])
     own = [k for k in library.keys if library.clips[k.clip].path == path and library.clips[k.clip].mirrored == side]
-    own = [k for k in own if np.isfinite(crossing(played.clip_frame[run], played.times[run], k.frame))]
-    carrying = [k for k in own if set(key.words) <= set(k.words)] or own
+    own = [k for k in own if np.isfinite(find_crossing(played.clip_frame[run], played.times[run], k.frame))]
+    carrying = [k for k in own if set(key.words) <= set(k.labels)] or own
     return min(carrying, key=lambda k: abs(k.frame - played.clip_frame[frame]), default=None)
 
 
-def _instead(key: KeyMoment, words, result) -> tuple[str, ...] | None:
+def _choose_used_instead(key: KeyMoment, words, result) -> tuple[str, ...] | None:
     """Return the labels used instead of the requested ones, by the take or by what is played there."""
     if result is not None and result.used_instead is not None:
         return tuple(result.used_instead)
     return None if set(key.words) <= set(words) else tuple(sorted(words))
 
 
-def crossing(clip_frames: np.ndarray, times: np.ndarray, key_frame: float) -> float:
+def find_crossing(clip_frames: np.ndarray, times: np.ndarray, key_frame: float) -> float:
     """Find when a run plays a key frame.
 
     Up to one output frame before or after the run its rate continues.
@@ -133,7 +133,7 @@ def crossing(clip_frames: np.ndarray, times: np.ndarray, key_frame: float) -> fl
     return float(np.interp(key_frame, longer, np.concatenate([[times[0] - step], times, [times[-1] + step]])))
 
 
-def ball_gap(played: Played, moment: Moment) -> float:
+def measure_ball_gap(played: Playback, moment: KeyMomentResult) -> float:
     """Measure the distance between the striking surface and the surface of the written ball at a key moment.
 
     Measured at the output frame nearest to the requested time (`ball_contact.measure_contact_gap`, overlap counts as
@@ -145,11 +145,11 @@ def ball_gap(played: Played, moment: Moment) -> float:
     if played.ball is None:
         return np.nan
     pose = played.positions[moment.frame], played.rotations[moment.frame]
-    ball = written_ball(played, moment.frame)
-    return abs(float(contact_gap(played.motion.skeleton, *pose, touching_words(moment), ball)))
+    ball = find_written_ball(played, moment.frame)
+    return abs(float(measure_contact_gap(played.motion.skeleton, *pose, list_contact_labels(moment), ball)))
 
 
-def met(played: Played, moment: Moment) -> tuple[float, float]:
+def measure_contact(played: Playback, moment: KeyMomentResult) -> tuple[float, float]:
     """Measure when the ball is met, and the gap there.
 
     Both are at the key moment, except for dives, in which a hand meets the ball at its nearest on the flight
@@ -158,27 +158,27 @@ def met(played: Played, moment: Moment) -> tuple[float, float]:
     Returns:
         Seconds on the track's clock and m, as in `measure_ball_gap`; NaN without ball or part.
     """
-    last = min(moment.frame + int(met_within(touching_words(moment)) * played.motion.fps), len(played.motion) - 1)
+    last = min(moment.frame + int(find_contact_window(list_contact_labels(moment)) * played.motion.fps), len(played.motion) - 1)
     frames = range(moment.frame, last + 1)
-    gaps = [ball_gap(played, replace(moment, frame=frame)) for frame in frames]
+    gaps = [measure_ball_gap(played, replace(moment, frame=frame)) for frame in frames]
     if not np.isfinite(gaps).any():
         return np.nan, np.nan
     nearest = int(np.nanargmin(gaps))
     return float(played.times[frames[nearest]]), gaps[nearest]
 
 
-def touching_words(moment: Moment) -> tuple[str, ...]:
+def list_contact_labels(moment: KeyMomentResult) -> tuple[str, ...]:
     """Return the labels that say which part meets the ball (`ball_contact.choose_contact_labels`)."""
-    return meeting_words(moment.words, moment.asked.words)
+    return choose_contact_labels(moment.words, moment.requested.words)
 
 
-def written_ball(played: Played, frame: int) -> np.ndarray:
+def find_written_ball(played: Playback, frame: int) -> np.ndarray:
     """Return the ball's centre (3,) m as written with the take, at the row nearest to an output frame's time."""
     row = int(np.argmin(np.abs(played.ball.times - played.times[frame])))
     return played.ball.positions[row]
 
 
-def dribble_touches(played: Played, touches: Sequence[DribbleTouch], track: Track | None) -> list[dict]:
+def measure_dribble_touches(played: Playback, touches: Sequence[DribbleTouch], track: Track | None) -> list[dict]:
     """Measure every touch of a dribble.
 
     Args:
@@ -193,20 +193,20 @@ def dribble_touches(played: Played, touches: Sequence[DribbleTouch], track: Trac
         {
             "time_s": float(played.times[touch.first]),
             "side": touch.side,
-            "contact_gap_m": max(_foot_gap(played, frame, touch.side) for frame in range(touch.first, touch.last + 1)),
-            "ball_shift_m": None if track is None else ball_shift(played, touch.first, track),
+            "contact_gap_m": max(_measure_foot_gap(played, frame, touch.side) for frame in range(touch.first, touch.last + 1)),
+            "ball_shift_m": None if track is None else measure_ball_shift(played, touch.first, track),
         } for touch in touches
     ]  # fmt: skip
 
 
-def _foot_gap(played: Played, frame: int, side: str) -> float:
+def _measure_foot_gap(played: Playback, frame: int, side: str) -> float:
     """Measure the gap, m, between a foot and the ball at a frame."""
     pose = played.positions[frame], played.rotations[frame]
-    foot = part_surfaces(played.motion.skeleton, "foot", (side,))
-    return abs(float(smallest_gap(foot, *pose, written_ball(played, frame))))
+    foot = build_part_surfaces(played.motion.skeleton, "foot", (side,))
+    return abs(float(measure_smallest_gap(foot, *pose, find_written_ball(played, frame))))
 
 
-def ball_shift(played: Played, frame: int, track: Track) -> float:
+def measure_ball_shift(played: Playback, frame: int, track: Track) -> float:
     """Measure how far on the ground the written ball is from the measured one (linear between samples).
 
     Returns:
@@ -217,4 +217,4 @@ def ball_shift(played: Played, frame: int, track: Track) -> float:
         return np.nan
     time = played.times[frame]
     measured = [np.interp(time, track.times[known], track.ball[known, axis]) for axis in (0, 1)]
-    return float(np.linalg.norm(written_ball(played, frame)[:2] - measured))
+    return float(np.linalg.norm(find_written_ball(played, frame)[:2] - measured))

@@ -16,18 +16,18 @@ from __future__ import annotations
 import numpy as np
 from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
-from ...base.time_series import interpolate, runs, time_derivative
+from ...base.time_series import interpolate_columns, find_runs, time_derivative
 from ...base.vectors import unit_vectors
 from ...motion import quaternion
-from ...motion.humanoid import identify
+from ...motion.humanoid import identify_joints
 from ...motion.skeleton import Skeleton
-from ...motion.track import Track, zero_phase_hann
+from ...motion.track import Track, smooth_zero_phase_hann
 
 ROOT_WINDOW = 1.5  # s, of the root error
 TRAVEL_WINDOW = 1.0  # s, of the travel speed
-STANDING = 0.5  # m/s below which a body counts as standing
+STANDING_SPEED = 0.5  # m/s below which a body counts as standing
 SPEED_EDGES = (1.0, 2.0, 3.0, 4.5)  # m/s between the classes of `classify_speed`
-JERK_REACH, SEAM_TO_JERK = 8, 2  # jerk indices to either side of a transition, and from its middle index to its frame
+JERK_REACH, TRANSITION_TO_JERK = 8, 2  # jerk indices to either side of a transition, and from its middle index to its frame
 _WIDTH = 2 * JERK_REACH + 1
 NOTICED_SLIDE = 0.021  # m of foot slide from which on people notice it
 GMD_HEIGHT, GMD_SPEED, GMD_SECONDS = 0.05, 0.5, 0.25  # m, m/s, s of GMD's skating ratio
@@ -36,7 +36,7 @@ _DIRECTIONS = np.linspace(0.0, np.pi, 24, endpoint=False)
 _DIRECTIONS = np.stack([np.cos(_DIRECTIONS), np.sin(_DIRECTIONS)])
 
 
-def track_at(track: Track, at: np.ndarray) -> np.ndarray:
+def interpolate_track(track: Track, at: np.ndarray) -> np.ndarray:
     """Interpolate the measured track at given seconds: linear between samples, held beyond the ends.
 
     Not smoothed. Samples that cleaning filled in or replaced as outliers are left out.
@@ -50,10 +50,10 @@ def track_at(track: Track, at: np.ndarray) -> np.ndarray:
     known = track.measured
     if not known.any():
         return np.full((len(at), 2), np.nan)
-    return interpolate(at, track.times[known], track.positions[known])
+    return interpolate_columns(at, track.times[known], track.positions[known])
 
 
-def root_error(pelvis: np.ndarray, track: np.ndarray, fps: float) -> np.ndarray:
+def measure_root_error(pelvis: np.ndarray, track: np.ndarray, fps: float) -> np.ndarray:
     """Measure the distance between pelvis and track, both through the same zero-phase Hann window of 1.5 s.
 
     The window is linear, so one pass over the difference is the difference of two passes.
@@ -65,30 +65,30 @@ def root_error(pelvis: np.ndarray, track: np.ndarray, fps: float) -> np.ndarray:
     Returns:
         (T,) m.
     """
-    return np.linalg.norm(zero_phase_hann(pelvis - track, fps, ROOT_WINDOW), axis=-1)
+    return np.linalg.norm(smooth_zero_phase_hann(pelvis - track, fps, ROOT_WINDOW), axis=-1)
 
 
-def pelvis_error(pelvis: np.ndarray, track: np.ndarray) -> np.ndarray:
+def measure_pelvis_error(pelvis: np.ndarray, track: np.ndarray) -> np.ndarray:
     """Measure the distance (T,) m between pelvis (T, 2) and track (T, 2) as they are, without a window."""
     return np.linalg.norm(pelvis - track, axis=-1)
 
 
-def sway(pelvis: np.ndarray, fps: float) -> np.ndarray:
+def measure_sway(pelvis: np.ndarray, fps: float) -> np.ndarray:
     """Measure the distance (T,) m of a pelvis (T, 2) from its own 1.5 s Hann path: a recording's own pelvis error."""
-    return pelvis_error(pelvis, zero_phase_hann(pelvis, fps, ROOT_WINDOW))
+    return measure_pelvis_error(pelvis, smooth_zero_phase_hann(pelvis, fps, ROOT_WINDOW))
 
 
-def travel_speed(pelvis: np.ndarray, fps: float) -> np.ndarray:
+def measure_travel_speed(pelvis: np.ndarray, fps: float) -> np.ndarray:
     """Measure the speed (T,) m/s of a pelvis or track (T, 2) through a 1 s Hann window."""
-    return np.linalg.norm(time_derivative(zero_phase_hann(pelvis, fps, TRAVEL_WINDOW), fps), axis=-1)
+    return np.linalg.norm(time_derivative(smooth_zero_phase_hann(pelvis, fps, TRAVEL_WINDOW), fps), axis=-1)
 
 
-def speed_class(speed: np.ndarray) -> np.ndarray:
+def classify_speed(speed: np.ndarray) -> np.ndarray:
     """Return the class 0..4 of speeds (...,) m/s: 0-1, 1-2, 2-3, 3-4.5, above."""
     return np.digitize(speed, SPEED_EDGES)
 
 
-def surge(pelvis: np.ndarray, fps: float) -> np.ndarray:
+def measure_surge(pelvis: np.ndarray, fps: float) -> np.ndarray:
     """Measure the pelvis speed along its path minus that speed's 1.5 s Hann.
 
     The path's direction is that of the velocity through the same window. Its rms guards against still feet that are
@@ -101,12 +101,12 @@ def surge(pelvis: np.ndarray, fps: float) -> np.ndarray:
         (T,) m/s.
     """
     speed = time_derivative(pelvis, fps)
-    course = unit_vectors(zero_phase_hann(speed, fps, ROOT_WINDOW))
-    along = np.sum(speed * course, axis=-1, keepdims=True)
-    return (along - zero_phase_hann(along, fps, ROOT_WINDOW))[:, 0]
+    direction = unit_vectors(smooth_zero_phase_hann(speed, fps, ROOT_WINDOW))
+    along = np.sum(speed * direction, axis=-1, keepdims=True)
+    return (along - smooth_zero_phase_hann(along, fps, ROOT_WINDOW))[:, 0]
 
 
-def class_rms(values: np.ndarray, classes: np.ndarray, least: int = 30) -> np.ndarray:
+def compute_class_rms(values: np.ndarray, classes: np.ndarray, least: int = 30) -> np.ndarray:
     """Compute the root mean square in each speed class.
 
     Args:
@@ -117,10 +117,10 @@ def class_rms(values: np.ndarray, classes: np.ndarray, least: int = 30) -> np.nd
         (5,), NaN where no class has enough.
     """
     rms = [np.sqrt(np.mean(values[classes == k] ** 2)) if np.sum(classes == k) >= least else np.nan for k in range(5)]
-    return nearest_known(np.array(rms))
+    return fill_from_nearest(np.array(rms))
 
 
-def nearest_known(values: np.ndarray) -> np.ndarray:
+def fill_from_nearest(values: np.ndarray) -> np.ndarray:
     """Replace every NaN in values (K,) by the nearest entry that is not NaN (the lower one of two)."""
     known = np.flatnonzero(np.isfinite(values))
     if not len(known):
@@ -128,7 +128,7 @@ def nearest_known(values: np.ndarray) -> np.ndarray:
     return np.array([values[known[np.argmin(np.abs(known - k))]] for k in range(len(values))])
 
 
-def speed_coverage(wanted: np.ndarray, fastest: float, slowest: float, reach=(0.85, 1.15)) -> dict[str, float]:
+def measure_speed_coverage(requested: np.ndarray, fastest: float, slowest: float, reach=(0.85, 1.15)) -> dict[str, float]:
     """Measure the shares of frames with a speed that the library cannot play within the warp limits.
 
     Args:
@@ -140,12 +140,12 @@ def speed_coverage(wanted: np.ndarray, fastest: float, slowest: float, reach=(0.
         above: share with wanted > fastest x 1.15; below: share with wanted < slowest x 0.85 and more than standing
         (0.5 m/s). NaN where the library's speed is not known.
     """
-    above = np.mean(wanted > fastest * reach[1]) if np.isfinite(fastest) else np.nan
-    below = np.mean((wanted < slowest * reach[0]) & (wanted > STANDING)) if np.isfinite(slowest) else np.nan
+    above = np.mean(requested > fastest * reach[1]) if np.isfinite(fastest) else np.nan
+    below = np.mean((requested < slowest * reach[0]) & (requested > STANDING_SPEED)) if np.isfinite(slowest) else np.nan
     return {"above": float(above), "below": float(below)}
 
 
-def jerk(positions: np.ndarray, fps: float) -> np.ndarray:
+def compute_jerk(positions: np.ndarray, fps: float) -> np.ndarray:
     """Compute the largest third difference of any joint.
 
     Args:
@@ -160,12 +160,12 @@ def jerk(positions: np.ndarray, fps: float) -> np.ndarray:
     return np.sqrt(np.max(np.sum(third**2, axis=-1), axis=-1)) * fps**3
 
 
-def windowed(values: np.ndarray) -> np.ndarray:
+def compute_window_maxima(values: np.ndarray) -> np.ndarray:
     """Compute the largest value within +-8 indices: (N,) -> (N,); windows end with the values."""
     return maximum_filter1d(values, _WIDTH, mode="nearest") if len(values) else values
 
 
-def uncut_windows(values: np.ndarray, speed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def collect_uncut_windows(values: np.ndarray, speed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Compute windowed maxima of an uncut clip where the whole window lies inside it, and the speed in their middle.
 
     Args:
@@ -177,10 +177,10 @@ def uncut_windows(values: np.ndarray, speed: np.ndarray) -> tuple[np.ndarray, np
     if len(values) < _WIDTH:
         return np.zeros(0), np.zeros(0)
     whole = slice(JERK_REACH, len(values) - JERK_REACH)
-    return windowed(values)[whole], speed[SEAM_TO_JERK:][whole]
+    return compute_window_maxima(values)[whole], speed[TRANSITION_TO_JERK:][whole]
 
 
-def real_p95(windows: np.ndarray, speed: np.ndarray, least: int = 30) -> np.ndarray:
+def compute_real_p95(windows: np.ndarray, speed: np.ndarray, least: int = 30) -> np.ndarray:
     """Compute the 95th percentile of uncut windows in each speed class.
 
     A class with fewer than `least` windows takes the nearest class that has them (runs above 4.5 m/s are rare).
@@ -192,12 +192,12 @@ def real_p95(windows: np.ndarray, speed: np.ndarray, least: int = 30) -> np.ndar
     Returns:
         (5,) m/s^3, NaN where no class has enough.
     """
-    classes = speed_class(speed)
+    classes = classify_speed(speed)
     values = [windows[classes == k] for k in range(5)]
-    return nearest_known(np.array([np.percentile(v, 95) if len(v) >= least else np.nan for v in values]))
+    return fill_from_nearest(np.array([np.percentile(v, 95) if len(v) >= least else np.nan for v in values]))
 
 
-def seam_ratios(values: np.ndarray, seams: np.ndarray, speed: np.ndarray, real: np.ndarray) -> np.ndarray:
+def compute_transition_ratios(values: np.ndarray, transitions: np.ndarray, speed: np.ndarray, real: np.ndarray) -> np.ndarray:
     """Compute windowed jerk at each transition over the real p95 at that speed.
 
     Args:
@@ -208,19 +208,19 @@ def seam_ratios(values: np.ndarray, seams: np.ndarray, speed: np.ndarray, real: 
     Returns:
         (S,).
     """
-    if not len(values) or not len(seams):
+    if not len(values) or not len(transitions):
         return np.zeros(0)
-    middle = np.clip(seams - SEAM_TO_JERK, 0, len(values) - 1)
-    return windowed(values)[middle] / real[speed_class(speed[seams])]
+    middle = np.clip(transitions - TRANSITION_TO_JERK, 0, len(values) - 1)
+    return compute_window_maxima(values)[middle] / real[classify_speed(speed[transitions])]
 
 
-def jerk_ratios(values: np.ndarray, speed: np.ndarray, real: np.ndarray) -> np.ndarray:
+def compute_jerk_ratios(values: np.ndarray, speed: np.ndarray, real: np.ndarray) -> np.ndarray:
     """Compute windowed jerk over the real p95 at that speed, in the middle of every window: (T-3,)."""
-    pace = speed[SEAM_TO_JERK : SEAM_TO_JERK + len(values)]
-    return windowed(values) / real[speed_class(pace)]
+    pace = speed[TRANSITION_TO_JERK : TRANSITION_TO_JERK + len(values)]
+    return compute_window_maxima(values) / real[classify_speed(pace)]
 
 
-def rest_ratios(values: np.ndarray, seams: np.ndarray, speed: np.ndarray, real: np.ndarray) -> np.ndarray:
+def compute_rest_ratios(values: np.ndarray, transitions: np.ndarray, speed: np.ndarray, real: np.ndarray) -> np.ndarray:
     """Compute the same ratio in the middle of every window that touches no transition's window: (M,).
 
     A locked knee can pop anywhere.
@@ -228,18 +228,18 @@ def rest_ratios(values: np.ndarray, seams: np.ndarray, speed: np.ndarray, real: 
     if not len(values):
         return np.zeros(0)
     free = np.ones(len(values), dtype=bool)
-    for seam in seams - SEAM_TO_JERK:
-        free[max(seam - 2 * JERK_REACH, 0) : seam + 2 * JERK_REACH + 1] = False
-    return jerk_ratios(values, speed, real)[free]
+    for transition in transitions - TRANSITION_TO_JERK:
+        free[max(transition - 2 * JERK_REACH, 0) : transition + 2 * JERK_REACH + 1] = False
+    return compute_jerk_ratios(values, speed, real)[free]
 
 
-def foot_joints(skeleton: Skeleton) -> np.ndarray:
+def list_foot_joints(skeleton: Skeleton) -> np.ndarray:
     """Return joint indices (2, 2): side (left, right) x (heel, toe)."""
-    body = identify(skeleton)
+    body = identify_joints(skeleton)
     return np.array([[limb.foot, limb.toe_or_foot] for limb in (body.left, body.right)])
 
 
-def contact_speeds(feet: np.ndarray, contacts: np.ndarray, fps: float) -> np.ndarray:
+def measure_contact_speeds(feet: np.ndarray, contacts: np.ndarray, fps: float) -> np.ndarray:
     """Measure the level speed of each foot while it is in contact.
 
     Mean of heel and toe from one frame to the next, counted where both frames are in contact (Kimodo's skate on
@@ -256,15 +256,15 @@ def contact_speeds(feet: np.ndarray, contacts: np.ndarray, fps: float) -> np.nda
     return np.where(contacts[:-1] & contacts[1:], step, np.nan)
 
 
-def stances(contacts: np.ndarray) -> np.ndarray:
+def list_stances(contacts: np.ndarray) -> np.ndarray:
     """List the runs of at least two contact frames: (S, 3) int rows of first frame, frame after the last, side."""
     rows = []
     for side in range(contacts.shape[1]):
-        rows += [(start, stop, side) for start, stop in runs(contacts[:, side]) if stop - start >= 2]
+        rows += [(start, stop, side) for start, stop in find_runs(contacts[:, side]) if stop - start >= 2]
     return np.array(rows, dtype=int).reshape(-1, 3)
 
 
-def stance_travel(toes: np.ndarray, spans: np.ndarray) -> np.ndarray:
+def measure_stance_travel(toes: np.ndarray, spans: np.ndarray) -> np.ndarray:
     """Measure the largest level distance between two places of the planted toe within each stance.
 
     Args:
@@ -277,16 +277,16 @@ def stance_travel(toes: np.ndarray, spans: np.ndarray) -> np.ndarray:
     # positions along each direction; a last row of zeros, so that a stance may end at T for `reduceat`
     along = np.concatenate([toes[..., :2] @ _DIRECTIONS, np.zeros((1, 2, _DIRECTIONS.shape[1]))])
     for side in (0, 1):
-        mine = spans[:, 2] == side
-        if mine.any():
-            bounds = spans[mine, :2].ravel()
+        on_side = spans[:, 2] == side
+        if on_side.any():
+            bounds = spans[on_side, :2].ravel()
             # `reduceat` over (first, end) pairs: every second result is the stance itself
             widest = np.maximum.reduceat(along[:, side], bounds)[::2] - np.minimum.reduceat(along[:, side], bounds)[::2]
-            travel[mine] = widest.max(axis=1)
+            travel[on_side] = widest.max(axis=1)
     return travel
 
 
-def skating_steps(toes: np.ndarray, floor: float, fps: float) -> np.ndarray:
+def find_skating_steps(toes: np.ndarray, floor: float, fps: float) -> np.ndarray:
     """Find GMD's skating frames, of either foot.
 
     Toe lower than 5 cm above the floor at t and t+1, faster than 0.5 m/s, and its 0.25 s mean speed too.
@@ -306,7 +306,7 @@ def skating_steps(toes: np.ndarray, floor: float, fps: float) -> np.ndarray:
     return ((low[:-1] & low[1:]) & (speed > GMD_SPEED) & (mean > GMD_SPEED)).any(axis=1)
 
 
-def support_height(feet: np.ndarray, contacts: np.ndarray, heel_rest: float) -> np.ndarray:
+def measure_support_height(feet: np.ndarray, contacts: np.ndarray, heel_rest: float) -> np.ndarray:
     """Measure the height above the ground of each planted foot's lower part.
 
     A foot on its heel counts by the heel, a foot on its toes by the toe, so neither rolling raises the figure.
@@ -322,7 +322,7 @@ def support_height(feet: np.ndarray, contacts: np.ndarray, heel_rest: float) -> 
     return np.where(contacts, lower, np.nan)
 
 
-def tip_height(skeleton: Skeleton, positions: np.ndarray, rotations: np.ndarray) -> np.ndarray:
+def measure_tip_height(skeleton: Skeleton, positions: np.ndarray, rotations: np.ndarray) -> np.ndarray:
     """Measure the height of the lower foot's tip, the end site of its toe (of the foot where it has no toe).
 
     Where a skeleton has no toe joints the floor is known from the ankles alone, and only the tips show a boot that is
@@ -335,7 +335,7 @@ def tip_height(skeleton: Skeleton, positions: np.ndarray, rotations: np.ndarray)
     Returns:
         (T,) m, NaN without an end site.
     """
-    body, lowest = identify(skeleton), np.full(len(positions), np.nan)
+    body, lowest = identify_joints(skeleton), np.full(len(positions), np.nan)
     for parent, offset in zip(skeleton.end_parents, skeleton.end_offsets):
         if parent in (body.left.toe_or_foot, body.right.toe_or_foot) and np.any(offset):
             tip = positions[:, parent] + quaternion.rotate(rotations[:, parent], offset)
@@ -343,7 +343,7 @@ def tip_height(skeleton: Skeleton, positions: np.ndarray, rotations: np.ndarray)
     return lowest
 
 
-def heel_rest_height(feet: np.ndarray, contacts: np.ndarray) -> float:
+def measure_heel_rest(feet: np.ndarray, contacts: np.ndarray) -> float:
     """Measure the height of the heel joint on a flat foot: the 2nd percentile while both feet are in contact.
 
     Over all frames where they never are, as in a run.
@@ -359,7 +359,7 @@ def heel_rest_height(feet: np.ndarray, contacts: np.ndarray) -> float:
     return float(np.percentile(heights, 2)) if heights.size else np.nan
 
 
-def planted_shift(feet: np.ndarray, wanted: np.ndarray, contacts: np.ndarray) -> np.ndarray:
+def measure_planted_shift(feet: np.ndarray, placed: np.ndarray, contacts: np.ndarray) -> np.ndarray:
     """Measure how far planted feet are from where the placed clip had them.
 
     Mean distance of heel and toe joints, one value per planted foot and frame.
@@ -371,4 +371,4 @@ def planted_shift(feet: np.ndarray, wanted: np.ndarray, contacts: np.ndarray) ->
     Returns:
         (N,) m.
     """
-    return np.linalg.norm(feet - wanted, axis=-1).mean(axis=-1)[contacts]
+    return np.linalg.norm(feet - placed, axis=-1).mean(axis=-1)[contacts]

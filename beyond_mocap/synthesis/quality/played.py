@@ -16,20 +16,20 @@ from ...base.errors import InputError
 from ...library.landings import LANDING_FOLDER
 from ...library.library import Library
 from ...library.made import FPS as MADE_FPS
-from ...library.made import MADE_FOLDER
+from ...library.made import SYNTHETIC_FOLDER
 from ...motion import contacts as foot_contacts
-from ...motion.humanoid import Humanoid, identify
+from ...motion.humanoid import Humanoid, identify_joints
 from ...motion.motion import Motion, forward_kinematics
 from ...motion.track.ball_path import BallPath
 from ..take import KeyResult, Take
-from .movement import foot_joints
+from .movement import list_foot_joints
 
 LOOP_SECONDS = 4.0  # s within which a stretch shown again counts as replayed
 LOOP_REACH = 80.0 / 60.0  # s of a clip around a shown frame that count as shown
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Played:
+class Playback:
     """One player's take as evaluation sees it.
 
     Attributes:
@@ -66,7 +66,7 @@ class Played:
     @cached_property
     def body(self) -> Humanoid:
         """The meaning of the skeleton's joints."""
-        return identify(self.motion.skeleton)
+        return identify_joints(self.motion.skeleton)
 
     @cached_property
     def _kinematics(self) -> tuple[np.ndarray, np.ndarray]:
@@ -91,9 +91,9 @@ class Played:
     @property
     def feet(self) -> np.ndarray:
         """(T, 2, 2, 3) m, world positions: side, (heel, toe)."""
-        return self.positions[:, foot_joints(self.motion.skeleton)]
+        return self.positions[:, list_foot_joints(self.motion.skeleton)]
 
-    def stride(self, library: Library | None) -> np.ndarray:
+    def compute_stride(self, library: Library | None) -> np.ndarray:
         """Compute the source frames that pass per output frame at recorded speed.
 
         For clips whose own rate is not known, as without a library, this is their usual step.
@@ -106,14 +106,14 @@ class Played:
         known = {} if library is None else {clip.path: clip.motion.fps for clip in library.clips}
         rates = np.ones(len(self.clips) + 1)
         for index, path in enumerate(self.clips):
-            fps = MADE_FPS if path.startswith(MADE_FOLDER) else known.get(path.removeprefix(LANDING_FOLDER))
-            rates[index] = fps / self.motion.fps if fps else _usual_step(self.clip_frame, self.clip == index)
+            fps = MADE_FPS if path.startswith(SYNTHETIC_FOLDER) else known.get(path.removeprefix(LANDING_FOLDER))
+            rates[index] = fps / self.motion.fps if fps else _measure_usual_step(self.clip_frame, self.clip == index)
         return rates[self.clip]
 
 
-def played_from_take(take: Take) -> Played:
+def playback_from_take(take: Take) -> Playback:
     """Build the playback of a take in memory."""
-    return Played(
+    return Playback(
         motion=take.motion, start_time=take.start_time, clips=tuple(take.clips), clip=np.asarray(take.clip, dtype=int),
         clip_frame=np.asarray(take.clip_frame, dtype=float), mirrored=np.asarray(take.mirrored, dtype=bool),
         words=tuple(take.words), contacts=np.asarray(take.contacts, dtype=bool), ball=take.ball,
@@ -121,9 +121,9 @@ def played_from_take(take: Take) -> Played:
     )
 
 
-def played_from_tables(
+def playback_from_tables(
     motion: Motion, provenance=None, ball: BallPath | None = None, start_time: float = 0.0, where: str = "provenance"
-) -> Played:
+) -> Playback:
     """Build the playback of a motion read from a file, with its provenance and ball where they are known.
 
     Without provenance contacts are detected on the motion itself.
@@ -141,12 +141,12 @@ def played_from_tables(
     count = len(motion)
     if provenance is None:
         unknown, nowhere, plain = np.full(count, -1), np.full(count, np.nan), np.zeros(count, bool)
-        return Played(motion=motion, start_time=start_time, clips=(), clip=unknown, clip_frame=nowhere, mirrored=plain,
-                      words=None, contacts=foot_contacts.detect(motion), ball=ball)
+        return Playback(motion=motion, start_time=start_time, clips=(), clip=unknown, clip_frame=nowhere, mirrored=plain,
+                      words=None, contacts=foot_contacts.detect_contacts(motion), ball=ball)
     if len(provenance.clip) != count:
         raise InputError(where, f"{len(provenance.clip)} rows", f"one per frame of the motion, {count}")
     clips, index = np.unique(np.asarray(provenance.clip, dtype=str), return_inverse=True)
-    return Played(
+    return Playback(
         motion=motion, start_time=float(provenance.times[0]), clips=tuple(str(clip) for clip in clips),
         clip=index.reshape(-1), clip_frame=np.asarray(provenance.clip_frame, dtype=float),
         mirrored=np.asarray(provenance.mirrored, dtype=bool), words=tuple(map(tuple, provenance.words)),
@@ -168,9 +168,9 @@ def find_transitions(clip: np.ndarray, mirrored: np.ndarray, clip_frame: np.ndar
     Returns:
         (S,) frames.
     """
-    rate = played_rate(clip, mirrored, clip_frame, stride)
+    rate = compute_playback_rate(clip, mirrored, clip_frame, stride)
     known = (clip[1:] >= 0) | (clip[:-1] >= 0)
-    warp = np.maximum(_neighbours_median(rate), 0.25)
+    warp = np.maximum(_compute_neighbour_median(rate), 0.25)
     jump = (rate > 1.5 * warp) | (rate < 0.5 * warp)
     return np.flatnonzero(known & (np.isnan(rate) | jump)) + 1
 
@@ -182,7 +182,7 @@ def number_pieces(count: int, starts: np.ndarray) -> np.ndarray:
     return np.cumsum(flags)
 
 
-def played_rate(clip: np.ndarray, mirrored: np.ndarray, clip_frame: np.ndarray, stride: np.ndarray) -> np.ndarray:
+def compute_playback_rate(clip: np.ndarray, mirrored: np.ndarray, clip_frame: np.ndarray, stride: np.ndarray) -> np.ndarray:
     """Compute the playback rate (played / recorded speed) from each frame to the next.
 
     Returns:
@@ -193,9 +193,9 @@ def played_rate(clip: np.ndarray, mirrored: np.ndarray, clip_frame: np.ndarray, 
     return np.where(same, rate, np.nan)
 
 
-def warp_rates(clip: np.ndarray, mirrored: np.ndarray, clip_frame: np.ndarray, stride: np.ndarray) -> np.ndarray:
+def list_warp_rates(clip: np.ndarray, mirrored: np.ndarray, clip_frame: np.ndarray, stride: np.ndarray) -> np.ndarray:
     """Compute the playback rate of every step inside a piece: (N,)."""
-    rate = played_rate(clip, mirrored, clip_frame, stride)
+    rate = compute_playback_rate(clip, mirrored, clip_frame, stride)
     rate[find_transitions(clip, mirrored, clip_frame, stride) - 1] = np.nan
     return rate[np.isfinite(rate)]
 
@@ -227,14 +227,14 @@ def find_replayed(
     return out
 
 
-def _usual_step(clip_frame: np.ndarray, mine: np.ndarray) -> float:
+def _measure_usual_step(clip_frame: np.ndarray, of_clip: np.ndarray) -> float:
     """Return the median step forward of one clip's frames, 1 without any."""
-    steps = np.diff(clip_frame)[mine[1:] & mine[:-1]]
+    steps = np.diff(clip_frame)[of_clip[1:] & of_clip[:-1]]
     forward = steps[steps > 0]
     return float(np.median(forward)) if len(forward) else 1.0
 
 
-def _neighbours_median(rate: np.ndarray, reach: int = 4) -> np.ndarray:
+def _compute_neighbour_median(rate: np.ndarray, reach: int = 4) -> np.ndarray:
     """Compute the median of the finite rates up to `reach` steps away on either side, the step itself left out.
 
     1 where there are none.

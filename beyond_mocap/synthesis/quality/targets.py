@@ -39,7 +39,7 @@ class Target:
         score = flat.get(self.own)
         return self.least, None if score is None else float(score) + self.beyond
 
-    def text(self, flat: Mapping[str, object]) -> str:
+    def describe(self, flat: Mapping[str, object]) -> str:
         """Describe the target, such as "≤ 0.005"."""
         least, most = self.bounds(flat)
         if least is not None and most is not None:
@@ -49,7 +49,7 @@ class Target:
             return f"≤ {most:.4g}" + (f" (recordings{beyond})" if self.own else "")
         return "" if least is None else f"≥ {least:g}"
 
-    def met(self, value: float, flat: Mapping[str, object]) -> bool | None:
+    def is_met(self, value: float, flat: Mapping[str, object]) -> bool | None:
         """Return whether a value meets the target; None where the bound is not known."""
         least, most = self.bounds(flat)
         if least is None and most is None:
@@ -91,7 +91,7 @@ KEY_TARGETS = {
 }
 
 
-def target_of(name: str, fps: float) -> Target | None:
+def find_target(name: str, fps: float) -> Target | None:
     """Find the target of a figure.
 
     Args:

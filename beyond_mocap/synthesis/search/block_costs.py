@@ -8,7 +8,7 @@ import numpy as np
 
 from ...library.features import Frames
 
-Words = frozenset[str] | None
+Labels = frozenset[str] | None
 
 
 class AnnotationCost:
@@ -35,7 +35,7 @@ class AnnotationCost:
         self._sums: dict[frozenset[str], np.ndarray] = {}
         self._present = _running_sum(frames.words.sum(axis=1))
 
-    def of_blocks(self, start: np.ndarray, asked: Sequence[Words]) -> np.ndarray:
+    def compute_block_costs(self, start: np.ndarray, requested: Sequence[Labels]) -> np.ndarray:
         """Compute D of blocks.
 
         Args:
@@ -47,31 +47,31 @@ class AnnotationCost:
         """
         common = np.zeros(len(start))
         either = np.zeros(len(start))
-        for low, high, words in _runs(asked):
+        for low, high, words in _label_runs(requested):
             if words is None:
                 continue
-            a, b = self._clamped(start + low), self._clamped(start + high)
+            a, b = self._limit_frame(start + low), self._limit_frame(start + high)
             # differences of running sums: count over the library frames a .. b of each block
-            shared = self._shared(words)
+            shared = self._shared_count(words)
             inside = shared[b] - shared[a]
             common += inside
             either += (self._present[b] - self._present[a]) + len(words) * (high - low) - inside
         # both - only one = both - (either - both)
         return np.where(either > 0, -(2.0 * common - either) / np.maximum(either, 1.0), 0.0)
 
-    def showing(self, words: frozenset[str]) -> np.ndarray:
+    def find_frames_with(self, words: frozenset[str]) -> np.ndarray:
         """Return (N,) bool: frames that carry any of the labels."""
-        return np.diff(self._shared(words)) > 0
+        return np.diff(self._shared_count(words)) > 0
 
-    def missing_share(self, words: frozenset[str]) -> np.ndarray:
+    def compute_missing_share(self, words: frozenset[str]) -> np.ndarray:
         """Compute the share (N,) of the requested labels that each frame lacks."""
-        shared = np.diff(self._shared(words))
+        shared = np.diff(self._shared_count(words))
         return 1.0 - shared / max(len(words), 1)
 
-    def _clamped(self, frame: np.ndarray) -> np.ndarray:
+    def _limit_frame(self, frame: np.ndarray) -> np.ndarray:
         return np.clip(frame, 0, len(self.frames))
 
-    def _shared(self, words: frozenset[str]) -> np.ndarray:
+    def _shared_count(self, words: frozenset[str]) -> np.ndarray:
         """Return the running count (N + 1,) of requested labels that frames carry, cached per set of labels."""
         if words not in self._sums:
             columns = [self._column[word] for word in sorted(words) if word in self._column]
@@ -84,13 +84,13 @@ def _running_sum(values: np.ndarray) -> np.ndarray:
     return np.concatenate([[0], np.cumsum(values, dtype=np.int64)])
 
 
-def _runs(asked: Sequence[Words]) -> list[tuple[int, int, Words]]:
+def _label_runs(requested: Sequence[Labels]) -> list[tuple[int, int, Labels]]:
     """List (first, end, labels) of the stretches with the same requested labels."""
-    edges = [0] + [i for i in range(1, len(asked)) if asked[i] != asked[i - 1]] + [len(asked)]
-    return [(low, high, asked[low]) for low, high in zip(edges, edges[1:])]
+    edges = [0] + [i for i in range(1, len(requested)) if requested[i] != requested[i - 1]] + [len(requested)]
+    return [(low, high, requested[low]) for low, high in zip(edges, edges[1:])]
 
 
-def windows(frames: Frames, clip: np.ndarray, centre: np.ndarray, size: int) -> np.ndarray:
+def collect_windows(frames: Frames, clip: np.ndarray, centre: np.ndarray, size: int) -> np.ndarray:
     """Collect augmented features of windows around frames.
 
     A window that would leave its clip is moved inwards (fig. 7b); a clip shorter than the window repeats its last
@@ -113,14 +113,14 @@ def windows(frames: Frames, clip: np.ndarray, centre: np.ndarray, size: int) -> 
     return frames.features[index].reshape(len(index), -1)
 
 
-def distances(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+def compute_distances(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Compute the Euclidean distances (A, B) between rows (A, K) and (B, K)."""
     # |a - b|^2 = |a|^2 + |b|^2 - 2 a b, as one matrix product
     square = (a * a).sum(1)[:, None] + (b * b).sum(1)[None, :] - 2.0 * (a @ b.T)
     return np.sqrt(np.maximum(square, 0.0))
 
 
-def typical_distance(frames: Frames) -> float:
+def measure_typical_distance(frames: Frames) -> float:
     """Compute the root mean square distance of two frames drawn at random.
 
     This length makes continuity costs about one for unrelated poses, in any library. Eq. 13 weighs continuity against

@@ -22,24 +22,24 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...base.errors import Cancelled
+from ...base.errors import UserCancelledError
 from ...library.clusters import BLOCK_LENGTHS
 from ...library.keys import Key
 from ...library.library import Library
-from .block_costs import AnnotationCost, distances, typical_distance, windows
-from .preferences import weak_foot_cost
-from .wanted import Wanted, needed, pool_frame
+from .block_costs import AnnotationCost, compute_distances, measure_typical_distance, collect_windows
+from .preferences import compute_weak_foot_cost
+from .wanted import SearchRequest, compute_needed_frames, library_frame
 
-MOST_CANDIDATES = 600  # blocks per slot, besides those next to key moments
-AVOIDED = 1000.0
+MAX_CANDIDATES = 600  # blocks per slot, besides those next to key moments
+AVOIDED_COST = 1000.0
 """Cost of a block that shows an avoided label: more than a whole track of anything else."""
-FINEST = BLOCK_LENGTHS[-1]  # frames
+FINEST_LENGTH = BLOCK_LENGTHS[-1]  # frames
 
 
 # The sequence through slots with the lowest cost, by dynamic programming (Faustino eq. 14, 15), on costs alone.
 
 
-def cheapest_path(
+def find_cheapest_path(
     unary: Sequence[np.ndarray], transition: Callable[[int], np.ndarray]
 ) -> tuple[np.ndarray, float]:
     """Choose one candidate per slot so that the sum of unary and transition costs is lowest.
@@ -70,7 +70,7 @@ def cheapest_path(
 
 
 @dataclass(frozen=True, eq=False)
-class Candidates:
+class BlockCandidates:
     """Candidate blocks of a slot.
 
     Attributes:
@@ -84,9 +84,9 @@ class Candidates:
     def __len__(self) -> int:
         return len(self.clip)
 
-    def at(self, choice) -> "Candidates":
+    def select(self, choice) -> "BlockCandidates":
         """Select candidates by index."""
-        return Candidates(self.clip[choice], self.start[choice])
+        return BlockCandidates(self.clip[choice], self.start[choice])
 
 
 class BlockSearch:
@@ -103,7 +103,7 @@ class BlockSearch:
     def __init__(
         self,
         library: Library,
-        wanted: Wanted,
+        request: SearchRequest,
         alpha: float,
         progress: Callable[[float, str], None] | None = None,
         cancelled: Callable[[], bool] | None = None,
@@ -117,15 +117,15 @@ class BlockSearch:
             progress: called as progress(fraction, text).
             cancelled: returns whether to stop.
         """
-        self.library, self.wanted, self.alpha = library, wanted, alpha
+        self.library, self.request, self.alpha = library, request, alpha
         self.frames = library.frames
         self.annotation = AnnotationCost(library.frames)
-        self.scale = typical_distance(library.frames)
+        self.scale = measure_typical_distance(library.frames)
         self._report = progress or (lambda fraction, text: None)
         self._cancelled = cancelled or (lambda: False)
         self.key_in_slot: dict[int, tuple[int, Key]] = {}
 
-    def run(self) -> Candidates:
+    def run(self) -> BlockCandidates:
         """Run the search.
 
         Returns:
@@ -136,59 +136,59 @@ class BlockSearch:
         coarse = self._choose_clusters()
         blocks = self._choose_blocks(BLOCK_LENGTHS[0], coarse)
         for number, length in enumerate(BLOCK_LENGTHS[1:]):
-            self._step(0.4 + 0.3 * number, f"Blocks of {length} frames")
-            blocks = self._choose_blocks(length, self._halves(blocks, length))
+            self._report_step(0.4 + 0.3 * number, f"Blocks of {length} frames")
+            blocks = self._choose_blocks(length, self._split_blocks(blocks, length))
         return blocks
 
-    def slots(self, length: int) -> int:
+    def count_slots(self, length: int) -> int:
         """Return the number of slots of `length` frames; all levels cover a whole number of the longest."""
         # -(-n // m): division rounded up
-        return -(-len(self.wanted) // BLOCK_LENGTHS[0]) * (BLOCK_LENGTHS[0] // length)
+        return -(-len(self.request) // BLOCK_LENGTHS[0]) * (BLOCK_LENGTHS[0] // length)
 
-    def asked_words(self, slot: int, length: int):
+    def list_requested_labels(self, slot: int, length: int):
         """Return the requested labels of a slot's frames, None beyond the end."""
-        words = self.wanted.asked[slot * length : (slot + 1) * length]
+        words = self.request.requested_labels[slot * length : (slot + 1) * length]
         return [*words, *[None] * (length - len(words))]
 
-    def keys_at(self, slot: int, length: int) -> list[tuple[int, int]]:
+    def find_keys(self, slot: int, length: int) -> list[tuple[int, int]]:
         """List (number, offset in the slot) of the first key moment in a slot that a clip can serve."""
         low = slot * length
         found = [
             (number, int(round(key.frame)) - low)
-            for number, key in enumerate(self.wanted.keys)
+            for number, key in enumerate(self.request.keys)
             if key.choices and low <= int(round(key.frame)) < low + length
         ]
         return found[:1]
 
-    def _key_blocks(self, slot: int, length: int) -> tuple[Candidates, list[tuple[int, Key]]]:
+    def _key_blocks(self, slot: int, length: int) -> tuple[BlockCandidates, list[tuple[int, Key]]]:
         """Build the blocks that show a key moment of this slot at its frame, and which key each shows."""
         which, clip, start = [], [], []
-        for number, offset in self.keys_at(slot, length):
-            for choice in self.wanted.keys[number].choices:
+        for number, offset in self.find_keys(slot, length):
+            for choice in self.request.keys[number].choices:
                 which.append((number, choice))
                 clip.append(choice.clip)
-                start.append(int(round(pool_frame(self.library, choice))) - offset)
-        return Candidates(np.array(clip, int), np.array(start, int)), which
+                start.append(int(round(library_frame(self.library, choice))) - offset)
+        return BlockCandidates(np.array(clip, int), np.array(start, int)), which
 
-    def _beside_keys(self, slot: int, length: int) -> Candidates:
+    def _blocks_beside_keys(self, slot: int, length: int) -> BlockCandidates:
         """Build the blocks that continue a serving clip into this slot, where its entry or exit needs it."""
         clip, start = [], []
         middle = (slot + 0.5) * length
-        for key in self.wanted.keys:
+        for key in self.request.keys:
             for choice in key.choices:
-                entry, leave = needed(self.library, choice)
+                entry, leave = compute_needed_frames(self.library, choice)
                 if -entry - length / 2 < middle - key.frame < leave + length / 2:
                     clip.append(choice.clip)
-                    start.append(int(round(pool_frame(self.library, choice))) + slot * length - int(round(key.frame)))
-        return self._inside(Candidates(np.array(clip, int), np.array(start, int)), length)
+                    start.append(int(round(library_frame(self.library, choice))) + slot * length - int(round(key.frame)))
+        return self._select_inside(BlockCandidates(np.array(clip, int), np.array(start, int)), length)
 
-    def _inside(self, blocks: Candidates, length: int) -> Candidates:
+    def _select_inside(self, blocks: BlockCandidates, length: int) -> BlockCandidates:
         """Select those that lie wholly within their clip."""
         first = self.frames.first[blocks.clip]
         fits = (blocks.start >= first) & (blocks.start + length <= first + self.frames.count[blocks.clip])
-        return blocks.at(fits)
+        return blocks.select(fits)
 
-    def _choose_clusters(self) -> list[Candidates]:
+    def _choose_clusters(self) -> list[BlockCandidates]:
         """Choose one cluster per slot of 32 frames by the same costs, and return its members as candidates.
 
         Source: Faustino 2024: "DP is actually performed twice".
@@ -196,64 +196,64 @@ class BlockSearch:
         length = BLOCK_LENGTHS[0]
         clusters = self.library.clusters[length]
         count = len(clusters.medoid)
-        usable = self.wanted.allowed[self.frames.clip[clusters.start]] if count else np.zeros(0, bool)
+        usable = self.request.allowed[self.frames.clip[clusters.start]] if count else np.zeros(0, bool)
         if not np.any(usable):
-            return [self._anything() for _ in range(self.slots(length))]
+            return [self._clip_starts() for _ in range(self.count_slots(length))]
         size = length // 2
         medoid = clusters.start[clusters.medoid]
         clip = self.frames.clip[medoid]
         # the end of each cluster's medoid block against the start of every other one
-        ends = windows(self.frames, clip, medoid + length - size + size // 2, size)
-        starts = windows(self.frames, clip, medoid + size // 2, size)
-        between = (1.0 - self.alpha) * distances(ends, starts) / (self.scale * np.sqrt(size))
+        ends = collect_windows(self.frames, clip, medoid + length - size + size // 2, size)
+        starts = collect_windows(self.frames, clip, medoid + size // 2, size)
+        between = (1.0 - self.alpha) * compute_distances(ends, starts) / (self.scale * np.sqrt(size))
         unary = []
-        for slot in range(self.slots(length)):
-            self._step(0.3 * slot / self.slots(length), "Clusters")
-            unary.append(self._cluster_costs(clusters, usable, slot))
-        choice, _ = cheapest_path(unary, lambda slot: between)
-        return [self._members(clusters, usable, label) for label in choice]
+        for slot in range(self.count_slots(length)):
+            self._report_step(0.3 * slot / self.count_slots(length), "Clusters")
+            unary.append(self._compute_cluster_costs(clusters, usable, slot))
+        choice, _ = find_cheapest_path(unary, lambda slot: between)
+        return [self._cluster_members(clusters, usable, label) for label in choice]
 
-    def _cluster_costs(self, clusters, usable: np.ndarray, slot: int) -> np.ndarray:
+    def _compute_cluster_costs(self, clusters, usable: np.ndarray, slot: int) -> np.ndarray:
         """Compute alpha D of each cluster, a mean over its blocks (eq. 19); a key moment forbids others."""
         count = len(clusters.medoid)
-        cost = self.annotation.of_blocks(clusters.start, self.asked_words(slot, clusters.length))
+        cost = self.annotation.compute_block_costs(clusters.start, self.list_requested_labels(slot, clusters.length))
         blocks, which = self._key_blocks(slot, clusters.length)
-        cost = cost + self._off_style(clusters.start)
+        cost = cost + self._compute_style_cost(clusters.start)
         # leave out blocks with avoided labels, unless none would remain or a key moment decides
         fine = usable & ~self._shows_avoided(clusters.start, slot, clusters.length)
         usable = fine if fine.any() and not len(blocks) else usable
         members = np.bincount(clusters.label[usable], minlength=count)
         total = np.bincount(clusters.label[usable], cost[usable], minlength=count)
         out = np.where(members > 0, self.alpha * total / np.maximum(members, 1), np.inf)
-        weak = np.concatenate([np.zeros(0), *(self._weak_foot(*served) for served in which)])
+        weak = np.concatenate([np.zeros(0), *(self._compute_foot_cost(*served) for served in which)])
         # clusters of the blocks that serve the key moment with the preferred foot
         labels = {clusters.label_at(start) for start in blocks.start[weak == weak.min(initial=np.inf)]} - {-1}
         if labels:
             out[[label for label in range(count) if label not in labels]] = np.inf
         return out
 
-    def _members(self, clusters, usable: np.ndarray, label: int) -> Candidates:
+    def _cluster_members(self, clusters, usable: np.ndarray, label: int) -> BlockCandidates:
         """Select the usable blocks of a cluster."""
         start = clusters.start[usable & (clusters.label == label)]
-        return Candidates(self.frames.clip[start], start)
+        return BlockCandidates(self.frames.clip[start], start)
 
-    def _anything(self) -> Candidates:
+    def _clip_starts(self) -> BlockCandidates:
         """Build candidates where all clips are shorter than the longest block: the start of every usable one."""
-        clip = np.flatnonzero(self.wanted.allowed)
-        return Candidates(clip, self.frames.first[clip])
+        clip = np.flatnonzero(self.request.allowed)
+        return BlockCandidates(clip, self.frames.first[clip])
 
-    def _halves(self, blocks: Candidates, length: int) -> list[Candidates]:
+    def _split_blocks(self, blocks: BlockCandidates, length: int) -> list[BlockCandidates]:
         """Collect for each half of each block the blocks of the cluster that it belongs to, and the half itself."""
         clusters = self.library.clusters[length]
-        usable = self.wanted.allowed[self.frames.clip[clusters.start]]
+        usable = self.request.allowed[self.frames.clip[clusters.start]]
         out = []
         for clip, start in zip(blocks.clip, blocks.start):
             for half in (start, start + length):
-                members = self._members(clusters, usable, clusters.label_at(half))
-                out.append(Candidates(np.append(members.clip, clip), np.append(members.start, half)))
+                members = self._cluster_members(clusters, usable, clusters.label_at(half))
+                out.append(BlockCandidates(np.append(members.clip, clip), np.append(members.start, half)))
         return out
 
-    def _choose_blocks(self, length: int, offered: list[Candidates]) -> Candidates:
+    def _choose_blocks(self, length: int, candidate_lists: list[BlockCandidates]) -> BlockCandidates:
         """Choose one block per slot by dynamic programming.
 
         Args:
@@ -261,62 +261,62 @@ class BlockSearch:
             candidate_lists: candidates of each slot.
         """
         slots, unary, keys = [], [], []
-        for slot, candidates in enumerate(offered):
-            self._step(None, "")
+        for slot, candidates in enumerate(candidate_lists):
+            self._report_step(None, "")
             blocks, which = self._key_blocks(slot, length)
             if not len(blocks):
-                blocks, which = self._thinned(slot, length, candidates), []
+                blocks, which = self._thin_candidates(slot, length, candidates), []
             slots.append(blocks)
             keys.append(which)
-            cost = self.alpha * self.annotation.of_blocks(blocks.start, self.asked_words(slot, length))
-            cost += self.alpha * self._off_style(blocks.start)
+            cost = self.alpha * self.annotation.compute_block_costs(blocks.start, self.list_requested_labels(slot, length))
+            cost += self.alpha * self._compute_style_cost(blocks.start)
             if which:
-                cost += np.concatenate([self._weak_foot(*served) for served in which])
-            unary.append(cost + AVOIDED * self._shows_avoided(blocks.start, slot, length))
-        ends, starts = zip(*(self._ends(blocks, length) for blocks in slots))
+                cost += np.concatenate([self._compute_foot_cost(*served) for served in which])
+            unary.append(cost + AVOIDED_COST * self._shows_avoided(blocks.start, slot, length))
+        ends, starts = zip(*(self._end_windows(blocks, length) for blocks in slots))
         weight = (1.0 - self.alpha) / (self.scale * np.sqrt(length // 2))
-        choice, _ = cheapest_path(unary, lambda slot: weight * distances(ends[slot], starts[slot + 1]))
+        choice, _ = find_cheapest_path(unary, lambda slot: weight * compute_distances(ends[slot], starts[slot + 1]))
         self.key_in_slot = {slot: keys[slot][c] for slot, c in enumerate(choice) if keys[slot]}
-        picked = [blocks.at([c]) for blocks, c in zip(slots, choice)]
-        return Candidates(np.concatenate([p.clip for p in picked]), np.concatenate([p.start for p in picked]))
+        picked = [blocks.select([c]) for blocks, c in zip(slots, choice)]
+        return BlockCandidates(np.concatenate([p.clip for p in picked]), np.concatenate([p.start for p in picked]))
 
-    def _thinned(self, slot: int, length: int, offered: Candidates) -> Candidates:
+    def _thin_candidates(self, slot: int, length: int, candidates: BlockCandidates) -> BlockCandidates:
         """Select at most MAX_CANDIDATES blocks, those with the best labels first, plus the ones beside key moments."""
-        if len(offered) > MOST_CANDIDATES:
-            cost = self.annotation.of_blocks(offered.start, self.asked_words(slot, length))
-            cost += AVOIDED * self._shows_avoided(offered.start, slot, length) + self._off_style(offered.start)
-            offered = offered.at(np.sort(np.argsort(cost, kind="stable")[:MOST_CANDIDATES]))
-        beside = self._beside_keys(slot, length)
-        return Candidates(np.append(offered.clip, beside.clip), np.append(offered.start, beside.start))
+        if len(candidates) > MAX_CANDIDATES:
+            cost = self.annotation.compute_block_costs(candidates.start, self.list_requested_labels(slot, length))
+            cost += AVOIDED_COST * self._shows_avoided(candidates.start, slot, length) + self._compute_style_cost(candidates.start)
+            candidates = candidates.select(np.sort(np.argsort(cost, kind="stable")[:MAX_CANDIDATES]))
+        beside = self._blocks_beside_keys(slot, length)
+        return BlockCandidates(np.append(candidates.clip, beside.clip), np.append(candidates.start, beside.start))
 
-    def _off_style(self, start: np.ndarray) -> np.ndarray:
+    def _compute_style_cost(self, start: np.ndarray) -> np.ndarray:
         """Compute the cost (M,) of blocks from frames `start` (M,) on that are not of the requested style."""
-        off = self.wanted.off_style
+        off = self.request.style_cost
         return np.zeros(len(start)) if off is None else off[np.clip(start, 0, len(off) - 1)].astype(float)
 
-    def _weak_foot(self, number: int, key: Key) -> np.ndarray:
+    def _compute_foot_cost(self, number: int, key: Key) -> np.ndarray:
         """Compute the cost (1,) of serving a key moment by `key` with the weak foot."""
-        return weak_foot_cost(self.wanted.keys[number].asked.words, (key,), self.wanted.weak_foot)
+        return compute_weak_foot_cost(self.request.keys[number].requested.words, (key,), self.request.weak_foot)
 
     def _shows_avoided(self, start: np.ndarray, slot: int, length: int) -> np.ndarray:
         """Return (M,) bool: whether blocks from frames `start` (M,) on show a label that the slot avoids."""
-        avoid = self.wanted.avoided_in(slot * length, (slot + 1) * length)
+        avoid = self.request.list_avoided(slot * length, (slot + 1) * length)
         if not avoid:
             return np.zeros(len(start), bool)
         # running count: the block shows one if the count grows between its ends
-        shown = np.append(0, np.cumsum(self.annotation.showing(avoid)))
+        running_count = np.append(0, np.cumsum(self.annotation.find_frames_with(avoid)))
         low, high = np.clip(start, 0, len(self.frames)), np.clip(start + length, 0, len(self.frames))
-        return shown[high] > shown[low]
+        return running_count[high] > running_count[low]
 
-    def _ends(self, blocks: Candidates, length: int) -> tuple[np.ndarray, np.ndarray]:
+    def _end_windows(self, blocks: BlockCandidates, length: int) -> tuple[np.ndarray, np.ndarray]:
         """Collect the windows around the frame after each block's last one and around its first (eq. 17)."""
         size = length // 2
-        after = windows(self.frames, blocks.clip, blocks.start + length, size)
-        return after, windows(self.frames, blocks.clip, blocks.start, size)
+        after = collect_windows(self.frames, blocks.clip, blocks.start + length, size)
+        return after, collect_windows(self.frames, blocks.clip, blocks.start, size)
 
-    def _step(self, fraction: float | None, text: str) -> None:
+    def _report_step(self, fraction: float | None, text: str) -> None:
         """Report progress, and raise Cancelled if requested."""
         if self._cancelled():
-            raise Cancelled("synthesis: cancelled")
+            raise UserCancelledError("synthesis: cancelled")
         if fraction is not None:
             self._report(fraction, text)

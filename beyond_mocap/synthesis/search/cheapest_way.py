@@ -15,7 +15,7 @@ _SAME = 0.05  # library frames: places closer than this are the same, apart from
 
 
 @dataclass(frozen=True, eq=False)
-class Offered:
+class SlotCandidates:
     """K candidates of a slot.
 
     Attributes:
@@ -32,12 +32,12 @@ class Offered:
     cost: np.ndarray
     piece: np.ndarray
 
-    def only(self, which: np.ndarray) -> "Offered":
+    def select(self, which: np.ndarray) -> "SlotCandidates":
         """Select candidates by index."""
-        return Offered(*(getattr(self, field.name)[which] for field in fields(self)))
+        return SlotCandidates(*(getattr(self, field.name)[which] for field in fields(self)))
 
 
-class Ways:
+class BeamTransitions:
     """All transitions from B states to the candidates of the next slot.
 
     A transition costs a cut, unless the clip shows that frame next anyway, and the change of playback rate. Costs are
@@ -59,13 +59,13 @@ class Ways:
         self.base = float(cost.min())
         self.above = (cost - self.base).astype(np.float32)
 
-    def every(self, to: Offered) -> np.ndarray:
+    def compute_all(self, to: SlotCandidates) -> np.ndarray:
         """Compute the cost (B, K) of each transition, including what the candidate shows."""
-        least = self._least(to)
+        least = self._compute_lower_bounds(to)
         pairs = np.arange(least.size)
-        return self.base + self._whole(to, least, pairs).reshape(least.shape).T.astype(float)
+        return self.base + self._compute_full_costs(to, least, pairs).reshape(least.shape).T.astype(float)
 
-    def cheapest(self, to: Offered, known: np.ndarray, most: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def find_cheapest(self, to: SlotCandidates, known: np.ndarray, kept_count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Find the cheapest transition to each candidate that may be kept.
 
         Of candidates that begin no piece, those are left out that cannot be among the `kept_count` cheapest of them and
@@ -78,46 +78,46 @@ class Ways:
         Returns:
             Numbers of the candidates (k,), costs (k,), and the states (k,) before them.
         """
-        most_above = np.partition(known, most - 1)[most - 1] - self.base if len(known) >= most else np.inf
+        limit = np.partition(known, kept_count - 1)[kept_count - 1] - self.base if len(known) >= kept_count else np.inf
         # drop candidates whose own cost already exceeds the limit set by `known`
-        near = np.flatnonzero((to.piece >= 0) | (to.cost <= most_above))
-        to = to.only(near)
-        least = self._least(to)
+        near = np.flatnonzero((to.piece >= 0) | (to.cost <= limit))
+        to = to.select(near)
+        least = self._compute_lower_bounds(to)
         count = least.shape[1]
         # bound[k]: full cost of the pair with the lowest lower bound, so an upper bound of the candidate's cost
         first = np.arange(len(least)) * count + np.argmin(least, axis=1)
-        bound = self._whole(to, least, first)
+        bound = self._compute_full_costs(to, least, first)
         free = to.piece < 0
         # no free candidate above the `kept_count`-th best of all upper bounds can be kept
         rivals = np.concatenate([bound[free], known - self.base])
-        if len(rivals) > most:
-            bound[free] = np.minimum(bound[free], np.partition(rivals, most - 1)[most - 1])
+        if len(rivals) > kept_count:
+            bound[free] = np.minimum(bound[free], np.partition(rivals, kept_count - 1)[kept_count - 1])
         # only pairs whose lower bound is within the upper bound are evaluated in full; flat index = candidate * B +
         # state
         pairs = np.flatnonzero(least <= bound[:, None])
-        offer = pairs // count
-        cost = self._whole(to, least, pairs)
+        candidate = pairs // count
+        cost = self._compute_full_costs(to, least, pairs)
         # `pairs` is sorted by candidate, so each candidate is one run
-        begins = np.flatnonzero(np.diff(offer, prepend=-1))
-        at = _cheapest_of_each(cost, begins)
-        at = at[cost[at] <= bound[offer[at]]]
-        return near[offer[at]], self.base + cost[at].astype(float), pairs[at] % count
+        begins = np.flatnonzero(np.diff(candidate, prepend=-1))
+        at = _find_cheapest_of_runs(cost, begins)
+        at = at[cost[at] <= bound[candidate[at]]]
+        return near[candidate[at]], self.base + cost[at].astype(float), pairs[at] % count
 
-    def _least(self, to: Offered) -> np.ndarray:
+    def _compute_lower_bounds(self, to: SlotCandidates) -> np.ndarray:
         """Compute the lower bounds (K, B) float32, above the base, of all transitions."""
         costs = self.costs
-        end, start = costs.inside(self.end), costs.inside(to.start)
-        least = costs.apart(start, end)
-        leave, enter = costs.left_and_entered(end, start)
+        end, start = costs.round_frame(self.end), costs.round_frame(to.start)
+        lower_bound = costs.apart(start, end)
+        leave, enter = costs.compute_cut_ends(end, start)
         cost = to.cost.astype(np.float32)
-        least += (enter + cost)[:, None]
-        least += leave + self.above
+        lower_bound += (enter + cost)[:, None]
+        lower_bound += leave + self.above
         # without a cut nothing but the costs of state and candidate remains
-        offer, state = self._meeting(to)
-        least[offer, state] = self.above[state] + cost[offer]
-        return least
+        candidate, state = self._find_uncut_pairs(to)
+        lower_bound[candidate, state] = self.above[state] + cost[candidate]
+        return lower_bound
 
-    def _whole(self, to: Offered, least: np.ndarray, pairs: np.ndarray) -> np.ndarray:
+    def _compute_full_costs(self, to: SlotCandidates, lower_bound: np.ndarray, pairs: np.ndarray) -> np.ndarray:
         """Compute the full costs of some pairs.
 
         Args:
@@ -128,39 +128,39 @@ class Ways:
             (P,) float32, above the base.
         """
         costs, weights = self.costs, self.costs.weights
-        offer, state = np.divmod(pairs, least.shape[1])
-        start, end = to.start[offer], self.end[state]
-        frame = costs.inside(start)
-        cut = np.float32(weights.feet) * costs.feet_apart(costs.inside(end), frame)
-        cut += np.float32(weights.replay) * self.seen[state, costs.offer.bucket[frame]]
-        cut[_same(start, end) & (to.clip[offer] == self.clip[state])] = 0.0
-        rate = np.float32(weights.rate_change) * np.abs(to.rate.astype(np.float32)[offer] - self.rate[state])
-        return least.ravel()[pairs] + cut + rate
+        candidate, state = np.divmod(pairs, lower_bound.shape[1])
+        start, end = to.start[candidate], self.end[state]
+        frame = costs.round_frame(start)
+        cut = np.float32(weights.feet) * costs.measure_foot_jump(costs.round_frame(end), frame)
+        cut += np.float32(weights.replay) * self.seen[state, costs.index.bucket[frame]]
+        cut[_is_same_frame(start, end) & (to.clip[candidate] == self.clip[state])] = 0.0
+        rate = np.float32(weights.rate_change) * np.abs(to.rate.astype(np.float32)[candidate] - self.rate[state])
+        return lower_bound.ravel()[pairs] + cut + rate
 
-    def _meeting(self, to: Offered) -> tuple[np.ndarray, np.ndarray]:
+    def _find_uncut_pairs(self, to: SlotCandidates) -> tuple[np.ndarray, np.ndarray]:
         """Find all pairs that continue without a cut.
 
         Returns:
             Candidates (M,) and states (M,).
         """
         # states sorted by their end; for each candidate the range low .. high of ends within _SAME
-        order = np.argsort(self.end, kind="stable")
-        low, high = (np.searchsorted(self.end[order], to.start + off) for off in (-_SAME, _SAME))
-        offer = np.flatnonzero(high > low)
-        many = high[offer] - low[offer]
+        by_end = np.argsort(self.end, kind="stable")
+        low, high = (np.searchsorted(self.end[by_end], to.start + off) for off in (-_SAME, _SAME))
+        candidate = np.flatnonzero(high > low)
+        many = high[candidate] - low[candidate]
         # enumerate all ranges in one array: position in the run of repeats plus the run's own `low`
-        at = np.arange(many.sum()) - np.repeat(np.cumsum(many) - many - low[offer], many)
-        offer, state = np.repeat(offer, many), order[at]
-        meets = _same(to.start[offer], self.end[state]) & (to.clip[offer] == self.clip[state])
-        return offer[meets], state[meets]
+        at = np.arange(many.sum()) - np.repeat(np.cumsum(many) - many - low[candidate], many)
+        candidate, state = np.repeat(candidate, many), by_end[at]
+        meets = _is_same_frame(to.start[candidate], self.end[state]) & (to.clip[candidate] == self.clip[state])
+        return candidate[meets], state[meets]
 
 
-def _same(start: np.ndarray, end: np.ndarray) -> np.ndarray:
+def _is_same_frame(start: np.ndarray, end: np.ndarray) -> np.ndarray:
     """Return (P,) bool: whether library frames are the same, apart from rounding."""
     return np.abs(start - end) < _SAME
 
 
-def _cheapest_of_each(cost: np.ndarray, begins: np.ndarray) -> np.ndarray:
+def _find_cheapest_of_runs(cost: np.ndarray, begins: np.ndarray) -> np.ndarray:
     """Find the first cheapest entry of each run.
 
     Args:

@@ -9,20 +9,20 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...base.errors import TimedLine
+from ...base.errors import TimedMessage
 from ...library.keys import Key
 from ...library.library import Library
 from .edit_list import EditList
 from .offer import USUAL_STANCE
-from .wanted import Wanted, needed, pool_frame
+from .wanted import SearchRequest, compute_needed_frames, library_frame
 
-DRAGGED = 1.0
+DRAG_SPEED = 1.0
 """m/s between a clip with both feet on the ground and the track, above which the feet are dragged."""
 
-_TOLD = 4.0  # frames left out from which on it is reported
+_REPORTED_FRAMES = 4.0  # frames left out from which on it is reported
 
 
-def drags(library: Library, wanted: Wanted, at: float, key: Key, rate: float, low: int, high: int) -> bool:
+def drags_feet(library: Library, request: SearchRequest, at: float, key: Key, rate: float, low: int, high: int) -> bool:
     """Return whether a key's clip drags its feet for most of the frames low .. high.
 
     Both feet are in contact for longer than in a walk, and the track is faster or slower than the clip by DRAG_SPEED.
@@ -35,17 +35,17 @@ def drags(library: Library, wanted: Wanted, at: float, key: Key, rate: float, lo
         rate: playback rate.
         low, high: output frames.
     """
-    frames, out = library.frames, np.arange(max(low, 0), min(high, len(wanted)))
+    frames, out = library.frames, np.arange(max(low, 0), min(high, len(request)))
     first = frames.first[key.clip]
-    shown = np.round(pool_frame(library, key) + rate * (out - at)).astype(int)
-    shown = np.clip(shown, first, first + frames.count[key.clip] - 1)
-    apart = np.abs(wanted.track.speed[out] - rate * frames.speed[shown])
-    feet = (library.stance_seconds[shown] > USUAL_STANCE) & (apart > DRAGGED)
+    clip_frames = np.round(library_frame(library, key) + rate * (out - at)).astype(int)
+    clip_frames = np.clip(clip_frames, first, first + frames.count[key.clip] - 1)
+    apart = np.abs(request.track.speed[out] - rate * frames.speed[clip_frames])
+    feet = (library.stance_seconds[clip_frames] > USUAL_STANCE) & (apart > DRAG_SPEED)
     return 2 * np.count_nonzero(feet) > len(out)
 
 
-def undragged(
-    library: Library, wanted: Wanted, edges: np.ndarray, at: float, key: Key, rate: float, slots: tuple[int, int],
+def list_slot_ranges(
+    library: Library, request: SearchRequest, edges: np.ndarray, at: float, key: Key, rate: float, slots: tuple[int, int],
     around: float,
 ) -> list[tuple[int, int]]:  # fmt: skip
     """List the slot ranges that a key's clip may fill: the given one, and those without end slots that drag its feet.
@@ -64,18 +64,18 @@ def undragged(
     """
     first, end = slots
     a, b = first, end  # shrink from both ends, slot by slot
-    while at - edges[a + 1] >= around and drags(
-        library, wanted, at, key=key, rate=rate, low=edges[a], high=edges[a + 1],
+    while at - edges[a + 1] >= around and drags_feet(
+        library, request, at, key=key, rate=rate, low=edges[a], high=edges[a + 1],
     ):
         a += 1
-    while edges[b - 1] - at >= around and drags(
-        library, wanted, at, key=key, rate=rate, low=edges[b - 1], high=edges[b],
+    while edges[b - 1] - at >= around and drags_feet(
+        library, request, at, key=key, rate=rate, low=edges[b - 1], high=edges[b],
     ):
         b -= 1
     return list(dict.fromkeys([(first, end), (a, end), (first, b), (a, b)]))
 
 
-def left_out(library: Library, wanted: Wanted, edit: EditList) -> list[TimedLine]:
+def report_left_out(library: Library, request: SearchRequest, edit: EditList) -> list[TimedMessage]:
     """Report each recorded key moment whose clip is shown without a part of its entry or exit that drags its feet.
 
     Args:
@@ -83,27 +83,27 @@ def left_out(library: Library, wanted: Wanted, edit: EditList) -> list[TimedLine
         request: the request.
         edit: the edit list, at the library's rate.
     """
-    told = []
+    messages = []
     for placed in edit.keys:
         if placed.key.clip < len(library.clips):
-            told += _left_out_of(library, wanted, edit, placed.key, wanted.keys[placed.wanted])
-    return told
+            messages += _report_clip(library, request, edit, placed.key, request.keys[placed.number])
+    return messages
 
 
-def _left_out_of(library: Library, wanted: Wanted, edit: EditList, key: Key, asked) -> list[TimedLine]:
+def _report_clip(library: Library, request: SearchRequest, edit: EditList, key: Key, moment) -> list[TimedMessage]:
     """Report what one key moment's clip lacks, for its entry and its exit."""
-    at = int(np.clip(round(asked.frame), 0, len(edit) - 1))
+    at = int(np.clip(round(moment.frame), 0, len(edit) - 1))
     low, high = next(piece for piece in edit.pieces if piece[0] <= at < piece[1])
-    entry, leave = needed(library, key)
+    entry, leave = compute_needed_frames(library, key)
     rate = (edit.frame[high - 1] - edit.frame[low]) / max(high - 1 - low, 1)
     # the whole clip would run from whole[0] to whole[1]; it is shown from low to high
-    whole = round(asked.frame - entry / rate), round(asked.frame + leave / rate)
-    start, words = float(wanted.track.times[0]), " ".join(asked.asked.words)
-    told = []
+    whole = round(moment.frame - entry / rate), round(moment.frame + leave / rate)
+    start, words = float(request.track.times[0]), " ".join(moment.asked.words)
+    messages = []
     for name, first, end, inside in (("entry", whole[0], low, low > 0), ("exit", high, whole[1], high < len(edit))):
-        if inside and end - first >= _TOLD and drags(library, wanted, asked.frame, key=key, rate=rate, low=first,
+        if inside and end - first >= _REPORTED_FRAMES and drags_feet(library, request, moment.frame, key=key, rate=rate, low=first,
                                                      high=end):
             when = start + first / library.fps, start + end / library.fps
-            lacks = f"the {name} of the clip for '{words}' is left out: the clip stands still while the track moves"
-            told.append(TimedLine(f"{when[0]:.1f}-{when[1]:.1f} s: {lacks}", when))
-    return told
+            text = f"the {name} of the clip for '{words}' is left out: the clip stands still while the track moves"
+            messages.append(TimedMessage(f"{when[0]:.1f}-{when[1]:.1f} s: {text}", when))
+    return messages

@@ -18,7 +18,7 @@ class PlacedKey:
         key: the library's key moment.
     """
 
-    wanted: int
+    number: int
     key: Key
 
 
@@ -36,7 +36,7 @@ class EditList:
 
     clip: np.ndarray
     frame: np.ndarray
-    seams: np.ndarray
+    transitions: np.ndarray
     keys: tuple[PlacedKey, ...]
 
     def __len__(self) -> int:
@@ -45,11 +45,11 @@ class EditList:
     @property
     def pieces(self) -> list[tuple[int, int]]:
         """(first, end) frames of the uncut pieces."""
-        edges = [0, *self.seams.tolist(), len(self.clip)]
+        edges = [0, *self.transitions.tolist(), len(self.clip)]
         return list(zip(edges, edges[1:]))
 
 
-def find_seams(clip: np.ndarray, frame: np.ndarray, step: float = 1.5) -> np.ndarray:
+def find_transitions(clip: np.ndarray, frame: np.ndarray, step: float = 1.5) -> np.ndarray:
     """Find the frames at which the clip changes, or the frame jumps by more than `step` library frames or backwards.
 
     Args:
@@ -61,7 +61,7 @@ def find_seams(clip: np.ndarray, frame: np.ndarray, step: float = 1.5) -> np.nda
     return np.flatnonzero((np.diff(clip) != 0) | (jump > step) | (jump < 0.0)) + 1
 
 
-def replaced(
+def replace_stretch(
     edit: EditList, first: int, end: int, clip: np.ndarray, frame: np.ndarray, keys: tuple[PlacedKey, ...]
 ) -> EditList:
     """Replace a stretch of an edit list.
@@ -81,12 +81,12 @@ def replaced(
     new_clip[inside], new_frame[inside] = clip[inside], frame[inside]
     # one frame more on either side, so that a jump at an end of the stretch is found
     low, high = max(first - 1, 0), min(end + 1, len(edit))
-    found = find_seams(new_clip[low:high], new_frame[low:high]) + low
-    seams = np.concatenate([edit.seams[edit.seams < first], found, edit.seams[edit.seams > end]])
-    return EditList(new_clip, new_frame, seams, tuple(sorted((*edit.keys, *keys), key=lambda key: key.wanted)))
+    found = find_transitions(new_clip[low:high], new_frame[low:high]) + low
+    transitions = np.concatenate([edit.transitions[edit.transitions < first], found, edit.transitions[edit.transitions > end]])
+    return EditList(new_clip, new_frame, transitions, tuple(sorted((*edit.keys, *keys), key=lambda key: key.number)))
 
 
-def at_times(edit: EditList, index: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def sample_edit(edit: EditList, index: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Interpolate an edit list at fractional frames, never mixing two pieces.
 
     Args:
@@ -102,11 +102,11 @@ def at_times(edit: EditList, index: np.ndarray) -> tuple[np.ndarray, np.ndarray,
         inside = piece == number
         if np.any(inside):
             clip[inside] = edit.clip[low]
-            frame[inside] = _extended(edit.frame[low:high], index[inside] - low)
+            frame[inside] = _interpolate_extended(edit.frame[low:high], index[inside] - low)
     return clip, frame, piece
 
 
-def _extended(values: np.ndarray, at: np.ndarray) -> np.ndarray:
+def _interpolate_extended(values: np.ndarray, at: np.ndarray) -> np.ndarray:
     """Interpolate linearly; beyond the end continue with the last slope."""
     if len(values) == 1:
         return values[0] + at

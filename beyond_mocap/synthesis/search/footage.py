@@ -12,14 +12,14 @@ import numpy as np
 
 from ...library.library import Library
 from ...motion import quaternion
-from ...motion.motion import at_frames
-from .edit_list import EditList, at_times
+from ...motion.motion import sample_frames
+from .edit_list import EditList, sample_edit
 
 _HELD = 2  # frames for which a clip's end may be held in a blend
 
 
 @dataclass(frozen=True, eq=False)
-class Shown:
+class SourceFrames:
     """What T output frames show.
 
     Attributes:
@@ -35,13 +35,13 @@ class Shown:
     piece: np.ndarray
 
     @property
-    def seams(self) -> np.ndarray:
+    def transitions(self) -> np.ndarray:
         """(S,) output frames that begin another piece."""
         return np.flatnonzero(np.diff(self.piece)) + 1
 
 
 @dataclass(frozen=True, eq=False)
-class Footage(Shown):
+class SourceMotion(SourceFrames):
     """T output frames with the motion that they show.
 
     Attributes:
@@ -61,7 +61,7 @@ class Footage(Shown):
     sway: np.ndarray
     velocity: np.ndarray
     turn: np.ndarray
-    standing: np.ndarray
+    heel_toe_contacts: np.ndarray
     ahead_pose: np.ndarray
     ahead_height: np.ndarray
     ahead_sway: np.ndarray
@@ -81,7 +81,7 @@ def output_index(frames: int, library: Library, fps: float, count: int) -> np.nd
     return np.minimum(np.arange(frames) * (library.fps / fps), count - 1)
 
 
-def shown(library: Library, edit: EditList, index: np.ndarray) -> Shown:
+def look_up_frames(library: Library, edit: EditList, index: np.ndarray) -> SourceFrames:
     """Look up what output frames show.
 
     Args:
@@ -89,11 +89,11 @@ def shown(library: Library, edit: EditList, index: np.ndarray) -> Shown:
         edit: the edit list.
         index: (T,) fractional frames at the library's rate.
     """
-    clip, frame, piece = at_times(edit, index)
-    return Shown(clip, frame, _clip_frames(library, clip, frame), piece)
+    clip, frame, piece = sample_edit(edit, index)
+    return SourceFrames(clip, frame, _to_clip_frames(library, clip, frame), piece)
 
 
-def fetch(library: Library, edit: EditList, index: np.ndarray, rate: float) -> Footage:
+def fetch_motion(library: Library, edit: EditList, index: np.ndarray, fps: float) -> SourceMotion:
     """Fetch source frames with their motion.
 
     Args:
@@ -102,22 +102,22 @@ def fetch(library: Library, edit: EditList, index: np.ndarray, rate: float) -> F
         index: (T,) fractional frames at the library's rate.
         fps: output frames per second.
     """
-    what = shown(library, edit, index)
-    clip, frame, seams = what.clip, what.frame, what.seams
-    pose, height, sway, heading = _poses(library, clip, frame)
+    frames = look_up_frames(library, edit, index)
+    clip, frame, transitions = frames.clip, frames.frame, frames.transitions
+    pose, height, sway, heading = _fetch_poses(library, clip, frame)
     played = np.gradient(frame) if len(frame) > 1 else np.ones(len(frame))
     # library frames per output frame; a difference across a transition says nothing, so it is taken from one side
-    for edge in seams:
-        played[edge - 1] = frame[edge - 1] - frame[edge - 2] if edge > 1 and edge - 1 not in seams else 1.0
-        played[edge] = frame[edge + 1] - frame[edge] if edge + 1 < len(frame) and edge + 1 not in seams else 1.0
-    velocity = _interpolated(library, clip, frame, library.frames.velocity) * (played * rate / library.fps)[:, None]
+    for edge in transitions:
+        played[edge - 1] = frame[edge - 1] - frame[edge - 2] if edge > 1 and edge - 1 not in transitions else 1.0
+        played[edge] = frame[edge + 1] - frame[edge] if edge + 1 < len(frame) and edge + 1 not in transitions else 1.0
+    velocity = _interpolate_in_clips(library, clip, frame, library.frames.velocity) * (played * fps / library.fps)[:, None]
     turn = np.diff(heading, prepend=heading[:1])
-    turn[seams] = 0.0
-    before = seams - 1
+    turn[transitions] = 0.0
+    before = transitions - 1
     ahead_frame = frame[before] + played[before]
-    ahead = _poses(library, clip[before], ahead_frame)
-    return Footage(
-        clip, frame, what.clip_frame, what.piece, pose, height, sway, velocity, turn, _standing(library, clip, frame),
+    ahead = _fetch_poses(library, clip[before], ahead_frame)
+    return SourceMotion(
+        clip, frame, frames.clip_frame, frames.piece, pose, height, sway, velocity, turn, _look_up_contacts(library, clip, frame),
         *ahead[:3],
     )
 
@@ -143,21 +143,21 @@ class Overlap:
     sway: np.ndarray
 
 
-def overlap(library: Library, footage: Footage, reach: float) -> Overlap:
+def fetch_overlap(library: Library, source: SourceMotion, reach: float) -> Overlap:
     """Fetch the overlap of neighbouring pieces.
 
     It reaches `reach` frames to either side of each transition, at most half of the shorter piece. A clip that ends
     sooner shortens its side, except for a frame or two in which its end is held.
     """
-    edges = np.concatenate([[0], footage.seams, [len(footage.clip)]])
+    edges = np.concatenate([[0], source.transitions, [len(source.clip)]])
     none = np.zeros(0)
-    rows = [_around(library, footage, edges[n : n + 3], reach) for n in range(len(footage.seams))]
+    rows = [_compute_overlap(library, source, edges[n : n + 3], reach) for n in range(len(source.transitions))]
     at, through, after, clip, frame = (np.concatenate(column) for column in zip((none, none, none, none, none), *rows))
-    shown = _poses(library, clip.astype(int), frame)[:3]
-    return Overlap(at.astype(int), through, after.astype(bool), *shown)
+    poses = _fetch_poses(library, clip.astype(int), frame)[:3]
+    return Overlap(at.astype(int), through, after.astype(bool), *poses)
 
 
-def _around(library: Library, footage: Footage, edges: np.ndarray, reach: float):
+def _compute_overlap(library: Library, source: SourceMotion, edges: np.ndarray, reach: float):
     """Compute the overlap around one transition.
 
     Args:
@@ -165,48 +165,48 @@ def _around(library: Library, footage: Footage, edges: np.ndarray, reach: float)
     Returns:
         Output frames, progress, whether behind the transition, and clip and frame that the other piece shows there.
     """
-    low, seam, high = (int(edge) for edge in edges)
-    clip, frame, frames = footage.clip, footage.frame, library.frames
-    ends, begins = clip[seam - 1], clip[seam]
-    out = frame[seam - 1] - frame[seam - 2] if seam - low > 1 else 1.0
-    into = frame[seam + 1] - frame[seam] if high - seam > 1 else 1.0
+    low, transition, high = (int(edge) for edge in edges)
+    clip, frame, frames = source.clip, source.frame, library.frames
+    ends, begins = clip[transition - 1], clip[transition]
+    out = frame[transition - 1] - frame[transition - 2] if transition - low > 1 else 1.0
+    into = frame[transition + 1] - frame[transition] if high - transition > 1 else 1.0
     # output frames until the piece before runs out of its clip, and before the piece after begins in its clip
-    left = (frames.first[ends] + frames.count[ends] - 1 - frame[seam - 1]) / max(out, 1e-3)
-    room = (frame[seam] - frames.first[begins]) / max(into, 1e-3)
-    before = int(min(reach, (seam - low) // 2, max(room, _HELD)))
-    behind = int(min(reach, (high - seam) // 2, max(left, _HELD)))
-    at = np.arange(seam - before, seam + behind)
-    after = at >= seam
+    left = (frames.first[ends] + frames.count[ends] - 1 - frame[transition - 1]) / max(out, 1e-3)
+    room = (frame[transition] - frames.first[begins]) / max(into, 1e-3)
+    before = int(min(reach, (transition - low) // 2, max(room, _HELD)))
+    behind = int(min(reach, (high - transition) // 2, max(left, _HELD)))
+    at = np.arange(transition - before, transition + behind)
+    after = at >= transition
     # each piece continued beyond the transition at its own playback rate
-    other = np.where(after, frame[seam - 1] + out * (at - seam + 1), frame[seam] + into * (at - seam))
+    other = np.where(after, frame[transition - 1] + out * (at - transition + 1), frame[transition] + into * (at - transition))
     through = np.arange(1, len(at) + 1) / (len(at) + 1.0)
     return at, through, after, np.where(after, ends, begins), other
 
 
-def _clip_frames(library: Library, clip: np.ndarray, frame: np.ndarray) -> np.ndarray:
+def _to_clip_frames(library: Library, clip: np.ndarray, frame: np.ndarray) -> np.ndarray:
     """Convert library frames to fractional frames in the clips' own rates, held at the clips' ends."""
     rates = np.array([c.motion.fps for c in library.clips]) / library.fps
     lengths = np.array([len(c.motion) for c in library.clips])
     return np.clip((frame - library.frames.first[clip]) * rates[clip], 0, lengths[clip] - 1)
 
 
-def _poses(library: Library, clip: np.ndarray, frame: np.ndarray):
+def _fetch_poses(library: Library, clip: np.ndarray, frame: np.ndarray):
     """Fetch pose, height, sway and heading at library frames; each clip is read once."""
     count, joints = len(clip), len(library.skeleton)
     pose, root = np.empty((count, joints, 4)), np.empty((count, 3))
-    own = _clip_frames(library, clip, frame)
+    own = _to_clip_frames(library, clip, frame)
     for number in np.unique(clip):
         at = np.flatnonzero(clip == number)
-        root[at], pose[at] = at_frames(library.clips[number].motion, own[at])
-    heading = _interpolated(library, clip, frame, library.frames.heading)
-    path = _interpolated(library, clip, frame, library.frames.path)
-    back = quaternion.about_up(-heading)
+        root[at], pose[at] = sample_frames(library.clips[number].motion, own[at])
+    heading = _interpolate_in_clips(library, clip, frame, library.frames.heading)
+    path = _interpolate_in_clips(library, clip, frame, library.frames.path)
+    back = quaternion.from_up_angle(-heading)
     pose[:, 0] = quaternion.multiply(back, pose[:, 0])
     away = np.concatenate([root[:, :2] - path, np.zeros((count, 1))], axis=1)
     return pose, root[:, 2], quaternion.rotate(back, away)[:, :2], heading
 
 
-def _interpolated(library: Library, clip: np.ndarray, frame: np.ndarray, values: np.ndarray) -> np.ndarray:
+def _interpolate_in_clips(library: Library, clip: np.ndarray, frame: np.ndarray, values: np.ndarray) -> np.ndarray:
     """Interpolate per-frame values (N, ...) linearly within clips, held at their ends."""
     first = library.frames.first[clip]
     at = np.clip(frame, first, first + library.frames.count[clip] - 1)
@@ -216,9 +216,9 @@ def _interpolated(library: Library, clip: np.ndarray, frame: np.ndarray, values:
     return values[low] * (1.0 - weight) + values[high] * weight
 
 
-def _standing(library: Library, clip: np.ndarray, frame: np.ndarray) -> np.ndarray:
+def _look_up_contacts(library: Library, clip: np.ndarray, frame: np.ndarray) -> np.ndarray:
     """Look up heel and toe contacts (T, 2, 2) at the nearest frame of each clip."""
-    own = np.round(_clip_frames(library, clip, frame)).astype(int)
+    own = np.round(_to_clip_frames(library, clip, frame)).astype(int)
     out = np.zeros((len(clip), 2, 2), bool)
     for number in np.unique(clip):
         at = clip == number

@@ -18,16 +18,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...annotation import LOCOMOTION_WORDS
-from ...base.vectors import distance_along
+from ...annotation import LOCOMOTION_LABELS
+from ...base.vectors import distances_along
 from ...library.library import Library
 from ...motion.track import SampledTrack
-from .block_costs import distances, windows
-from .blocks import FINEST, BlockSearch, Candidates
-from .wanted import Wanted
+from .block_costs import compute_distances, collect_windows
+from .blocks import FINEST_LENGTH, BlockSearch, BlockCandidates
+from .wanted import SearchRequest
 
-CLOSE = 0.1  # m from the requested distance within which a sequence fits
-MOST_BLOCKS = 500  # candidates of a section
+DISTANCE_TOLERANCE = 0.1  # m from the requested distance within which a sequence fits
+MAX_BLOCKS = 500  # candidates of a section
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,21 +43,21 @@ class Section:
 
     first: int
     end: int
-    locomotion: bool
-    blocks: Candidates
+    is_locomotion: bool
+    blocks: BlockCandidates
 
 
-def split(wanted: Wanted, blocks: Candidates) -> list[Section]:
+def split_sections(request: SearchRequest, blocks: BlockCandidates) -> list[Section]:
     """Split a sequence into runs of slots whose frames request locomotion only, and the runs between them."""
     kinds = []
     for slot in range(len(blocks)):
-        words = wanted.asked[slot * FINEST : (slot + 1) * FINEST]
-        kinds.append(bool(words) and all(w is not None and w & LOCOMOTION_WORDS for w in words))
+        words = request.requested_labels[slot * FINEST_LENGTH : (slot + 1) * FINEST_LENGTH]
+        kinds.append(bool(words) and all(w is not None and w & LOCOMOTION_LABELS for w in words))
     edges = [0] + [s for s in range(1, len(kinds)) if kinds[s] != kinds[s - 1]] + [len(kinds)]
-    return [Section(low, high, kinds[low], blocks.at(slice(low, high))) for low, high in zip(edges, edges[1:])]
+    return [Section(low, high, kinds[low], blocks.select(slice(low, high))) for low, high in zip(edges, edges[1:])]
 
 
-def match_distance(search: BlockSearch, blocks: Candidates, delta: float) -> list[Section]:
+def match_distance(search: BlockSearch, blocks: BlockCandidates, delta: float) -> list[Section]:
     """Fit the travelled distance of locomotion sections to the track.
 
     Args:
@@ -65,97 +65,97 @@ def match_distance(search: BlockSearch, blocks: Candidates, delta: float) -> lis
         blocks: its result, one per slot.
         delta: m that the distance may be off, where cycles allow.
     """
-    wanted, sections, travelled = search.wanted, [], 0.0
-    asked = travelled_distance(wanted.track)
-    for section in split(wanted, blocks):
-        own = float(block_distances(search.library, section.blocks).sum())
-        goal = float(asked[min(section.end * FINEST, len(asked) - 1)])
+    request, sections, travelled = search.request, [], 0.0
+    track_distance = compute_travelled_distance(request.track)
+    for section in split_sections(request, blocks):
+        clip_distance = float(compute_block_distances(search.library, section.blocks).sum())
+        goal = float(track_distance[min(section.end * FINEST_LENGTH, len(track_distance) - 1)])
         # goal: distance of the track up to the section's end; own + travelled: what the clips have travelled by then
-        missing = goal - (own + travelled)
-        if section.locomotion and len(section.blocks) > 2 and abs(missing) > delta:
-            section = _refilled(search, section, own + missing)
-            own = float(block_distances(search.library, section.blocks).sum())
+        missing = goal - (clip_distance + travelled)
+        if section.is_locomotion and len(section.blocks) > 2 and abs(missing) > delta:
+            section = _refill_section(search, section, clip_distance + missing)
+            clip_distance = float(compute_block_distances(search.library, section.blocks).sum())
         sections.append(section)
-        travelled += own
+        travelled += clip_distance
     return sections
 
 
-def travelled_distance(track: SampledTrack) -> np.ndarray:
+def compute_travelled_distance(track: SampledTrack) -> np.ndarray:
     """Compute the distance (T,) m along the smoothed track since its first frame."""
-    return distance_along(track.positions)
+    return distances_along(track.positions)
 
 
-def block_distances(library: Library, blocks: Candidates) -> np.ndarray:
+def compute_block_distances(library: Library, blocks: BlockCandidates) -> np.ndarray:
     """Compute the distance (K,) m that each 8-frame block travels along its clip's path."""
     frames = library.frames
-    running = distance_along(frames.path)
+    running = distances_along(frames.path)
     last = frames.first[blocks.clip] + frames.count[blocks.clip] - 1
     low = np.clip(blocks.start, frames.first[blocks.clip], last)
-    return running[np.clip(blocks.start + FINEST, low, last)] - running[low]
+    return running[np.clip(blocks.start + FINEST_LENGTH, low, last)] - running[low]
 
 
-def _refilled(search: BlockSearch, section: Section, goal: float) -> Section:
+def _refill_section(search: BlockSearch, section: Section, goal: float) -> Section:
     """Replace the inner blocks of a section so that it travels `goal` metres."""
-    blocks = _locomotion_blocks(search, section)
-    entry, leave = section.blocks.at([0]), section.blocks.at([-1])
-    ends = float(block_distances(search.library, section.blocks.at([0, -1])).sum())
+    blocks = _select_locomotion_blocks(search, section)
+    entry, leave = section.blocks.select([0]), section.blocks.select([-1])
+    ends = float(compute_block_distances(search.library, section.blocks.select([0, -1])).sum())
     if not len(blocks) or goal <= ends:
         return section
-    inner = _cheapest_chain(search, section, blocks, goal - ends)
-    chain = [entry, *([blocks.at(inner)] if len(inner) else []), leave]
-    merged = Candidates(np.concatenate([c.clip for c in chain]), np.concatenate([c.start for c in chain]))
+    inner = _find_cheapest_chain(search, section, blocks, goal - ends)
+    chain = [entry, *([blocks.select(inner)] if len(inner) else []), leave]
+    merged = BlockCandidates(np.concatenate([c.clip for c in chain]), np.concatenate([c.start for c in chain]))
     return Section(section.first, section.end, True, merged)
 
 
-def _locomotion_blocks(search: BlockSearch, section: Section) -> Candidates:
+def _select_locomotion_blocks(search: BlockSearch, section: Section) -> BlockCandidates:
     """Select locomotion blocks that carry a label requested in the section.
 
     Starts lie on a grid of four frames, so that every block's own continuation is there too.
     """
     frames = search.frames
-    asked = {w for slot in range(section.first, section.end) for w in search.asked_words(slot, FINEST) if w}
-    wanted_words = frozenset().union(*asked) & LOCOMOTION_WORDS if asked else frozenset()
+    requested = {w for slot in range(section.first, section.end) for w in search.list_requested_labels(slot, FINEST_LENGTH) if w}
+    wanted_words = frozenset().union(*requested) & LOCOMOTION_LABELS if requested else frozenset()
     columns = [i for i, word in enumerate(frames.vocabulary) if word in wanted_words]
     # clips with key moments are no locomotion
     keyed = np.zeros(len(frames), bool)
     for key in search.library.keys:
         keyed[frames.first[key.clip] : frames.first[key.clip] + frames.count[key.clip]] = True
-    start = search.library.clusters[FINEST].start
+    start = search.library.clusters[FINEST_LENGTH].start
     inside = (start - frames.first[frames.clip[start]]) % 4 == 0
-    fits = inside & search.wanted.allowed[frames.clip[start]] & ~keyed[start]
-    fits &= frames.words[start][:, columns].any(axis=1) & frames.words[start + FINEST - 1][:, columns].any(axis=1)
-    if avoid := search.wanted.avoided_in(section.first * FINEST, section.end * FINEST):
-        shown = np.append(0, np.cumsum(search.annotation.showing(avoid)))
-        free = fits & (shown[start + FINEST] == shown[start])
+    fits = inside & search.request.allowed[frames.clip[start]] & ~keyed[start]
+    fits &= frames.words[start][:, columns].any(axis=1) & frames.words[start + FINEST_LENGTH - 1][:, columns].any(axis=1)
+    if avoid := search.request.list_avoided(section.first * FINEST_LENGTH, section.end * FINEST_LENGTH):
+        running_count = np.append(0, np.cumsum(search.annotation.find_frames_with(avoid)))
+        free = fits & (running_count[start + FINEST_LENGTH] == running_count[start])
         fits = free if free.any() else fits
     start = start[fits]
-    if len(start) > MOST_BLOCKS:
-        start = _evenly(start, frames.clip[start])
-    return Candidates(frames.clip[start], start)
+    if len(start) > MAX_BLOCKS:
+        start = _thin_evenly(start, frames.clip[start])
+    return BlockCandidates(frames.clip[start], start)
 
 
-def _evenly(start: np.ndarray, clip: np.ndarray) -> np.ndarray:
+def _thin_evenly(start: np.ndarray, clip: np.ndarray) -> np.ndarray:
     """Select at most about MAX_BLOCKS blocks, whole clips at a time, clips spread evenly."""
     clips = np.unique(clip)
-    share = max(1, int(np.ceil(len(start) / MOST_BLOCKS)))
+    share = max(1, int(np.ceil(len(start) / MAX_BLOCKS)))
     return start[np.isin(clip, clips[::share])]
 
 
-def _cheapest_chain(search: BlockSearch, section: Section, blocks: Candidates, goal: float) -> np.ndarray:
+def _find_cheapest_chain(search: BlockSearch, section: Section, blocks: BlockCandidates, goal: float) -> np.ndarray:
     """Find the blocks that travel `goal` metres between the section's entry and exit block, by dynamic programming.
 
     Source: Faustino 2024, eq. 22, 23.
     """
-    alpha, size = search.alpha, FINEST // 2
+    alpha, size = search.alpha, FINEST_LENGTH // 2
     weight = (1.0 - alpha) / (search.scale * np.sqrt(size))
-    step = block_distances(search.library, blocks)
-    after = windows(search.frames, blocks.clip, blocks.start + FINEST, size)
-    before = windows(search.frames, blocks.clip, blocks.start, size)
-    first, last = section.blocks.at([0]), section.blocks.at([-1])
-    from_entry = distances(windows(search.frames, first.clip, first.start + FINEST, size), before)[0]
-    to_exit = weight * distances(after, windows(search.frames, last.clip, last.start, size))[:, 0]
-    between = weight * distances(after, before)
-    words = _words_by_distance(search, section, blocks)
+    step = compute_block_distances(search.library, blocks)
+    after = collect_windows(search.frames, blocks.clip, blocks.start + FINEST_LENGTH, size)
+    before = collect_windows(search.frames, blocks.clip, blocks.start, size)
+    first, last = section.blocks.select([0]), section.blocks.select([-1])
+    from_entry = compute_distances(collect_windows(search.frames, first.clip, first.start + FINEST_LENGTH, size), before)[0]
+    to_exit = weight * compute_distances(after, collect_windows(search.frames, last.clip, last.start, size))[:, 0]
+    between = weight * compute_distances(after, before)
+    words = _build_label_cost(search, section, blocks)
     # layer n: lowest cost of a chain of n + 1 blocks that ends with each block, and the distance it travels
     total = weight * from_entry + alpha * words(np.zeros(len(blocks)), np.arange(len(blocks)))
     travelled, back, layers = step.copy(), [], []
@@ -173,25 +173,25 @@ def _cheapest_chain(search: BlockSearch, section: Section, blocks: Candidates, g
     return _read_chain(layers, back)
 
 
-def _words_by_distance(search: BlockSearch, section: Section, blocks: Candidates):
+def _build_label_cost(search: BlockSearch, section: Section, blocks: BlockCandidates):
     """Build a function for D of a block after `travelled` metres of the section.
 
     It compares with the labels requested where the track has travelled as far (the paper's AA_d over travelled
     distance).
     """
-    asked = travelled_distance(search.wanted.track)
-    low, high = section.first * FINEST, min(section.end * FINEST, len(asked))
-    kinds = sorted({w for w in search.wanted.asked[low:high] if w is not None}, key=sorted)
+    track_distance = compute_travelled_distance(search.request.track)
+    low, high = section.first * FINEST_LENGTH, min(section.end * FINEST_LENGTH, len(track_distance))
+    kinds = sorted({w for w in search.request.requested_labels[low:high] if w is not None}, key=sorted)
     # table[kind, block]: D for each distinct set of requested labels
-    table = np.stack([search.annotation.of_blocks(blocks.start, [kind] * FINEST) for kind in kinds])
-    number = np.array([kinds.index(w) if w is not None else 0 for w in search.wanted.asked[low:high]])
-    along = asked[low:high] - asked[low]
+    table = np.stack([search.annotation.compute_block_costs(blocks.start, [kind] * FINEST_LENGTH) for kind in kinds])
+    number = np.array([kinds.index(w) if w is not None else 0 for w in search.request.requested_labels[low:high]])
+    along = track_distance[low:high] - track_distance[low]
 
-    def words(travelled: np.ndarray, block: np.ndarray) -> np.ndarray:
+    def label_cost(travelled: np.ndarray, block: np.ndarray) -> np.ndarray:
         place = np.minimum(np.searchsorted(along, travelled), len(along) - 1)
         return table[number[place], block]
 
-    return words
+    return label_cost
 
 
 def _read_chain(layers, back) -> np.ndarray:
@@ -202,7 +202,7 @@ def _read_chain(layers, back) -> np.ndarray:
     """
     error = np.stack([e for e, _ in layers])
     cost = np.stack([c for _, c in layers])
-    close = error <= CLOSE
+    close = error <= DISTANCE_TOLERANCE
     score = np.where(close, cost, np.inf) if np.any(close) else error
     layer, block = np.unravel_index(int(np.argmin(score)), score.shape)
     chain = [int(block)]

@@ -11,12 +11,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...annotation.gaits import wanted_offset
+from ...annotation.gaits import compute_heading_offset
 from ...library.library import Library
 from ..plan import Plan
-from .offer import RATES, SLOT, Offer, Pairs
-from .preferences import Used, price
-from .wanted import Wanted
+from .offer import PLAYBACK_RATES, SLOT, CandidateIndex, RatePairs
+from .preferences import UsedStretch, compute_reuse_cost
+from .wanted import SearchRequest
 
 # Finding the cheapest of many pairs of a playback rate and a library frame without evaluating all.
 #
@@ -32,8 +32,8 @@ _ROUNDING = 1e-3  # m/s, for float32 speeds
 _CONTINUITY = ("switch", "pose", "rate_change")
 
 
-def cheapest(
-    cost_of: Callable[[slice], np.ndarray], speeds: np.ndarray, speed: float, weight: float, looked_at: int, count: int
+def find_cheapest(
+    cost_of: Callable[[slice], np.ndarray], speeds: np.ndarray, speed: float, weight: float, considered: int, count: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """Find the `count` cheapest of the `considered` pairs nearest to a speed.
 
@@ -47,20 +47,20 @@ def cheapest(
     Returns:
         Their numbers (k,), ascending, and costs (k,).
     """
-    near = _nearest(speeds, speed, looked_at)
-    part, cost = _promising(cost_of, speeds, speed, weight=weight, near=near, count=count)
+    near = _nearest_slice(speeds, speed, considered)
+    part, cost = _find_promising(cost_of, speeds, speed, weight=weight, near=near, count=count)
     best = np.sort(np.argpartition(cost, count)[:count]) if len(cost) > count else np.arange(len(cost))
     return part.start + best, cost[best]
 
 
-def _nearest(speeds: np.ndarray, speed: float, count: int) -> slice:
+def _nearest_slice(speeds: np.ndarray, speed: float, count: int) -> slice:
     """Return the slice of the `count` speeds nearest to `speed`, by rank."""
     middle = int(np.searchsorted(speeds, speed))
     low = int(np.clip(middle - count // 2, 0, max(0, len(speeds) - count)))
     return slice(low, min(low + count, len(speeds)))
 
 
-def _promising(cost_of, speeds: np.ndarray, speed: float, weight: float, near: slice, count: int):
+def _find_promising(cost_of, speeds: np.ndarray, speed: float, weight: float, near: slice, count: int):
     """Return the part of `near` that holds the `count` cheapest pairs, and their costs.
 
     All of `near` where it is small, or where the sample gave too low a bound.
@@ -68,12 +68,12 @@ def _promising(cost_of, speeds: np.ndarray, speed: float, weight: float, near: s
     rank = int(_ABOVE * count / _SAMPLED)
     if near.stop - near.start > 4 * _SAMPLED * rank and weight > 0.0:
         # cost / weight bounds the missed speed, so the cheapest pairs lie within `reach` of the requested speed
-        most = np.partition(cost_of(slice(near.start, near.stop, _SAMPLED)), rank)[rank]
-        reach = float(most) / weight + _ROUNDING
+        upper_bound = np.partition(cost_of(slice(near.start, near.stop, _SAMPLED)), rank)[rank]
+        reach = float(upper_bound) / weight + _ROUNDING
         low, high = np.searchsorted(speeds, [speed - reach, speed + reach])
         part = slice(max(int(low), near.start), min(int(high), near.stop))
         cost = cost_of(part)
-        if np.count_nonzero(cost <= most) >= count:
+        if np.count_nonzero(cost <= upper_bound) >= count:
             return part, cost
     return near, cost_of(near)
 
@@ -130,8 +130,8 @@ class Weights:
     facing: float = 0.15
     words: float = 1.0
     unasked: float = 2.0
-    made: float = 0.2
-    made_key: float = 0.8
+    synthetic: float = 0.2
+    synthetic_key: float = 0.8
     rate: float = 0.24
     stretch: float = 4.0
     switch: float = 0.1
@@ -145,7 +145,7 @@ class Weights:
 
 _NEAR_KEY = 45  # frames around a key moment in which its own labels may be shown
 
-AVOIDED = 1000.0
+AVOIDED_COST = 1000.0
 """Cost of a slot that shows an avoided label: more than a whole track of anything else."""
 
 Term = tuple[str, np.ndarray]
@@ -153,7 +153,7 @@ Term = tuple[str, np.ndarray]
 
 
 @dataclass(frozen=True, eq=False)
-class Alike:
+class BoneDistance:
     """Another distance of poses: the sum of the distances of weighted bones, averaged over frames around the cut.
 
     Attributes:
@@ -169,8 +169,8 @@ class PathCosts:
     """The costs of one request on one library of N frames."""
 
     def __init__(
-        self, library: Library, wanted: Wanted, weights: Weights = Weights(), used: tuple[Used, ...] = (),
-        alike: Alike | None = None,
+        self, library: Library, request: SearchRequest, weights: Weights = Weights(), used: tuple[UsedStretch, ...] = (),
+        bone_distance: BoneDistance | None = None,
     ):
         """Prepare the costs.
 
@@ -181,31 +181,31 @@ class PathCosts:
             used: source frames that another solution avoids where it can.
             bone_distance: another distance of poses than that of the features.
         """
-        self.library, self.wanted, self.weights = library, wanted, weights
-        self.price = price(library, used) if used else None
-        self.alike = alike
-        self.frames, self.offer = library.frames, Offer.of(library, wanted.allowed)
-        self.wanted_offset = wanted_offset(wanted.track)
-        self._rate_cost = (weights.rate * np.abs(RATES - 1.0)).astype(np.float32)
-        self._kept: dict[tuple[frozenset[str], frozenset[str]], np.ndarray] = {}
-        self._asked: dict[tuple[int, int], tuple[float, float]] = {}
+        self.library, self.request, self.weights = library, request, weights
+        self.reuse_cost = compute_reuse_cost(library, used) if used else None
+        self.bone_distance = bone_distance
+        self.frames, self.index = library.frames, CandidateIndex.for_library(library, request.allowed)
+        self.wanted_offset = compute_heading_offset(request.track)
+        self._rate_cost = (weights.rate * np.abs(PLAYBACK_RATES - 1.0)).astype(np.float32)
+        self._cached_costs: dict[tuple[frozenset[str], frozenset[str]], np.ndarray] = {}
+        self._cached_motion: dict[tuple[int, int], tuple[float, float]] = {}
 
-    def inside(self, frame: np.ndarray) -> np.ndarray:
+    def round_frame(self, frame: np.ndarray) -> np.ndarray:
         """Round to the nearest whole library frames."""
         return np.clip(np.round(frame).astype(int), 0, len(self.frames) - 1)
 
-    def asked(self, first: int, end: int) -> tuple[float, float]:
+    def requested_motion(self, first: int, end: int) -> tuple[float, float]:
         """Return the track's mean speed, m/s, and change of direction, rad, from frame first to end; cached."""
-        if (first, end) not in self._asked:
-            track = self.wanted.track
+        if (first, end) not in self._cached_motion:
+            track = self.request.track
             last = min(end, len(track.times) - 1)
             speed = float(track.speed[first : last + 1].mean())
             # a slow body turns on the spot: its direction counts less
             turn = float(track.direction[last] - track.direction[first]) * min(1.0, speed)
-            self._asked[first, end] = speed, turn
-        return self._asked[first, end]
+            self._cached_motion[first, end] = speed, turn
+        return self._cached_motion[first, end]
 
-    def misfit(self, first: int, end: int, number: np.ndarray, frame: np.ndarray) -> np.ndarray:
+    def compute_misfit(self, first: int, end: int, number: np.ndarray, frame: np.ndarray) -> np.ndarray:
         """Compute the cost of playing library frames in a slot.
 
         Args:
@@ -215,16 +215,16 @@ class PathCosts:
         Returns:
             (K,); inf where the clip ends before or may not be used.
         """
-        cost = _added(self._played_terms(first, end, self.offer.pairs(number, frame)))
-        cost += self._still(self._words(first, end), self.wanted.avoided_in(first, end))[frame]
-        return np.where(self.offer.valid[number, frame], cost, np.inf)
+        cost = _sum_terms(self._iter_motion_costs(first, end, self.index.build_pairs(number, frame)))
+        cost += self._fixed_costs(self._requested_labels(first, end), self.request.list_avoided(first, end))[frame]
+        return np.where(self.index.valid[number, frame], cost, np.inf)
 
-    def misfit_terms(self, first: int, end: int, number: np.ndarray, frame: np.ndarray) -> Iterator[Term]:
+    def iter_misfit_terms(self, first: int, end: int, number: np.ndarray, frame: np.ndarray) -> Iterator[Term]:
         """Generate the terms of `compute_misfit`, by name, each (K,)."""
-        yield from self._played_terms(first, end, self.offer.pairs(number, frame))
-        yield from self._still_terms(frame, self._words(first, end), self.wanted.avoided_in(first, end))
+        yield from self._iter_motion_costs(first, end, self.index.build_pairs(number, frame))
+        yield from self._iter_fixed_terms(frame, self._requested_labels(first, end), self.request.list_avoided(first, end))
 
-    def cheapest(self, first: int, end: int, looked_at: int, count: int):
+    def find_cheapest(self, first: int, end: int, considered: int, count: int):
         """Find the pairs of playback rate and library frame with the lowest cost among those nearest in speed.
 
         The missed speed alone would put the others behind, so a large library is searched as fast as a small one.
@@ -236,51 +236,51 @@ class PathCosts:
         Returns:
             number (K,), frame (K,), misfit (K,).
         """
-        words, avoid = self._words(first, end), self.wanted.avoided_in(first, end)
-        pairs, still, (speed, _) = self.offer.in_speed(avoid), self._still(words, avoid), self.asked(first, end)
+        words, avoid = self._requested_labels(first, end), self.request.list_avoided(first, end)
+        pairs, fixed_cost, (speed, _) = self.index.pairs_by_speed(avoid), self._fixed_costs(words, avoid), self.requested_motion(first, end)
 
         def cost_of(part: slice) -> np.ndarray:
-            some = pairs.part(part)
-            return _added(self._played_terms(first, end, some)) + still[some.frame]
+            part_pairs = pairs.slice_pairs(part)
+            return _sum_terms(self._iter_motion_costs(first, end, part_pairs)) + fixed_cost[part_pairs.frame]
 
-        best, cost = cheapest(cost_of, pairs.speed, speed, weight=self.weights.speed, looked_at=looked_at, count=count)
+        best, cost = find_cheapest(cost_of, pairs.speed, speed, weight=self.weights.speed, considered=considered, count=count)
         return pairs.number[best], pairs.frame[best], cost
 
-    def _words(self, first: int, end: int) -> frozenset[str]:
+    def _requested_labels(self, first: int, end: int) -> frozenset[str]:
         """Return the labels requested in the middle of a slot."""
-        return self.wanted.asked[(first + end) // 2] or frozenset()
+        return self.request.requested_labels[(first + end) // 2] or frozenset()
 
-    def _played_terms(self, first: int, end: int, pairs: Pairs) -> Iterator[Term]:
+    def _iter_motion_costs(self, first: int, end: int, pairs: RatePairs) -> Iterator[Term]:
         """Generate the terms that depend on the track: motion of pairs (K,), playback rate, and the player's lag."""
         # pairs hold the turn over SLOT frames, this slot may be longer or shorter
         turn = pairs.turn * np.float32((end - first) / SLOT)
-        yield from self._motion_terms(first, end, pairs.speed, turn=turn, offset=pairs.offset,
+        yield from self._iter_motion_terms(first, end, pairs.speed, turn=turn, offset=pairs.offset,
                                       long_stance=pairs.long_stance)
         yield "rate", self._rate_cost[pairs.number]
-        if self.wanted.taste is not None:
-            yield "variety", self.wanted.taste.cost(first, pairs.frame)
+        if self.request.lag_preference is not None:
+            yield "variety", self.request.lag_preference.compute_cost(first, pairs.frame)
 
-    def _still(self, words: frozenset[str], avoid: frozenset[str]) -> np.ndarray:
+    def _fixed_costs(self, words: frozenset[str], avoid: frozenset[str]) -> np.ndarray:
         """Return the cost (N,) of the library's frames wherever these labels are requested and avoided; cached."""
-        if (words, avoid) not in self._kept:
-            terms = self._still_terms(np.arange(len(self.frames)), words, avoid)
-            self._kept[words, avoid] = _added(terms).astype(np.float32)
-        return self._kept[words, avoid]
+        if (words, avoid) not in self._cached_costs:
+            terms = self._iter_fixed_terms(np.arange(len(self.frames)), words, avoid)
+            self._cached_costs[words, avoid] = _sum_terms(terms).astype(np.float32)
+        return self._cached_costs[words, avoid]
 
-    def _still_terms(self, frame: np.ndarray, words: frozenset[str], avoid: frozenset[str]) -> Iterator[Term]:
+    def _iter_fixed_terms(self, frame: np.ndarray, words: frozenset[str], avoid: frozenset[str]) -> Iterator[Term]:
         """Generate the terms of it, by name, each (K,) of frames (K,)."""
-        w, (missing, unasked) = self.weights, self.offer.lacking(words)
+        w, (missing, unasked) = self.weights, self.index.measure_lacking(words)
         yield "words", w.words * missing[frame]
         yield "unasked", np.float32(w.unasked) * unasked[frame]
-        yield "made", np.float32(w.made) * self.offer.made[frame]
-        if self.wanted.off_style is not None:
-            yield "style", self.wanted.off_style[frame]
-        if self.price is not None:
-            yield "price", self.price[frame]
+        yield "made", np.float32(w.synthetic) * self.index.is_synthetic[frame]
+        if self.request.style_cost is not None:
+            yield "style", self.request.style_cost[frame]
+        if self.reuse_cost is not None:
+            yield "price", self.reuse_cost[frame]
         if avoid:
-            yield "avoided", AVOIDED * self.offer.showing(avoid)[frame]
+            yield "avoided", AVOIDED_COST * self.index.shows_labels(avoid)[frame]
 
-    def key_misfit(self, first: int, end: int, clip: np.ndarray, start: np.ndarray, rate: np.ndarray) -> np.ndarray:
+    def compute_key_misfit(self, first: int, end: int, clip: np.ndarray, start: np.ndarray, rate: np.ndarray) -> np.ndarray:
         """Compute the cost of pieces of key moments in a slot.
 
         Labels have no weight here except avoided ones. A kick that was recorded slower than the player runs is played
@@ -294,59 +294,59 @@ class PathCosts:
         Returns:
             (K,) cost.
         """
-        return _added(self._key_terms(first, end, clip, start, rate)) * ((end - first) / SLOT)
+        return _sum_terms(self._iter_key_terms_per_slot(first, end, clip, start, rate)) * ((end - first) / SLOT)
 
-    def key_terms(self, first: int, end: int, clip: np.ndarray, start: np.ndarray, rate: np.ndarray) -> Iterator[Term]:
+    def iter_key_terms(self, first: int, end: int, clip: np.ndarray, start: np.ndarray, rate: np.ndarray) -> Iterator[Term]:
         """Generate the terms of `compute_key_misfit`, by name, each (K,)."""
-        for name, values in self._key_terms(first, end, clip, start, rate):
+        for name, values in self._iter_key_terms_per_slot(first, end, clip, start, rate):
             yield name, values * ((end - first) / SLOT)
 
-    def _key_terms(self, first: int, end: int, clip: np.ndarray, start: np.ndarray, rate: np.ndarray) -> Iterator[Term]:
+    def _iter_key_terms_per_slot(self, first: int, end: int, clip: np.ndarray, start: np.ndarray, rate: np.ndarray) -> Iterator[Term]:
         """Generate the same per SLOT frames."""
         low, high = self.frames.first[clip], self.frames.first[clip] + self.frames.count[clip] - 1
         length = end - first
         # first and last library frame that is played, held inside the clip
         a, b = (np.clip(at, low, high) for at in (start, start + rate * length))
-        path = [_between(self.frames.path, at, high) for at in (a, b)]
-        turn = _between(self.frames.heading, b, high) - _between(self.frames.heading, a, high)
+        path = [_interpolate_values(self.frames.path, at, high) for at in (a, b)]
+        turn = _interpolate_values(self.frames.heading, b, high) - _interpolate_values(self.frames.heading, a, high)
         speed = np.linalg.norm(path[1] - path[0], axis=1) * self.library.fps / length
-        middle = self.inside((a + b) / 2.0)
-        yield from self._motion_terms(
-            first, end, speed, turn=turn, offset=self.offer.offset[middle], long_stance=self.offer.long_stance[middle]
+        middle = self.round_frame((a + b) / 2.0)
+        yield from self._iter_motion_terms(
+            first, end, speed, turn=turn, offset=self.index.offset[middle], long_stance=self.index.long_stance[middle]
         )
         # library frames that lie beyond either end of the clip
         held = np.maximum(low - start, 0) + np.maximum(start + rate * length - high, 0)
         off = np.abs(rate - 1.0)
         far = self.weights.stretch * np.maximum(off - 0.15, 0.0)
         yield "rate", self.weights.rate * off + far + self.weights.held * held
-        yield "made", self.weights.made_key * self.offer.made[self.inside(start)]
-        if self.wanted.off_style is not None:
-            yield "style", self.wanted.off_style[self.inside(start)]
-        if self.price is not None:
-            yield "price", self.price[middle]
-        if self.wanted.avoided:
-            yield "avoided", AVOIDED * SLOT / length * self._avoided_between(first, end, a, b)
+        yield "made", self.weights.synthetic_key * self.index.is_synthetic[self.round_frame(start)]
+        if self.request.style_cost is not None:
+            yield "style", self.request.style_cost[self.round_frame(start)]
+        if self.reuse_cost is not None:
+            yield "price", self.reuse_cost[middle]
+        if self.request.avoided:
+            yield "avoided", AVOIDED_COST * SLOT / length * self._shows_avoided(first, end, a, b)
 
-    def _avoided_between(self, first: int, end: int, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    def _shows_avoided(self, first: int, end: int, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         """Return (K,) bool: whether library frames a .. b (K,) show a label that the output's first .. end avoids.
 
         Labels that a key moment close by requests do not count.
         """
-        avoid = self.wanted.avoided_in(first, end)
-        near = (key.asked.words for key in self.wanted.keys if first - _NEAR_KEY <= key.frame < end + _NEAR_KEY)
-        shown = np.append(0, np.cumsum(self.offer.annotation.showing(avoid.difference(*near))))
-        return shown[self.inside(b) + 1] > shown[self.inside(a)]
+        avoid = self.request.list_avoided(first, end)
+        near = (key.requested.words for key in self.request.keys if first - _NEAR_KEY <= key.frame < end + _NEAR_KEY)
+        running_count = np.append(0, np.cumsum(self.index.annotation.find_frames_with(avoid.difference(*near))))
+        return running_count[self.round_frame(b) + 1] > running_count[self.round_frame(a)]
 
-    def _motion_terms(self, first: int, end: int, speed, turn, offset, long_stance) -> Iterator[Term]:
+    def _iter_motion_terms(self, first: int, end: int, speed, turn, offset, long_stance) -> Iterator[Term]:
         """Generate the terms of speed, turning and facing against the track."""
-        wanted_speed, wanted_turn = self.asked(first, end)
+        wanted_speed, wanted_turn = self.requested_motion(first, end)
         w, moving = self.weights, min(1.0, wanted_speed)
         yield "speed", np.abs(speed - wanted_speed) * (w.speed + w.drag * long_stance)
         yield "turn", w.turn * (0.3 + 0.7 * moving) * np.abs(turn - wanted_turn)
         aside = np.abs(offset - float(self.wanted_offset[(first + end) // 2]))
         yield "facing", w.facing * moving * np.minimum(aside, 2.0 * np.pi - aside)
 
-    def cut_terms(self, ends: np.ndarray, start: np.ndarray) -> Iterator[Term]:
+    def iter_cut_terms(self, ends: np.ndarray, start: np.ndarray) -> Iterator[Term]:
         """Generate the terms of cuts between library frames, by name, each (B, K) or broadcast to it.
 
         "pose" is the distance of the poses (and comes first); "left" and "cut" grow with the jerk that is left or
@@ -356,38 +356,38 @@ class PathCosts:
             ends: (B,) last frame before the cut.
             start: (K,) first frame after it.
         """
-        ends, start = self.inside(ends), self.inside(start)
-        yield "pose", self.apart(ends, start)
-        yield "feet", np.float32(self.weights.feet) * self.feet_apart(ends[:, None], start)
-        left, entered = self.left_and_entered(ends, start)
+        ends, start = self.round_frame(ends), self.round_frame(start)
+        yield "pose", self.compute_pose_cost(ends, start)
+        yield "feet", np.float32(self.weights.feet) * self.measure_foot_jump(ends[:, None], start)
+        left, entered = self.compute_cut_ends(ends, start)
         yield "left", left[:, None]
         yield "cut", entered
 
-    def left_and_entered(self, ends: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def compute_cut_ends(self, ends: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Compute the cost (B,) of leaving library frames ends (B,), and (K,) of cutting to start (K,)."""
-        left = self.weights.wild * self.offer.wild_before[ends]
-        entered = self.weights.switch + self.weights.wild * self.offer.wild_after[start]
+        left = self.weights.wild * self.index.wild_before[ends]
+        entered = self.weights.switch + self.weights.wild * self.index.wild_after[start]
         return left.astype(np.float32), entered.astype(np.float32)
 
-    def apart(self, ends: np.ndarray, start: np.ndarray) -> np.ndarray:
+    def compute_pose_cost(self, ends: np.ndarray, start: np.ndarray) -> np.ndarray:
         """Compute the cost (B, K) of the change of pose between library frames ends (B,) and start (K,)."""
         weight = np.float32(self.weights.pose)
-        if self.alike is None:
-            return distances(weight * self.frames.features[ends], weight * self.frames.features[start])
+        if self.bone_distance is None:
+            return compute_distances(weight * self.frames.features[ends], weight * self.frames.features[start])
         total = np.zeros((len(ends), len(start)), np.float32)
-        for offset in self.alike.offsets:
-            a, b = (weight * self.alike.bones[self._beside(frames, offset)] for frames in (ends, start))
+        for offset in self.bone_distance.offsets:
+            a, b = (weight * self.bone_distance.bones[self._offset_frames(frames, offset)] for frames in (ends, start))
             for bone in range(a.shape[1]):
-                total += distances(a[:, bone], b[:, bone])
-        return total / np.float32(len(self.alike.offsets))
+                total += compute_distances(a[:, bone], b[:, bone])
+        return total / np.float32(len(self.bone_distance.offsets))
 
-    def _beside(self, frames: np.ndarray, offset: int) -> np.ndarray:
+    def _offset_frames(self, frames: np.ndarray, offset: int) -> np.ndarray:
         """Return the library frames (K,) an offset away from others (K,), held at the ends of their clips."""
         clip = self.frames.clip[frames]
         first = self.frames.first[clip]
         return np.clip(frames + offset, first, first + self.frames.count[clip] - 1)
 
-    def feet_apart(self, ends: np.ndarray, start: np.ndarray) -> np.ndarray:
+    def measure_foot_jump(self, ends: np.ndarray, start: np.ndarray) -> np.ndarray:
         """Measure how far feet in contact before and after cuts would jump.
 
         Args:
@@ -396,21 +396,21 @@ class PathCosts:
         Returns:
             m, summed over both feet.
         """
-        feet, stands = self.frames.feet, self.offer.stands
+        feet, in_contact = self.frames.feet, self.index.is_in_contact
         apart = np.zeros(np.broadcast_shapes(ends.shape, start.shape), np.float32)
         for foot in (0, 1):
             x, y = (feet[ends, axis] - feet[start, axis] for axis in (2 * foot, 2 * foot + 1))
-            apart += np.sqrt(x * x + y * y) * (stands[ends, foot] & stands[start, foot])
+            apart += np.sqrt(x * x + y * y) * (in_contact[ends, foot] & in_contact[start, foot])
         return apart
 
 
-def distances(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+def compute_distances(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Compute the distances (B, K) between points (B, D) and (K, D)."""
-    square = _with_square(a, -2.0 * a, 1) @ _with_square(b, b, 0).T
+    square = _append_square(a, -2.0 * a, 1) @ _append_square(b, b, 0).T
     return np.sqrt(np.maximum(square, 0.0, out=square), out=square)
 
 
-def _with_square(points: np.ndarray, scaled: np.ndarray, place: int) -> np.ndarray:
+def _append_square(points: np.ndarray, scaled: np.ndarray, place: int) -> np.ndarray:
     """Append squared lengths and ones to scaled points, so that one product is |a|^2 + |b|^2 - 2 a b.
 
     Args:
@@ -426,7 +426,7 @@ def _with_square(points: np.ndarray, scaled: np.ndarray, place: int) -> np.ndarr
     return out
 
 
-def _added(terms: Iterator[Term]) -> np.ndarray:
+def _sum_terms(terms: Iterator[Term]) -> np.ndarray:
     """Return the sum of terms, in their order; the first one is overwritten."""
     _, total = next(terms)
     for _, values in terms:
@@ -434,14 +434,14 @@ def _added(terms: Iterator[Term]) -> np.ndarray:
     return total
 
 
-def _between(values: np.ndarray, at: np.ndarray, last: np.ndarray) -> np.ndarray:
+def _interpolate_values(values: np.ndarray, at: np.ndarray, last: np.ndarray) -> np.ndarray:
     """Interpolate values (N, ...) at fractional frames `at` (K,) that lie no later than `last` (K,)."""
     low = np.floor(at).astype(int)
     weight = (at - low).reshape(-1, *[1] * (values.ndim - 1))
     return values[low] * (1.0 - weight) + values[np.minimum(low + 1, last)] * weight
 
 
-def balanced(alpha: float, weights: Weights = Weights()) -> Weights:
+def balance_weights(alpha: float, weights: Weights = Weights()) -> Weights:
     """Balance labels against continuity by alpha.
 
     Labels are scaled by alpha / 0.2, continuity (cut, change of pose and of playback rate) by (1 - alpha) / 0.8, so

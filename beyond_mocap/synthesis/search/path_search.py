@@ -15,23 +15,23 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from ...base.errors import Cancelled, InputError
+from ...base.errors import UserCancelledError, InputError
 from ...library.library import Library
-from .cheapest_way import Offered, Ways
-from .edit_list import EditList, PlacedKey, find_seams, replaced
-from .key_fit import ball_at, misfit, strikes
-from .offer import RATES, SLOT
-from .path_costs import Alike, PathCosts, Weights
-from .preferences import Used, weak_foot_cost
-from .slots import key_pieces, slot_edges, slot_of
-from .wanted import Wanted
+from .cheapest_way import SlotCandidates, BeamTransitions
+from .edit_list import EditList, PlacedKey, find_transitions, replace_stretch
+from .key_fit import measure_ball, compute_key_misfit, measure_strikes
+from .offer import PLAYBACK_RATES, SLOT
+from .path_costs import BoneDistance, PathCosts, Weights
+from .preferences import UsedStretch, compute_weak_foot_cost
+from .slots import build_key_pieces, build_slot_edges, find_slot
+from .wanted import SearchRequest
 
 MEMORY_SLOTS = 15  # slots whose buckets a state remembers (4 s at 30 frames per second)
 _LEAD_IN = 2  # slots ahead of a piece in which frames that lead into it are candidates
 
 
 @dataclass(frozen=True)
-class Width:
+class SearchWidth:
     """How much a search evaluates.
 
     Attributes:
@@ -40,17 +40,17 @@ class Width:
         considered: pairs nearest to the requested speed among which these are the cheapest.
     """
 
-    beam: int = 64
+    beam_width: int = 64
     candidates: int = 1500
-    looked_at: int = 30000
+    considered: int = 30000
 
 
-NARROW = Width(beam=4, candidates=100, looked_at=2000)
+NARROW = SearchWidth(beam_width=4, candidates=100, considered=2000)
 """Width of a search that is cut short, or quick from the start."""
 
 
 @dataclass(frozen=True, eq=False)
-class Between:
+class SearchStretch:
     """A stretch to be searched again.
 
     What the edit list shows before and behind stays: the search starts from the one and pays for the transition to the
@@ -68,7 +68,7 @@ class Between:
 
 
 @dataclass(frozen=True, eq=False)
-class States:
+class BeamStates:
     """B ways to fill a slot.
 
     Attributes:
@@ -89,9 +89,9 @@ class States:
     piece: np.ndarray
     recent: np.ndarray
 
-    def only(self, which: np.ndarray) -> "States":
+    def select(self, which: np.ndarray) -> "BeamStates":
         """Select states by index."""
-        return States(*(getattr(self, field.name)[which] for field in fields(self)))
+        return BeamStates(*(getattr(self, field.name)[which] for field in fields(self)))
 
 
 class PathSearch:
@@ -108,15 +108,15 @@ class PathSearch:
     def __init__(
         self,
         library: Library,
-        wanted: Wanted,
+        request: SearchRequest,
         weights: Weights = Weights(),
         progress: Callable[[float, str], None] | None = None,
         cancelled: Callable[[], bool] | None = None,
         *,
         hurry: Callable[[], bool] | None = None,
-        between: Between | None = None,
-        used: tuple[Used, ...] = (),
-        alike: Alike | None = None,
+        stretch: SearchStretch | None = None,
+        used: tuple[UsedStretch, ...] = (),
+        bone_distance: BoneDistance | None = None,
         on_grid: bool = False,
         narrow: bool = False,
     ):
@@ -136,16 +136,16 @@ class PathSearch:
             on_grid: whether slots lie as in other searches of the same frames (`build_slot_edges`).
             narrow: whether the beam is narrow from the second slot on.
         """
-        self.library, self.wanted, self.weights, self.between = library, wanted, weights, between
+        self.library, self.request, self.weights, self.stretch = library, request, weights, stretch
         self.frames = library.frames
-        self.costs = PathCosts(library, wanted, weights, used, alike)
-        self.offer = self.costs.offer
-        self.edges = slot_edges(library, wanted, *((between.first, between.end) if between else (0, None)), on_grid)
-        self.pieces = key_pieces(library, wanted, self.edges)
+        self.costs = PathCosts(library, request, weights, used, bone_distance)
+        self.index = self.costs.index
+        self.edges = build_slot_edges(library, request, *((stretch.first, stretch.end) if stretch else (0, None)), on_grid)
+        self.pieces = build_key_pieces(library, request, self.edges)
         self.choice_cost = self._choice_costs()
-        self._closed = {slot_of(self.edges, wanted.keys[number].frame) for number in self.pieces.wanted}
-        self.width = Width()
-        self.hurried: int | None = None
+        self._closed_slots = {find_slot(self.edges, request.keys[number].frame) for number in self.pieces.number}
+        self.width = SearchWidth()
+        self.hurried_from: int | None = None
         self._report = progress or (lambda fraction, text: None)
         self._cancelled = cancelled or (lambda: False)
         self._hurry, self._narrow = hurry or (lambda: False), narrow
@@ -157,73 +157,73 @@ class PathSearch:
             InputError: where no clip is as long as a slot.
             Cancelled: when `cancelled` returns true.
         """
-        if not len(self.offer.by_speed):
+        if not len(self.index.by_speed):
             raise InputError(
                 self.library.folder or "library",
                 f"no clip of more than {SLOT} frames at {self.library.fps:g} per second",
                 "clips of a second or more", "add longer recordings",
             )
-        layers: list[States] = []
+        layers: list[BeamStates] = []
         count = len(self.edges) - 1
         # a stretch in the middle starts from the frame before it, whose one state shows one frame
-        before, shown = self._arriving() if self.edges[0] > 0 else (None, 0)
+        before, frames_shown = self._build_arrival() if self.edges[0] > 0 else (None, 0)
         for slot in range(count):
             self._stop_or_hurry(slot)
             self._report(slot / count, "Searching")
-            before = self._first() if before is None else self._layer(slot, before, shown)
-            shown = self.edges[slot + 1] - self.edges[slot]
+            before = self._build_first_states() if before is None else self._build_layer(slot, before, frames_shown)
+            frames_shown = self.edges[slot + 1] - self.edges[slot]
             layers.append(before)
-        if self.edges[-1] < len(self.wanted):
-            layers[-1] = self._leaving(layers[-1], shown)
-        return self._read(layers)
+        if self.edges[-1] < len(self.request):
+            layers[-1] = self._add_exit_cost(layers[-1], frames_shown)
+        return self._trace_path(layers)
 
     def _stop_or_hurry(self, slot: int) -> None:
         """Raise Cancelled, or narrow the beam, if that is requested."""
         if self._cancelled() or slot == 0 and self._hurry():
-            raise Cancelled("synthesis: cancelled")
-        if self.hurried is None and (self._hurry() or self._narrow and slot > 0):
-            self.width, self.hurried = NARROW, int(self.edges[slot])
+            raise UserCancelledError("synthesis: cancelled")
+        if self.hurried_from is None and (self._hurry() or self._narrow and slot > 0):
+            self.width, self.hurried_from = NARROW, int(self.edges[slot])
 
     def _choice_costs(self) -> np.ndarray:
         """Compute (P,) how badly each piece's clip strikes the ball that the track has at its key moment."""
-        costs = np.zeros(len(self.pieces.wanted))
-        for number in np.unique(self.pieces.wanted):
-            key, at = self.wanted.keys[number], self.pieces.wanted == number
-            ball = ball_at(self.wanted.track, key.frame, key.ball_height_known)
-            costs[at] = misfit(strikes(self.library, key.choices), ball)[self.pieces.choice[at]]
-            costs[at] += weak_foot_cost(key.asked.words, key.choices, self.wanted.weak_foot)[self.pieces.choice[at]]
+        costs = np.zeros(len(self.pieces.number))
+        for number in np.unique(self.pieces.number):
+            key, at = self.request.keys[number], self.pieces.number == number
+            ball = measure_ball(self.request.track, key.frame, key.ball_height_known)
+            costs[at] = compute_key_misfit(measure_strikes(self.library, key.choices), ball)[self.pieces.choice[at]]
+            costs[at] += compute_weak_foot_cost(key.requested.words, key.choices, self.request.weak_foot)[self.pieces.choice[at]]
         return costs
 
-    def _first(self) -> States:
+    def _build_first_states(self) -> BeamStates:
         """Build the states of the first slot."""
-        to = self.offered(0)
+        to = self.collect_candidates(0)
         recent = np.full((len(to.clip), MEMORY_SLOTS), -1)
-        return self._kept(States(to.clip, to.start, to.rate, cost=to.cost, back=np.zeros(len(to.clip), int),
+        return self._prune_states(BeamStates(to.clip, to.start, to.rate, cost=to.cost, back=np.zeros(len(to.clip), int),
                                  piece=to.piece, recent=recent))
 
-    def _arriving(self) -> tuple[States, int]:
+    def _build_arrival(self) -> tuple[BeamStates, int]:
         """Build the state from which a stretch starts, the frame before it; and that state's length, 1."""
-        first, edit = self.between.first, self.between.edit
+        first, edit = self.stretch.first, self.stretch.edit
         at = np.array([first - 1])
-        shown = edit.frame[np.maximum(first - SLOT * np.arange(MEMORY_SLOTS, 0, -1), 0)]
-        recent = self.offer.bucket[self.costs.inside(shown)][None, :]
+        frames_shown = edit.frame[np.maximum(first - SLOT * np.arange(MEMORY_SLOTS, 0, -1), 0)]
+        recent = self.index.bucket[self.costs.round_frame(frames_shown)][None, :]
         nothing = np.zeros(1, int)
-        return States(edit.clip[at], edit.frame[at], _steps(edit, at), cost=np.zeros(1), back=nothing,
+        return BeamStates(edit.clip[at], edit.frame[at], _compute_steps(edit, at), cost=np.zeros(1), back=nothing,
                       piece=nothing - 1, recent=recent), 1
 
-    def _leaving(self, states: States, shown: int) -> States:
+    def _add_exit_cost(self, states: BeamStates, frames_shown: int) -> BeamStates:
         """Add to the last states the cost of the transition to the frame that stays behind the stretch.
 
         Args:
             states: of the last slot.
             frames_shown: frames of the last slot.
         """
-        edit, at = self.between.edit, np.array([self.between.end])
-        goal = Offered(edit.clip[at], edit.frame[at], _steps(edit, at), np.zeros(1), np.array([-1]))
-        ways = self.ways(states, np.arange(len(states.cost)), states.start + states.rate * shown)
-        return replace(states, cost=ways.every(goal)[:, 0])
+        edit, at = self.stretch.edit, np.array([self.stretch.end])
+        goal = SlotCandidates(edit.clip[at], edit.frame[at], _compute_steps(edit, at), np.zeros(1), np.array([-1]))
+        transitions = self.build_transitions(states, np.arange(len(states.cost)), states.start + states.rate * frames_shown)
+        return replace(states, cost=transitions.compute_all(goal)[:, 0])
 
-    def _layer(self, slot: int, before: States, shown: int) -> States:
+    def _build_layer(self, slot: int, before: BeamStates, frames_shown: int) -> BeamStates:
         """Compute the best states of one slot.
 
         Args:
@@ -231,122 +231,122 @@ class PathSearch:
             before: the states of the slot before.
             frames_shown: frames of the slot before.
         """
-        ends = before.start + before.rate * shown
+        ends = before.start + before.rate * frames_shown
         # a state inside a piece that has not ended can only continue it; piece -1 reads the appended 0 and is masked
-        bound = (before.piece >= 0) & (np.append(self.pieces.end, 0)[before.piece] > slot)
-        options = [self._bound(slot, before, ends, np.flatnonzero(bound))] if bound.any() else []
-        free = np.flatnonzero(~bound)
+        is_bound = (before.piece >= 0) & (np.append(self.pieces.end, 0)[before.piece] > slot)
+        options = [self._continue_pieces(slot, before, ends, np.flatnonzero(is_bound))] if is_bound.any() else []
+        free = np.flatnonzero(~is_bound)
         if len(free):
-            going_on = [] if slot in self._closed else [self._continued(slot, before, ends, free)]
+            going_on = [] if slot in self._closed_slots else [self._continue_clips(slot, before, ends, free)]
             known = np.concatenate([np.zeros(0), *(cost for _, _, _, cost, _, _ in going_on)])
-            options += [self._entered(slot, before, ends, free, known), *going_on]
+            options += [self._find_transitions(slot, before, ends, free, known), *going_on]
         clip, start, rate, cost, back, piece = (np.concatenate(parts) for parts in zip(*options))
-        return self._kept(States(clip, start, rate, cost=cost, back=back, piece=piece,
+        return self._prune_states(BeamStates(clip, start, rate, cost=cost, back=back, piece=piece,
                                  recent=np.roll(before.recent[back], -1, axis=1)))
 
-    def _kept(self, states: States) -> States:
+    def _prune_states(self, states: BeamStates) -> BeamStates:
         """Keep the cheapest free and the cheapest bound states, a beam of each, and update their memory."""
         order = np.argsort(states.cost, kind="stable")
         free = states.piece[order] < 0
-        kept = states.only(np.concatenate([order[free][: self.width.beam], order[~free][: self.width.beam]]))
-        kept.recent[:, -1] = self.offer.bucket[self.costs.inside(kept.start)]
-        return kept
+        best = states.select(np.concatenate([order[free][: self.width.beam_width], order[~free][: self.width.beam_width]]))
+        best.recent[:, -1] = self.index.bucket[self.costs.round_frame(best.start)]
+        return best
 
-    def offered(self, slot: int) -> Offered:
+    def collect_candidates(self, slot: int) -> SlotCandidates:
         """Collect the candidates that can begin in a slot.
 
         These are pieces of key moments, and, unless a key frame lies in the slot, library frames at any playback rate:
         the cheapest ones, those that lead into a piece, and what was shown before an edit.
         """
         low, high = self.edges[slot : slot + 2]
-        closed, here = slot in self._closed, np.flatnonzero(self.pieces.first == slot)
-        offers = [self._beginning(low, high, here)] if closed or len(here) else []
+        closed, here = slot in self._closed_slots, np.flatnonzero(self.pieces.first == slot)
+        candidate_lists = [self._piece_candidates(low, high, here)] if closed or len(here) else []
         if not closed:
-            offers += [self._candidates(low, high), *self._leading_in(slot)]
-            offers += [self._as_before(low, high)] if self.between else []
-        return Offered(*(np.concatenate(parts) for parts in zip(*offers)))
+            candidate_lists += [self._frame_candidates(low, high), *self._iter_lead_in_candidates(slot)]
+            candidate_lists += [self._previous_candidate(low, high)] if self.stretch else []
+        return SlotCandidates(*(np.concatenate(parts) for parts in zip(*candidate_lists)))
 
-    def _beginning(self, low: int, high: int, here: np.ndarray):
+    def _piece_candidates(self, low: int, high: int, here: np.ndarray):
         """Build the candidates of pieces `here` that begin in a slot."""
         clip, start, rate = self.pieces.clip[here], self.pieces.start[here], self.pieces.rate[here]
-        cost = self.costs.key_misfit(low, high, clip, start, rate) + self.choice_cost[here]
+        cost = self.costs.compute_key_misfit(low, high, clip, start, rate) + self.choice_cost[here]
         return clip, start, rate, cost, here
 
-    def _candidates(self, low: int, high: int):
+    def _frame_candidates(self, low: int, high: int):
         """Build the candidates of the cheapest library frames."""
-        number, start, cost = self.costs.cheapest(low, high, self.width.looked_at, self.width.candidates)
-        return self.frames.clip[start], start.astype(float), RATES[number], cost, np.full(len(cost), -1)
+        number, start, cost = self.costs.find_cheapest(low, high, self.width.considered, self.width.candidates)
+        return self.frames.clip[start], start.astype(float), PLAYBACK_RATES[number], cost, np.full(len(cost), -1)
 
-    def _leading_in(self, slot: int):
+    def _iter_lead_in_candidates(self, slot: int):
         """Generate the candidates from which a piece that begins soon is reached without a cut, if there are any."""
         soon = np.flatnonzero((self.pieces.first > slot) & (self.pieces.first <= slot + _LEAD_IN))
         if not len(soon):
             return
-        number = np.abs(RATES - self.pieces.rate[soon][:, None]).argmin(axis=1)
-        clip, rate = self.pieces.clip[soon], RATES[number]
+        number = np.abs(PLAYBACK_RATES - self.pieces.rate[soon][:, None]).argmin(axis=1)
+        clip, rate = self.pieces.clip[soon], PLAYBACK_RATES[number]
         start = self.pieces.start[soon] - rate * (self.edges[self.pieces.first[soon]] - self.edges[slot])
-        cost = self._misfit_inside(slot, clip, start, number)
+        cost = self._compute_misfit_inside(slot, clip, start, number)
         yield clip, start, rate, cost, np.full(len(soon), -1)
 
-    def _as_before(self, low: int, high: int):
+    def _previous_candidate(self, low: int, high: int):
         """Build the candidate of what the edit list shows in a slot, none if it is cut there."""
-        edit = self.between.edit
-        at = np.array([] if np.any((edit.seams > low) & (edit.seams < high)) else [low], int)
-        start, rate = edit.frame[at], _steps(edit, at)
-        number = np.abs(RATES - rate[:, None]).argmin(axis=1)
-        cost = self.costs.misfit(low, high, number, self.costs.inside(start))
+        edit = self.stretch.edit
+        at = np.array([] if np.any((edit.transitions > low) & (edit.transitions < high)) else [low], int)
+        start, rate = edit.frame[at], _compute_steps(edit, at)
+        number = np.abs(PLAYBACK_RATES - rate[:, None]).argmin(axis=1)
+        cost = self.costs.compute_misfit(low, high, number, self.costs.round_frame(start))
         return edit.clip[at], start, rate, cost, np.full(len(at), -1)
 
-    def _misfit_inside(self, slot: int, clip: np.ndarray, start: np.ndarray, number: np.ndarray) -> np.ndarray:
+    def _compute_misfit_inside(self, slot: int, clip: np.ndarray, start: np.ndarray, number: np.ndarray) -> np.ndarray:
         """Compute the misfit (K,) of playing clips from fractional frames on, inf where they do not last."""
         low, high = self.edges[slot : slot + 2]
         first, last = self.frames.first[clip], self.frames.first[clip] + self.frames.count[clip] - 1
-        lasts = (start >= first) & (start + RATES[number] * (high - low) <= last)
-        return np.where(lasts, self.costs.misfit(low, high, number, self.costs.inside(start)), np.inf)
+        lasts = (start >= first) & (start + PLAYBACK_RATES[number] * (high - low) <= last)
+        return np.where(lasts, self.costs.compute_misfit(low, high, number, self.costs.round_frame(start)), np.inf)
 
-    def _entered(self, slot: int, before: States, ends: np.ndarray, free: np.ndarray, known: np.ndarray):
+    def _find_transitions(self, slot: int, before: BeamStates, ends: np.ndarray, free: np.ndarray, known: np.ndarray):
         """Find the candidates that may be kept, each by the cheapest transition.
 
         Args:
             known: (L,) costs of other ways to fill the slot.
         """
-        to = self.offered(slot)
-        which, cost, state = self.ways(before, free, ends[free]).cheapest(to, known, self.width.beam)
+        to = self.collect_candidates(slot)
+        which, cost, state = self.build_transitions(before, free, ends[free]).find_cheapest(to, known, self.width.beam_width)
         return to.clip[which], to.start[which], to.rate[which], cost, free[state], to.piece[which]
 
-    def ways(self, before: States, free: np.ndarray, ends: np.ndarray) -> Ways:
+    def build_transitions(self, before: BeamStates, free: np.ndarray, ends: np.ndarray) -> BeamTransitions:
         """Build the transitions from the states `free` (B,), which end at library frames `ends` (B,)."""
-        seen = self._seen(before.recent[free])
-        return Ways(self.costs, before.clip[free], ends, rate=before.rate[free], cost=before.cost[free], seen=seen)
+        seen = self._mark_seen(before.recent[free])
+        return BeamTransitions(self.costs, before.clip[free], ends, rate=before.rate[free], cost=before.cost[free], seen=seen)
 
-    def _seen(self, recent: np.ndarray) -> np.ndarray:
+    def _mark_seen(self, recent: np.ndarray) -> np.ndarray:
         """Return (B, buckets) whether a state has lately shown a bucket of frames or its neighbours; recent (B, M)."""
         # one bucket more on either side, cut off in the end; -1 (nothing shown) falls into the first of these
-        seen = np.zeros((len(recent), self.offer.bucket[-1] + 3), bool)
+        seen = np.zeros((len(recent), self.index.bucket[-1] + 3), bool)
         row = np.arange(len(recent))[:, None]
         for shift in (0, 1, 2):
             seen[row, np.maximum(recent + shift, 0)] = True
         return seen[:, 1:-1]
 
-    def _bound(self, slot: int, before: States, ends: np.ndarray, bound: np.ndarray):
+    def _continue_pieces(self, slot: int, before: BeamStates, ends: np.ndarray, bound: np.ndarray):
         """Continue the pieces of key moments."""
         clip, start, rate = before.clip[bound], ends[bound], before.rate[bound]
-        cost = before.cost[bound] + self.costs.key_misfit(self.edges[slot], self.edges[slot + 1], clip, start, rate)
+        cost = before.cost[bound] + self.costs.compute_key_misfit(self.edges[slot], self.edges[slot + 1], clip, start, rate)
         return clip, start, rate, cost, bound, before.piece[bound]
 
-    def _continued(self, slot: int, before: States, ends: np.ndarray, free: np.ndarray):
+    def _continue_clips(self, slot: int, before: BeamStates, ends: np.ndarray, free: np.ndarray):
         """Continue without a cut, at each playback rate, where the slot still ends inside the clip."""
-        back = np.repeat(free, len(RATES))
-        number = np.tile(np.arange(len(RATES)), len(free))
-        clip, start, rate = before.clip[back], ends[back], RATES[number]
-        cost = before.cost[back] + self._misfit_inside(slot, clip, start, number)
+        back = np.repeat(free, len(PLAYBACK_RATES))
+        number = np.tile(np.arange(len(PLAYBACK_RATES)), len(free))
+        clip, start, rate = before.clip[back], ends[back], PLAYBACK_RATES[number]
+        cost = before.cost[back] + self._compute_misfit_inside(slot, clip, start, number)
         cost += self.weights.rate_change * np.abs(rate - before.rate[back])
         return clip, start, rate, cost, back, np.full(len(back), -1)
 
-    def _read(self, layers: list[States]) -> EditList:
+    def _trace_path(self, layers: list[BeamStates]) -> EditList:
         """Trace the cheapest last state back to the first, as an edit list."""
         state = int(np.argmin(layers[-1].cost))
-        clip, frame = np.empty(len(self.wanted), int), np.empty(len(self.wanted))
+        clip, frame = np.empty(len(self.request), int), np.empty(len(self.request))
         placed: dict[int, PlacedKey] = {}
         for slot, states in reversed(list(enumerate(layers))):
             low, high = self.edges[slot : slot + 2]
@@ -354,17 +354,17 @@ class PathSearch:
             clip[low:high] = states.clip[state]
             piece = int(states.piece[state])
             if piece >= 0:
-                number = int(self.pieces.wanted[piece])
-                placed[number] = PlacedKey(number, self.pieces.key(self.wanted, piece))
+                number = int(self.pieces.number[piece])
+                placed[number] = PlacedKey(number, self.pieces.key(self.request, piece))
             state = int(states.back[state])
         keys = tuple(placed[number] for number in sorted(placed))
-        if self.between:
-            return replaced(self.between.edit, int(self.edges[0]), int(self.edges[-1]), clip=clip, frame=frame,
+        if self.stretch:
+            return replace_stretch(self.stretch.edit, int(self.edges[0]), int(self.edges[-1]), clip=clip, frame=frame,
                             keys=keys)
-        return EditList(clip, frame, find_seams(clip, frame), keys)
+        return EditList(clip, frame, find_transitions(clip, frame), keys)
 
 
-def _steps(edit: EditList, at: np.ndarray) -> np.ndarray:
+def _compute_steps(edit: EditList, at: np.ndarray) -> np.ndarray:
     """Compute the step (K,) in library frames of an edit list at frames `at` (K,), as played within their pieces."""
     starts = np.array([low for low, _ in edit.pieces])
     piece = np.searchsorted(starts, at, side="right") - 1

@@ -23,7 +23,7 @@ from ...annotation.vocabulary import SIDES
 from ...library.keys import Key
 from ...library.library import Library
 
-WEAK_FOOT_COST = 1.5
+WEAK_FOOT_WEIGHT = 1.5
 """Cost of serving a key moment with the weak foot, in metres per second of missed speed."""
 
 _SIDES = frozenset(SIDES)
@@ -36,18 +36,18 @@ SPREAD = 0.6180339887
 than a period has room for some lags only, and others have room for the rest. Multiples of the golden section are spread
 evenly."""
 
-LIKED, DISLIKED = 0.05, 0.45
+PREFERRED_RANGE, FULL_COST_RANGE = 0.05, 0.45
 """Seconds from a preferred lag up to which there is no cost, and from which on there is the full cost."""
 
-AGAIN = 1.0
+REUSE_COST = 1.0
 """Cost per slot of the same source frames, that of a metre per second of missed speed."""
-SAME_CLIP = 0.25
+SAME_CLIP_COST = 0.25
 """Cost per slot of other frames of the same clip, or of its mirror image."""
-AROUND = 0.25
+SHOWN_MARGIN = 0.25
 """Seconds around shown source frames that count as shown."""
 
 
-def off_style_cost(library: Library, style: Sequence[str], weight: float, warnings: list[str]) -> np.ndarray | None:
+def compute_style_cost(library: Library, style: Sequence[str], weight: float, warnings: list[str]) -> np.ndarray | None:
     """Compute the cost of library frames that are not of a style.
 
     A frame is of the style if it carries one of its labels, or belongs to a clip that one of its patterns
@@ -66,7 +66,7 @@ def off_style_cost(library: Library, style: Sequence[str], weight: float, warnin
     frames = library.frames
     matches = np.zeros(len(frames), bool)
     for entry in style:
-        word, clips = entry.lower(), np.array([named_by(clip.path, entry) for clip in library.clips])
+        word, clips = entry.lower(), np.array([matches_pattern(clip.path, entry) for clip in library.clips])
         carries = frames.words[:, [i for i, known in enumerate(frames.vocabulary) if known == word]].any(axis=1)
         if not carries.any() and not clips.any():
             warnings.append(f"style '{entry}': the library has no such label, folder or clip")
@@ -74,7 +74,7 @@ def off_style_cost(library: Library, style: Sequence[str], weight: float, warnin
     return np.where(matches, 0.0, weight).astype(np.float32)
 
 
-def named_by(path: str, pattern: str) -> bool:
+def matches_pattern(path: str, pattern: str) -> bool:
     """Return whether a pattern names a clip's path below the library.
 
     It may be the path itself with * and ?, one of its folders, or its file name with or without ending; letter case
@@ -86,7 +86,7 @@ def named_by(path: str, pattern: str) -> bool:
     return any(fnmatchcase(name, pattern) for name in names if name != ".")
 
 
-def weak_foot_cost(asked: Iterable[str], choices: Sequence[Key], weak_foot: str) -> np.ndarray:
+def compute_weak_foot_cost(requested: Iterable[str], choices: Sequence[Key], weak_foot: str) -> np.ndarray:
     """Compute the cost of serving a key moment with the weak foot.
 
     Nothing where the request names a side, where no foot meets the ball, or where no foot is preferred.
@@ -98,14 +98,14 @@ def weak_foot_cost(asked: Iterable[str], choices: Sequence[Key], weak_foot: str)
     Returns:
         (K,).
     """
-    if not weak_foot or _SIDES.intersection(asked):
+    if not weak_foot or _SIDES.intersection(requested):
         return np.zeros(len(choices))
-    weak = [weak_foot in key.words and may_use_foot(key.words) for key in choices]
-    return WEAK_FOOT_COST * np.array(weak, float)
+    weak = [weak_foot in key.labels and may_use_foot(key.labels) for key in choices]
+    return WEAK_FOOT_WEIGHT * np.array(weak, float)
 
 
 @dataclass(frozen=True, eq=False)
-class Taste:
+class LagPreference:
     """A player's preference for a lag.
 
     Attributes:
@@ -118,14 +118,14 @@ class Taste:
     table: np.ndarray
     start: int
 
-    def cost(self, first: int, frame: np.ndarray) -> np.ndarray:
+    def compute_cost(self, first: int, frame: np.ndarray) -> np.ndarray:
         """Compute the cost (K,) of showing library frames (K,) from the track's frame `first` on."""
         # place - time modulo the period; the table holds two periods, so the sum of two remainders needs no further
         # modulo
         return self.table[self.place[frame] + (-first - self.start) % (len(self.table) // 2)]
 
 
-def taste(library: Library, lag: float, variety: float, start: float) -> Taste | None:
+def build_lag_preference(library: Library, lag: float, variety: float, start: float) -> LagPreference | None:
     """Build the preference of a player.
 
     Args:
@@ -144,12 +144,12 @@ def taste(library: Library, lag: float, variety: float, start: float) -> Taste |
     place = (np.arange(len(frames)) - frames.first[frames.clip] + offset.astype(int)[frames.clip]) % period
     off = np.arange(period) / period - lag / PERIOD
     away = np.abs(off - np.round(off)) * PERIOD
-    table = variety * np.clip((away - LIKED) / (DISLIKED - LIKED), 0.0, 1.0)
-    return Taste(place, np.tile(table, 2).astype(np.float32), round(start * library.fps))
+    table = variety * np.clip((away - PREFERRED_RANGE) / (FULL_COST_RANGE - PREFERRED_RANGE), 0.0, 1.0)
+    return LagPreference(place, np.tile(table, 2).astype(np.float32), round(start * library.fps))
 
 
 @dataclass(frozen=True)
-class Used:
+class UsedStretch:
     """A piece of a clip that has been shown.
 
     Attributes:
@@ -165,7 +165,7 @@ class Used:
     last: float
 
 
-def used_in(library: Library, edit, first: int, end: int) -> tuple[Used, ...]:
+def list_used_stretches(library: Library, edit, first: int, end: int) -> tuple[UsedStretch, ...]:
     """List the source frames that frames first .. end of an edit list show."""
     found = []
     for low, high in edit.pieces:
@@ -174,19 +174,19 @@ def used_in(library: Library, edit, first: int, end: int) -> tuple[Used, ...]:
             clip = int(edit.clip[low])
             frames = edit.frame[low:high] - library.frames.first[clip]
             source = library.clips[clip]
-            found.append(Used(source.path, source.mirrored, float(frames.min()), float(frames.max())))
+            found.append(UsedStretch(source.path, source.mirrored, float(frames.min()), float(frames.max())))
     return tuple(dict.fromkeys(found))
 
 
-def price(library: Library, used: tuple[Used, ...]) -> np.ndarray:
+def compute_reuse_cost(library: Library, used: tuple[UsedStretch, ...]) -> np.ndarray:
     """Compute the extra cost (N,) float32 per slot of every library frame; unknown clips are left out."""
     cost = np.zeros(len(library.frames), np.float32)
-    frames, around = library.frames, AROUND * library.fps
+    frames, around = library.frames, SHOWN_MARGIN * library.fps
     place = {(clip.path, clip.mirrored): number for number, clip in enumerate(library.clips)}
     clips = {piece.clip for piece in used}
     for number, clip in enumerate(library.clips):
         if clip.path in clips:
-            cost[frames.first[number] : frames.first[number] + frames.count[number]] = SAME_CLIP
+            cost[frames.first[number] : frames.first[number] + frames.count[number]] = SAME_CLIP_COST
     for piece in used:
         number = place.get((piece.clip, piece.mirrored))
         if number is None:
@@ -194,5 +194,5 @@ def price(library: Library, used: tuple[Used, ...]) -> np.ndarray:
         start, last = frames.first[number], frames.first[number] + frames.count[number] - 1
         low = max(start, int(np.floor(start + piece.first - around)))
         high = min(last, int(np.ceil(start + piece.last + around)))
-        cost[low : high + 1] = AGAIN
+        cost[low : high + 1] = REUSE_COST
     return cost

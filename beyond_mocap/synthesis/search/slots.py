@@ -14,13 +14,13 @@ import numpy as np
 
 from ...library.keys import Key
 from ...library.library import Library
-from .dragged import undragged
+from .dragged import list_slot_ranges
 from .offer import SLOT
-from .wanted import Wanted, needed, pool_frame
+from .wanted import SearchRequest, compute_needed_frames, library_frame
 
-KEY_RATES = np.array([0.7, 0.85, 1.0, 1.15, 1.3])  # playback rates at which a key moment's clip may be played
-SHORTEST = 6  # frames of the shortest slot beside an extra edge
-AROUND = 12
+KEY_PLAYBACK_RATES = np.array([0.7, 0.85, 1.0, 1.15, 1.3])  # playback rates at which a key moment's clip may be played
+MIN_SLOT = 6  # frames of the shortest slot beside an extra edge
+MIN_KEY_MARGIN = 12
 """Least frames before and after a key frame that its clip is played, however short its annotated row: a nearer cut
 would be inside the swing itself."""
 
@@ -29,7 +29,7 @@ _TRIMMED = 2.5  # frames of an entry or exit that may be cut off, so that they d
 
 
 @dataclass(frozen=True, eq=False)
-class Pieces:
+class KeyPieces:
     """P ways to serve key moments, every choice at every playback rate.
 
     Attributes:
@@ -42,7 +42,7 @@ class Pieces:
         start: (P,) fractional library frame at the first slot's edge.
     """
 
-    wanted: np.ndarray
+    number: np.ndarray
     choice: np.ndarray
     clip: np.ndarray
     rate: np.ndarray
@@ -50,13 +50,13 @@ class Pieces:
     end: np.ndarray
     start: np.ndarray
 
-    def key(self, wanted: Wanted, piece: int) -> Key:
+    def key(self, request: SearchRequest, piece: int) -> Key:
         """Return the library's key moment that a piece plays."""
-        return wanted.keys[self.wanted[piece]].choices[self.choice[piece]]
+        return request.keys[self.number[piece]].choices[self.choice[piece]]
 
 
-def slot_edges(
-    library: Library, wanted: Wanted, first: int = 0, end: int | None = None, on_grid: bool = False
+def build_slot_edges(
+    library: Library, request: SearchRequest, first: int = 0, end: int | None = None, on_grid: bool = False
 ) -> np.ndarray:
     """Cut the output into slots of about SLOT frames.
 
@@ -74,80 +74,80 @@ def slot_edges(
     Returns:
         (S + 1,) output frames.
     """
-    end = len(wanted) if end is None else end
-    served = [key for key in wanted.keys if key.choices and first <= round(key.frame) < end]
+    end = len(request) if end is None else end
+    served = [key for key in request.keys if key.choices and first <= round(key.frame) < end]
     at = [key.frame for key in served]
     halfway = [round((a + b) / 2) for a, b in zip(at, at[1:]) if b - a < _CROWDED]
     fixed = np.unique(np.clip([first, *halfway, end], first, end))
     for key in served:
-        entry, leave = np.min([needed(library, choice) for choice in key.choices], axis=0)
-        for edge in (round(key.frame - max(entry, AROUND)), round(key.frame + max(leave, AROUND))):
-            if np.abs(fixed - edge).min() >= SHORTEST and first < edge < end:
+        entry, leave = np.min([compute_needed_frames(library, choice) for choice in key.choices], axis=0)
+        for edge in (round(key.frame - max(entry, MIN_KEY_MARGIN)), round(key.frame + max(leave, MIN_KEY_MARGIN))):
+            if np.abs(fixed - edge).min() >= MIN_SLOT and first < edge < end:
                 fixed = np.sort(np.append(fixed, edge))
-    fixed = _with_grid(fixed) if on_grid else fixed
+    fixed = _add_grid(fixed) if on_grid else fixed
     parts = [np.linspace(a, b, max(1, round((b - a) / SLOT)) + 1)[:-1] for a, b in zip(fixed, fixed[1:])]
     return np.round(np.concatenate([*parts, [end]])).astype(int)
 
 
-def _with_grid(fixed: np.ndarray) -> np.ndarray:
+def _add_grid(fixed: np.ndarray) -> np.ndarray:
     """Add the first and the last multiple of SLOT between each two edges that leaves no short slot beside them."""
     out = [fixed]
     for low, high in zip(fixed, fixed[1:]):
         # the first multiple rounded up, the last rounded down
-        first, last = -(-(low + SHORTEST) // SLOT) * SLOT, (high - SHORTEST) // SLOT * SLOT
+        first, last = -(-(low + MIN_SLOT) // SLOT) * SLOT, (high - MIN_SLOT) // SLOT * SLOT
         out.append(np.array([first, last] if first <= last else [], int))
     return np.unique(np.concatenate(out))
 
 
-def key_pieces(library: Library, wanted: Wanted, edges: np.ndarray) -> Pieces:
+def build_key_pieces(library: Library, request: SearchRequest, edges: np.ndarray) -> KeyPieces:
     """Build all pieces of all key moments between the first edge and the last.
 
     A key moment between two others in the same slot has no room and gets none.
     """
-    served = [n for n, key in enumerate(wanted.keys) if key.choices and edges[0] <= round(key.frame) < edges[-1]]
-    inside = {number: slot_of(edges, wanted.keys[number].frame) for number in served}
+    served = [n for n, key in enumerate(request.keys) if key.choices and edges[0] <= round(key.frame) < edges[-1]]
+    inside = {number: find_slot(edges, request.keys[number].frame) for number in served}
     rows: list[tuple] = []
     for before, number, after in zip([None, *served], served, [*served[1:], None]):
         # slots low .. high are free for this key moment: up to the edges midway to its neighbours
-        low = 0 if before is None else _edge_between(edges, wanted, before, number)
-        high = len(edges) - 1 if after is None else _edge_between(edges, wanted, number, after)
+        low = 0 if before is None else _find_edge_between(edges, request, before, number)
+        high = len(edges) - 1 if after is None else _find_edge_between(edges, request, number, after)
         if low <= inside[number] < high:
-            rows += _pieces_of(library, wanted, edges, number=number, low=low, high=high)
+            rows += _build_pieces(library, request, edges, number=number, low=low, high=high)
     columns = zip(*rows) if rows else [()] * 7
     kinds = (int, int, int, float, int, int, float)
-    return Pieces(*(np.array(column, dtype=kind) for column, kind in zip(columns, kinds)))
+    return KeyPieces(*(np.array(column, dtype=kind) for column, kind in zip(columns, kinds)))
 
 
-def _pieces_of(library: Library, wanted: Wanted, edges: np.ndarray, number: int, low: int, high: int) -> list[tuple]:
+def _build_pieces(library: Library, request: SearchRequest, edges: np.ndarray, number: int, low: int, high: int) -> list[tuple]:
     """Build the pieces of one key moment, between the edges numbered low and high.
 
     Returns:
         Rows in the order of the fields of `KeyPieces`.
     """
-    key = wanted.keys[number]
-    here = slot_of(edges, key.frame)
+    key = request.keys[number]
+    here = find_slot(edges, key.frame)
     rows = []
     for choice, option in enumerate(key.choices):
-        entry, leave = np.maximum(needed(library, option), AROUND)
-        for rate in key.rates or KEY_RATES:
+        entry, leave = np.maximum(compute_needed_frames(library, option), MIN_KEY_MARGIN)
+        for rate in key.rates or KEY_PLAYBACK_RATES:
             # the last edge before the entry and the first one after the exit, both a little trimmed
             first = int(np.searchsorted(edges, key.frame - entry / rate + _TRIMMED, side="right")) - 1
             end = int(np.searchsorted(edges, key.frame + leave / rate - _TRIMMED))
             first, end = int(np.clip(first, low, here)), int(np.clip(end, here + 1, high))
-            around = AROUND / rate - _TRIMMED
-            for a, b in undragged(library, wanted, edges, at=key.frame, key=option, rate=rate, slots=(first, end),
+            around = MIN_KEY_MARGIN / rate - _TRIMMED
+            for a, b in list_slot_ranges(library, request, edges, at=key.frame, key=option, rate=rate, slots=(first, end),
                                   around=around):
                 # so that the key frame is played at exactly key.frame
-                start = pool_frame(library, option) - rate * (key.frame - edges[a])
+                start = library_frame(library, option) - rate * (key.frame - edges[a])
                 rows.append((number, choice, option.clip, rate, a, b, start))
     return rows
 
 
-def slot_of(edges: np.ndarray, frame: float) -> int:
+def find_slot(edges: np.ndarray, frame: float) -> int:
     """Return the slot in which an output frame lies."""
     return int(np.clip(np.searchsorted(edges, frame, side="right") - 1, 0, len(edges) - 2))
 
 
-def _edge_between(edges: np.ndarray, wanted: Wanted, a: int, b: int) -> int:
+def _find_edge_between(edges: np.ndarray, request: SearchRequest, a: int, b: int) -> int:
     """Return the number of the edge nearest to the middle between two key moments."""
-    return int(np.argmin(np.abs(edges - (wanted.keys[a].frame + wanted.keys[b].frame) / 2)))
+    return int(np.argmin(np.abs(edges - (request.keys[a].frame + request.keys[b].frame) / 2)))

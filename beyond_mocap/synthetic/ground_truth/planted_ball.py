@@ -11,19 +11,19 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...base.errors import InputError
-from ...base.time_series import interpolate
+from ...base.time_series import interpolate_columns
 from ...motion import quaternion
 from ...motion.motion import Motion, forward_kinematics
-from .planted_body import adult_share
+from .planted_body import compute_size
 
 GRAVITY = 9.81  # m/s^2
 _GRIP = (0.012, 0.105, -0.036)  # m, of a left hand in a T-pose: between the fingers, on the palm's side
 _MARKER = (0.25, 0.15, -0.95)  # direction of the marker from the centre of a held ball
-_FINE = 1e-3  # s, step of flights with air drag
+_STEP = 1e-3  # s, step of flights with air drag
 
 
 @dataclass(frozen=True)
-class PlantedBall:
+class BallRequest:
     """Request for a synthetic ball.
 
     Attributes:
@@ -40,8 +40,8 @@ class PlantedBall:
     release: float
     side: str = "Right"
     radius: float = 0.0366
-    turns: float = 12.0
-    seen: float = 0.3
+    spin_rate: float = 12.0
+    seconds_seen: float = 0.3
     drag: float = 0.0
     label: str = "BALL"
     grip: tuple[float, float, float] | None = None
@@ -61,7 +61,7 @@ class BallTruth:
         grip: (3,) m, the centre in the hand's axes.
     """
 
-    asked: PlantedBall
+    request: BallRequest
     places: np.ndarray
     marker: np.ndarray
     position: np.ndarray
@@ -75,7 +75,7 @@ class BallTruth:
         return float(np.linalg.norm(self.velocity))
 
 
-def planted_ball(truth: Motion, asked: PlantedBall) -> BallTruth:
+def build_ball(truth: Motion, request: BallRequest) -> BallTruth:
     """Build the ball of a motion in marker axes.
 
     Args:
@@ -86,32 +86,32 @@ def planted_ball(truth: Motion, asked: PlantedBall) -> BallTruth:
     Raises:
         InputError: if the body has no such hand, or the release is outside the motion.
     """
-    name = asked.side + "Hand"
+    name = request.side + "Hand"
     if name not in truth.skeleton.names:
         raise InputError("synthetic ball", f"no joint {name}", "a body with that hand", "choose the other side")
-    if not 0.0 < asked.release < truth.duration:
-        raise InputError("synthetic ball", f"release at {asked.release:g} s", f"within 0 to {truth.duration:g} s")
+    if not 0.0 < request.release < truth.duration:
+        raise InputError("synthetic ball", f"release at {request.release:g} s", f"within 0 to {truth.duration:g} s")
     hand = truth.skeleton.index(name)
-    mirrored = np.array([1.0, 1.0 if asked.side == "Left" else -1.0, 1.0])
-    grip = np.array(asked.grip) if asked.grip is not None else _GRIP * mirrored * adult_share(truth.skeleton)
+    side_sign = np.array([1.0, 1.0 if request.side == "Left" else -1.0, 1.0])
+    grip = np.array(request.grip) if request.grip is not None else _GRIP * side_sign * compute_size(truth.skeleton)
     positions, turns = (rows[:, hand] for rows in forward_kinematics(truth))
     held = positions + quaternion.rotate(turns, grip)
-    outward = np.array(_MARKER) * mirrored
-    outward = asked.radius * outward / np.linalg.norm(outward)
+    outward = np.array(_MARKER) * side_sign
+    outward = request.radius * outward / np.linalg.norm(outward)
     times = np.arange(len(truth)) / truth.fps
-    position, velocity, turn = _at_release(times, held, turns, asked.release)
-    spin = 2.0 * np.pi * asked.turns * _backspin(velocity)
-    after = np.maximum(times - asked.release, 0.0)
-    flown = _flight(position, velocity, after, asked.drag)
-    flying = times > asked.release
-    places = np.where(flying[:, None], flown, held)
+    position, velocity, turn = _find_release(times, held, turns, request.release)
+    spin = 2.0 * np.pi * request.spin_rate * _find_backspin_axis(velocity)
+    after = np.maximum(times - request.release, 0.0)
+    flight = _simulate_flight(position, velocity, after, request.drag)
+    flying = times > request.release
+    places = np.where(flying[:, None], flight, held)
     spun = quaternion.multiply(quaternion.from_rotation_vector(after[:, None] * spin), turn)
     marker = places + quaternion.rotate(np.where(flying[:, None], spun, turns), outward)
-    return BallTruth(asked=asked, places=places, marker=marker, position=position, velocity=velocity, spin=spin,
+    return BallTruth(request=request, places=places, marker=marker, position=position, velocity=velocity, spin=spin,
                      grip=grip)
 
 
-def _at_release(times, held, turns, release: float):
+def _find_release(times, held, turns, release: float):
     """Interpolate place (3,), velocity (3,) and the hand's rotation (4,) at release, between the frames."""
     from scipy.interpolate import CubicSpline
 
@@ -121,22 +121,22 @@ def _at_release(times, held, turns, release: float):
     return path(release), path(release, 1), quaternion.slerp(turns[frame], turns[frame + 1], np.array(share))
 
 
-def _backspin(velocity: np.ndarray) -> np.ndarray:
+def _find_backspin_axis(velocity: np.ndarray) -> np.ndarray:
     """Compute the level axis (3,) about which a ball of this velocity has backspin; any axis if it flies straight up.
     """
     across = np.cross([0.0, 0.0, 1.0], velocity)
     return -across / np.linalg.norm(across) if np.linalg.norm(across) > 1e-6 else np.array([0.0, 1.0, 0.0])
 
 
-def _flight(position: np.ndarray, velocity: np.ndarray, after: np.ndarray, drag: float) -> np.ndarray:
+def _simulate_flight(position: np.ndarray, velocity: np.ndarray, after: np.ndarray, drag: float) -> np.ndarray:
     """Compute the places (T, 3) m of the centre `after` (T,) seconds of flight."""
     fall = np.array([0.0, 0.0, -GRAVITY])
     if drag == 0.0:
         return position + after[:, None] * velocity + 0.5 * after[:, None] ** 2 * fall
-    steps = np.arange(int(np.ceil(after.max() / _FINE)) + 2)
+    steps = np.arange(int(np.ceil(after.max() / _STEP)) + 2)
     places = np.empty((len(steps), 3))
     for step in steps:
         places[step] = position
         pull = fall - drag * np.linalg.norm(velocity) * velocity
-        position, velocity = position + _FINE * velocity + 0.5 * _FINE**2 * pull, velocity + _FINE * pull
-    return interpolate(after, steps * _FINE, places)
+        position, velocity = position + _STEP * velocity + 0.5 * _STEP**2 * pull, velocity + _STEP * pull
+    return interpolate_columns(after, steps * _STEP, places)

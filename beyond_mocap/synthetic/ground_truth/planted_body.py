@@ -13,9 +13,9 @@ import numpy as np
 
 from ...base.vectors import arctan2
 from ...motion import quaternion
-from ...motion.humanoid import identify_posed
-from ...motion.motion import Motion, forward_kinematics, local_rotations, pose_kinematics
-from ...motion.retargeting.anatomy import Anatomy, head_chain, study
+from ...motion.humanoid import identify_posed_joints
+from ...motion.motion import Motion, forward_kinematics, compute_local_rotations, compute_pose
+from ...motion.retargeting.anatomy import Anatomy, list_head_chain, estimate_anatomy
 from ...motion.skeleton import Skeleton
 
 _X, _Y, _Z = np.eye(3)
@@ -29,7 +29,7 @@ _LEG = 0.873
 _TIPS = {"Head": (0.01, 0.0, 0.19), "Hand": (0.0, 0.18, 0.0), "ToeBase": (0.07, 0.0, -0.005)}
 
 
-def in_marker_axes(motion: Motion) -> Motion:
+def to_marker_axes(motion: Motion) -> Motion:
     """Convert a motion to a skeleton in the axes of marker models.
 
     Args:
@@ -39,51 +39,51 @@ def in_marker_axes(motion: Motion) -> Motion:
     Raises:
         InputError: if the body has no legs.
     """
-    body = identify_posed(motion)
-    anatomy = study(motion.skeleton, body, motion)
+    body = identify_posed_joints(motion)
+    anatomy = estimate_anatomy(motion.skeleton, body, motion)
     places, world = forward_kinematics(motion)
-    named = _named(motion.skeleton, anatomy)
-    turns = {name: _segment(name, world[:, joint], anatomy.axes[joint]) for name, joint in named.items()}
+    named = _find_joints(motion.skeleton, anatomy)
+    turns = {name: _convert_segment(name, world[:, joint], anatomy.axes[joint]) for name, joint in named.items()}
     for side in ("Left", "Right"):
-        _forearm_turns_hand(turns, side)
-    return _written(named, motion, places, turns, anatomy.leg)
+        _move_twist(turns, side)
+    return _build_motion(named, motion, places, turns, anatomy.leg)
 
 
-def _named(skeleton: Skeleton, anatomy: Anatomy) -> dict[str, int]:
+def _find_joints(skeleton: Skeleton, anatomy: Anatomy) -> dict[str, int]:
     """Find the joints of marker models: name -> joint, parents first."""
     body = anatomy.body
     found: dict[str, int] = {"Hips": body.hips}
     spine = list(body.spine)
     names = ["Spine", *(f"Spine{i}" for i in range(1, len(spine)))][: max(len(spine) - 1, 0)] + ["Chest"]
     found |= dict(zip(names if spine else [], spine))
-    chain = head_chain(skeleton, body)
+    chain = list_head_chain(skeleton, body)
     above = ["Neck", *(f"Neck{i}" for i in range(1, len(chain)))][: max(len(chain) - 1, 0)] + ["Head"]
     found |= dict(zip(above if chain else [], chain))
     for side, limb in (("Left", body.left), ("Right", body.right)):
         found |= {side + name: getattr(limb, part) for part, name in _PARTS.items()}
-    return {name: joint for name, joint in found.items() if joint in anatomy.known}
+    return {name: joint for name, joint in found.items() if joint in anatomy.known_joints}
 
 
-def _segment(name: str, world: np.ndarray, axes: np.ndarray) -> np.ndarray:
+def _convert_segment(name: str, world: np.ndarray, axes: np.ndarray) -> np.ndarray:
     """Compute the world rotation (T, 4) of a segment in T-pose axes; the anatomy's axes are those of hanging arms."""
     turn = quaternion.multiply(world, axes)
     if name.endswith(("Arm", "Hand")):
         sign = 1.0 if name.startswith("Left") else -1.0
-        turn = quaternion.multiply(turn, quaternion.about_axis(_X, -sign * np.pi / 2))
+        turn = quaternion.multiply(turn, quaternion.from_axis_angle(_X, -sign * np.pi / 2))
     return turn
 
 
-def _forearm_turns_hand(turns: dict[str, np.ndarray], side: str) -> None:
+def _move_twist(turns: dict[str, np.ndarray], side: str) -> None:
     """Move the hand's rotation about its length to the forearm, so that the wrist bends but does not twist."""
     if side + "Hand" not in turns:
         return
     forearm, hand = turns[side + "ForeArm"], turns[side + "Hand"]
     bend = quaternion.multiply(quaternion.inverse(forearm), hand)
     angle = 2.0 * arctan2(bend[:, 2], bend[:, 0])
-    turns[side + "ForeArm"] = quaternion.multiply(forearm, quaternion.about_axis(_Y, angle))
+    turns[side + "ForeArm"] = quaternion.multiply(forearm, quaternion.from_axis_angle(_Y, angle))
 
 
-def _written(named: dict[str, int], motion: Motion, places: np.ndarray, turns: dict, leg: float) -> Motion:
+def _build_motion(named: dict[str, int], motion: Motion, places: np.ndarray, rotations: dict, leg: float) -> Motion:
     """Build the motion on its new skeleton.
 
     Args:
@@ -93,21 +93,21 @@ def _written(named: dict[str, int], motion: Motion, places: np.ndarray, turns: d
         leg: length of a leg, m.
     """
     names = list(named)
-    parents = [_parent(name, names) for name in names]
-    world = np.stack([turns[name] for name in names], axis=1)
+    parents = [_find_parent(name, names) for name in names]
+    world = np.stack([rotations[name] for name in names], axis=1)
     offsets = np.zeros((len(names), 3))
     for joint, parent in enumerate(parents):
         if parent >= 0:
             bone = places[:, named[names[joint]]] - places[:, named[names[parent]]]
             offsets[joint] = quaternion.rotate(quaternion.inverse(world[:, parent]), bone).mean(axis=0)
     ends = [name for name in names if name.removeprefix("Left").removeprefix("Right") in _TIPS]
-    tips = np.array([_tip(name, motion, named[name], turns[name], leg) for name in ends]).reshape(-1, 3)
+    tips = np.array([_find_tip(name, motion, named[name], rotations[name], leg) for name in ends]).reshape(-1, 3)
     skeleton = Skeleton(tuple(names), tuple(parents), offsets, tuple(names.index(name) for name in ends), tips)
-    local = quaternion.normalized(local_rotations(skeleton, world))
+    local = quaternion.normalize(compute_local_rotations(skeleton, world))
     return Motion(skeleton, places[:, named["Hips"]], local, motion.fps)
 
 
-def _tip(name: str, motion: Motion, joint: int, turn: np.ndarray, leg: float) -> np.ndarray:
+def _find_tip(name: str, motion: Motion, joint: int, turn: np.ndarray, leg: float) -> np.ndarray:
     """Find the end of a head, hand or toe (3,): the rig's own, or an average one."""
     skeleton = motion.skeleton
     if joint in skeleton.end_parents and not skeleton.children(joint):
@@ -120,15 +120,15 @@ def _tip(name: str, motion: Motion, joint: int, turn: np.ndarray, leg: float) ->
     return np.array(_TIPS[name.removeprefix("Left").removeprefix("Right")]) * [1.0, side, 1.0] * leg / _LEG
 
 
-def _parent(name: str, names: list[str]) -> int:
+def _find_parent(name: str, names: list[str]) -> int:
     """Find the nearest joint above `name` that the body has; -1 for none."""
-    for above in _above(name):
+    for above in _list_above(name):
         if above in names:
             return names.index(above)
     return -1
 
 
-def _above(name: str) -> list[str]:
+def _list_above(name: str) -> list[str]:
     """List the joints that can carry `name`, nearest first."""
     trunk = ["Chest", "Spine4", "Spine3", "Spine2", "Spine1", "Spine", "Hips"]
     neck = ["Head", "Neck3", "Neck2", "Neck1", "Neck", *trunk]
@@ -141,13 +141,13 @@ def _above(name: str) -> list[str]:
     return arm[arm.index(name) + 1 :] + trunk if name in arm else leg[leg.index(name) + 1 :] + ["Hips"]
 
 
-def adult_share(skeleton: Skeleton) -> float:
+def compute_size(skeleton: Skeleton) -> float:
     """Compute the body's size over that of an adult of 1.80 m, by its legs."""
     bones = [skeleton.offsets[skeleton.index(side + part)] for side in ("Left", "Right") for part in ("Leg", "Foot")]
     return float(np.linalg.norm(bones, axis=1).sum() / 2.0 / _LEG)
 
 
-def calibration_pose(skeleton: Skeleton, seconds: float, fps: float, seed: int) -> Motion:
+def build_calibration_pose(skeleton: Skeleton, seconds: float, fps: float, seed: int) -> Motion:
     """Build a static trial: standing still with arms lifted by 45 degrees, elbows slightly bent, swaying a little.
 
     Args:
@@ -163,26 +163,26 @@ def calibration_pose(skeleton: Skeleton, seconds: float, fps: float, seed: int) 
     times = np.arange(count) / fps
     local = np.broadcast_to(quaternion.identity(len(skeleton)), (count, len(skeleton), 4)).copy()
     for joint, name in enumerate(skeleton.names):
-        sway = _sway(times, rng, np.radians(0.6), 3)
-        local[:, joint] = quaternion.multiply(_held(name), quaternion.from_rotation_vector(sway))
-    root = _sway(times, rng, 0.004, 3)
-    places, _ = pose_kinematics(skeleton, root, local)
+        sway = _build_sway(times, rng, np.radians(0.6), 3)
+        local[:, joint] = quaternion.multiply(_find_rotation(name), quaternion.from_rotation_vector(sway))
+    root = _build_sway(times, rng, 0.004, 3)
+    places, _ = compute_pose(skeleton, root, local)
     feet = [joint for joint, name in enumerate(skeleton.names) if name.endswith(("ToeBase", "Foot"))]
     low = places[:, feet, 2].min() - 0.022 * _LEG
     return Motion(skeleton, root - [0.0, 0.0, low], local, fps)
 
 
-def _held(name: str) -> np.ndarray:
+def _find_rotation(name: str) -> np.ndarray:
     """Rotation (4,) of a joint in the calibration pose."""
     sign = 1.0 if name.startswith("Left") else -1.0
     if name.endswith("ForeArm"):
-        return quaternion.about_axis(_Z, -sign * np.radians(20.0))
+        return quaternion.from_axis_angle(_Z, -sign * np.radians(20.0))
     if name.endswith("Arm"):
-        return quaternion.about_axis(_X, -sign * np.radians(45.0))
+        return quaternion.from_axis_angle(_X, -sign * np.radians(45.0))
     return quaternion.identity()
 
 
-def _sway(times: np.ndarray, rng: np.random.Generator, size: float, columns: int) -> np.ndarray:
+def _build_sway(times: np.ndarray, rng: np.random.Generator, size: float, columns: int) -> np.ndarray:
     """Build a slow, smooth random movement (T, columns) of about `size`."""
     rates, phases = rng.uniform(0.2, 0.9, (2, columns)), rng.uniform(0.0, 2.0 * np.pi, (2, columns))
     waves = np.sin(2.0 * np.pi * times[:, None, None] * rates + phases)

@@ -11,20 +11,20 @@ import numpy as np
 
 from .chains import HIERARCHY, LIMB_OF, Chains
 from .description import Windows
-from .kinematics import Pose, flat, from_six, picked, six, spread
+from .kinematics import Pose, flatten, from_six, take_joints, to_six, update_joints
 from .model import SINGLE, ModelSettings
 
 
-def network_output(name: str, chains: Chains, settings: ModelSettings, pose: Pose, after: Pose, xp=np):
+def build_output(name: str, chains: Chains, settings: ModelSettings, pose: Pose, after: Pose, xp=np):
     """Build the output y (..., out) that leads from `pose` to `after`: the training target of a network."""
     if name in ("hip", SINGLE):
-        joints = predicted(name, chains, settings)
-        places = picked(after.positions, joints, -2, xp) - origin(chains, settings, pose)[..., None, :]
-        return xp.concatenate([flat(places, 2), flat(six(picked(after.turns, joints, -3, xp), xp), 2)], axis=-1)
-    return flat(six(picked(after.local, predicted(name, chains, settings), -3, xp), xp), 2)
+        joints = list_predicted_joints(name, chains, settings)
+        places = take_joints(after.positions, joints, -2, xp) - compute_origin(chains, settings, pose)[..., None, :]
+        return xp.concatenate_motions([flatten(places, 2), flatten(to_six(take_joints(after.turns, joints, -3, xp), xp), 2)], axis=-1)
+    return flatten(to_six(take_joints(after.local, list_predicted_joints(name, chains, settings), -3, xp), xp), 2)
 
 
-def answered(
+def apply_output(
     name: str, chains: Chains, settings: ModelSettings, y, pose: Pose, after: Pose, window: Windows, xp=np
 ) -> Pose:
     """Apply the output of a network to a pose.
@@ -45,31 +45,31 @@ def answered(
         `after` with valid positions and rotations of the network's chain.
     """
     if name == SINGLE:
-        return _single_pose(chains, settings, y, pose, xp)
+        return _build_single_pose(chains, settings, y, pose, xp)
     if name == "hip":
-        place = y[..., :3] + origin(chains, settings, pose)
-        return _hips_at(chains, after, place, from_six(y[..., 3:9], xp), xp)
-    joints = predicted(name, chains, settings)
+        place = y[..., :3] + compute_origin(chains, settings, pose)
+        return _place_hips(chains, after, place, from_six(y[..., 3:9], xp), xp)
+    joints = list_predicted_joints(name, chains, settings)
     turns = from_six(y.reshape(*y.shape[:-1], len(joints), 6), xp)
     local = {joint: turns[..., i, :, :] for i, joint in enumerate(joints)}
     given = {}
     if name in LIMB_OF[:2] and settings.wrist == "given":
         number = LIMB_OF.index(name)
         given = {chains.effectors[number]: window.hands_next[..., number, :, :]}
-    return spread(chains.skeleton, after, chains.known[name], root=after.root, local=local, given=given, xp=xp)
+    return update_joints(chains.skeleton, after, chains.known[name], root=after.root, local=local, given=given, xp=xp)
 
 
-def floating(chains: Chains, settings: ModelSettings, y, pose: Pose, xp=np):
+def split_single_output(chains: Chains, settings: ModelSettings, y, pose: Pose, xp=np):
     """Split the output of the single network into positions (..., j, 3) m and rotations (..., j, 3, 3), world.
 
     They are those of `chains.joints`; the bones between them have any length (section 7.3).
     """
     count = len(chains.joints)
-    places = y[..., : 3 * count].reshape(*y.shape[:-1], count, 3) + origin(chains, settings, pose)[..., None, :]
+    places = y[..., : 3 * count].reshape(*y.shape[:-1], count, 3) + compute_origin(chains, settings, pose)[..., None, :]
     return places, from_six(y[..., 3 * count :].reshape(*y.shape[:-1], count, 6), xp)
 
 
-def ends(name: str, chains: Chains, settings: ModelSettings, y, xp=np):
+def compute_end_positions(name: str, chains: Chains, settings: ModelSettings, y, xp=np):
     """Compute the end positions (..., E, 3) m of an output y (..., out) that the loss compares (E_i of eq. 7.5).
 
     For the hip both upper legs, for the body both upper arms and the head (Fredriksson: the upper arms only, which
@@ -79,30 +79,30 @@ def ends(name: str, chains: Chains, settings: ModelSettings, y, xp=np):
     if name == SINGLE:
         count = len(chains.joints)
         places = y[..., : 3 * count].reshape(*y.shape[:-1], count, 3)
-        return picked(places, tuple(chains.joints.index(joint) for joint in chains.effectors), -2, xp)
+        return take_joints(places, tuple(chains.joints.index(joint) for joint in chains.effectors), -2, xp)
     if name == "hip":
         turn = from_six(y[..., 3:9], xp)
-        return xp.stack([y[..., :3] + xp.matmul(turn, _from_hips(chains, leg)) for leg in (2, 3)], axis=-2)
-    joints = predicted(name, chains, settings)
+        return xp.stack([y[..., :3] + xp.matmul(turn, _compute_leg_offset(chains, leg)) for leg in (2, 3)], axis=-2)
+    joints = list_predicted_joints(name, chains, settings)
     turns = from_six(y.reshape(*y.shape[:-1], len(joints), 6), xp)
     if name == "body":
         goals = (*chains.sockets[:2], chains.head)
     else:
         goals = (chains.effectors[LIMB_OF.index(name)],)
-    return xp.stack([_reached(
+    return xp.stack([_compute_position(
         chains, joints, turns, reference=chains.references[name], goal=goal, xp=xp,
     ) for goal in goals], axis=-2)
 
 
-def _from_hips(chains: Chains, number: int) -> np.ndarray:
+def _compute_leg_offset(chains: Chains, number: int) -> np.ndarray:
     """Compute the position (3,) m of a leg's first joint relative to the hips, joints between them at rest."""
-    way, joint = np.zeros(3), chains.sockets[number]
+    offset, joint = np.zeros(3), chains.sockets[number]
     while joint != chains.hips:
-        way, joint = way + chains.skeleton.offsets[joint], chains.skeleton.parents[joint]
-    return way
+        offset, joint = offset + chains.skeleton.offsets[joint], chains.skeleton.parents[joint]
+    return offset
 
 
-def _reached(chains: Chains, joints: tuple[int, ...], turns, reference: int, goal: int, xp):
+def _compute_position(chains: Chains, joints: tuple[int, ...], turns, reference: int, goal: int, xp):
     """Compute the position (..., 3) m of joint `goal` in the frame of `reference`; turns (..., N, 3, 3) of `joints`."""
     place, joint = chains.skeleton.offsets[goal], chains.skeleton.parents[goal]
     while joint != reference:
@@ -112,7 +112,7 @@ def _reached(chains: Chains, joints: tuple[int, ...], turns, reference: int, goa
     return place
 
 
-def _hips_at(chains: Chains, after: Pose, place, turn, xp) -> Pose:
+def _place_hips(chains: Chains, after: Pose, place, turn, xp) -> Pose:
     """Place the hips at (..., 3) m with rotation (..., 3, 3); joints above them only move."""
     root, above = place, None
     for joint in (*chains.above, chains.hips):
@@ -121,27 +121,27 @@ def _hips_at(chains: Chains, after: Pose, place, turn, xp) -> Pose:
             continue
         root = root - xp.matmul(above, chains.skeleton.offsets[joint])
         above = xp.matmul(above, after.local[..., joint, :, :])
-    return spread(chains.skeleton, after, chains.known["hip"], root=root, local={}, given={chains.hips: turn}, xp=xp)
+    return update_joints(chains.skeleton, after, chains.known["hip"], root=root, local={}, given={chains.hips: turn}, xp=xp)
 
 
-def _single_pose(chains: Chains, settings: ModelSettings, y, pose: Pose, xp) -> Pose:
+def _build_single_pose(chains: Chains, settings: ModelSettings, y, pose: Pose, xp) -> Pose:
     """Build the pose with the hip position and all rotations that the single network predicts."""
-    places, turns = floating(chains, settings, y, pose, xp)
+    places, turns = split_single_output(chains, settings, y, pose, xp)
     own = {joint: turns[..., i, :, :] for i, joint in enumerate(chains.joints)}
-    after = _hips_at(chains, pose, places[..., 0, :], own[chains.hips], xp)
+    after = _place_hips(chains, pose, places[..., 0, :], own[chains.hips], xp)
     for name in HIERARCHY[1:]:
         given = {joint: own[joint] for joint in chains.members[name]}
-        after = spread(chains.skeleton, after, chains.known[name], root=after.root, local={}, given=given, xp=xp)
+        after = update_joints(chains.skeleton, after, chains.known[name], root=after.root, local={}, given=given, xp=xp)
     return after
 
 
-def origin(chains: Chains, settings: ModelSettings, pose: Pose):
+def compute_origin(chains: Chains, settings: ModelSettings, pose: Pose):
     """Compute the point (..., 3) m from which the hip and single network measure positions."""
     level = np.array([1.0, 1.0, 0.0] if settings.frame == "hip" else [0.0, 0.0, 0.0])
     return pose.positions[..., chains.hips, :] * level
 
 
-def predicted(name: str, chains: Chains, settings: ModelSettings) -> tuple[int, ...]:
+def list_predicted_joints(name: str, chains: Chains, settings: ModelSettings) -> tuple[int, ...]:
     """List the joints whose rotation (for hip and single also position) a network predicts."""
     if name == SINGLE:
         return chains.joints

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from ...base.errors import InputError
-from ...motion.humanoid import Limb, identify
+from ...motion.humanoid import Limb, identify_joints
 from ...motion.retargeting import structure
 from ...motion.skeleton import Skeleton
 
@@ -63,13 +63,13 @@ class Chains:
         return tuple(joint for name in HIERARCHY for joint in self.members[name])
 
     @cached_property
-    def hip_sees(self) -> tuple[int, ...]:
+    def hip_inputs(self) -> tuple[int, ...]:
         """The 14 input joints of the hip network: hips, chest, and of each limb upper, middle and end."""
         ends = (*self.effectors[:2], *self.ankles)
         return (self.hips, self.chest, *self.sockets, *self.middles, *ends)
 
     @cached_property
-    def body_sees(self) -> tuple[int, ...]:
+    def body_inputs(self) -> tuple[int, ...]:
         """The 8 input joints of the body network, all outside the body: elbows, knees, wrists, ankles."""
         return (*self.middles, *self.effectors[:2], *self.ankles)
 
@@ -79,56 +79,56 @@ class Chains:
         return (self.hips, *self.members["body"])
 
     @cached_property
-    def arm_sees(self) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    def arm_inputs(self) -> tuple[tuple[int, ...], tuple[int, ...]]:
         """The (7) trunk joints whose positions the left and right arm networks receive: all but their own reference."""
         left, right = (tuple(j for j in self.trunk if j != self.references[arm]) for arm in LIMB_OF[:2])
         return left, right
 
     @cached_property
-    def leg_sees(self) -> tuple[int, ...]:
+    def leg_inputs(self) -> tuple[int, ...]:
         """The (6) body joints whose rotations the leg networks receive."""
         carriers = (self.references[arm] for arm in LIMB_OF[:2])
         return tuple(dict.fromkeys((self.members["body"][0], self.chest, *carriers, self.neck, self.head)))
 
 
-def chains_of(skeleton: Skeleton) -> Chains:
+def find_chains(skeleton: Skeleton) -> Chains:
     """Find the chains of a humanoid skeleton.
 
     Raises:
         InputError: if the skeleton lacks hands, legs or a trunk between hips and arms.
     """
-    body = identify(skeleton)
-    _check(body.left, body.right)
+    body = identify_joints(skeleton)
+    _check_limbs(body.left, body.right)
     parents = skeleton.parents
-    arms = [_between(skeleton, limb.upper_arm, limb.hand) for limb in (body.left, body.right)]
-    legs = [_between(skeleton, limb.upper_leg, limb.toe_or_foot) for limb in (body.left, body.right)]
+    arms = [_list_joints_between(skeleton, limb.upper_arm, limb.hand) for limb in (body.left, body.right)]
+    legs = [_list_joints_between(skeleton, limb.upper_leg, limb.toe_or_foot) for limb in (body.left, body.right)]
     sockets = (body.left.upper_arm, body.right.upper_arm, body.left.upper_leg, body.right.upper_leg)
     top = body.neck if body.head is None else body.head
     trunk: set[int] = set()
     for joint in (*(parents[arm] for arm in sockets[:2]), *([] if top is None else [top])):
-        trunk |= set(_between(skeleton, body.hips, joint)) - {body.hips}
+        trunk |= set(_list_joints_between(skeleton, body.hips, joint)) - {body.hips}
     if not trunk:
         raise InputError("skeleton", "no joint between the hips and the arms", "a spine")
     members = dict(zip(HIERARCHY, [(body.hips,), tuple(sorted(trunk)), *arms, *legs]))
     references = dict(zip(HIERARCHY, [-1, body.hips, *(parents[joint] for joint in sockets)]))
-    chest = structure.common_ancestor(parents, [parents[arm] for arm in sockets[:2]])
+    chest = structure.find_common_ancestor(parents, [parents[arm] for arm in sockets[:2]])
     head = chest if top is None else top
     return Chains(
-        skeleton=skeleton, hips=body.hips, above=tuple(j for j in _between(skeleton, 0, body.hips) if j != body.hips),
-        members=members, references=references, known=_known(skeleton, members),
+        skeleton=skeleton, hips=body.hips, above=tuple(j for j in _list_joints_between(skeleton, 0, body.hips) if j != body.hips),
+        members=members, references=references, known=_group_by_chain(skeleton, members),
         effectors=(body.left.hand, body.right.hand, body.left.toe_or_foot, body.right.toe_or_foot), sockets=sockets,
         middles=(body.left.lower_arm, body.right.lower_arm, body.left.lower_leg, body.right.lower_leg),
         ankles=(body.left.foot, body.right.foot), chest=chest, neck=head if body.neck is None else body.neck, head=head,
     )
 
 
-def _check(left: Limb, right: Limb) -> None:
+def _check_limbs(left: Limb, right: Limb) -> None:
     """Raise InputError if an arm or leg lacks a joint."""
-    wanted = ("upper_arm", "lower_arm", "hand", "upper_leg", "lower_leg", "foot")
+    required = ("upper_arm", "lower_arm", "hand", "upper_leg", "lower_leg", "foot")
     missing = [
         f"{side} {part.replace('_', ' ')}"
         for side, limb in (("left", left), ("right", right))
-        for part in wanted
+        for part in required
         if getattr(limb, part) is None
     ]
     if missing:
@@ -136,27 +136,27 @@ def _check(left: Limb, right: Limb) -> None:
         raise InputError("skeleton", found, "a body with arms, hands and feet", "choose another rig")
 
 
-def _between(skeleton: Skeleton, high: int, low: int) -> tuple[int, ...]:
+def _list_joints_between(skeleton: Skeleton, high: int, low: int) -> tuple[int, ...]:
     """List the joints from `high` down to `low`, both included; InputError if `low` does not hang below `high`."""
-    way = sorted(structure.path(skeleton.parents, low))
-    if high not in way:
+    joints = sorted(structure.list_ancestors(skeleton.parents, low))
+    if high not in joints:
         found = f"{skeleton.names[low]} does not hang below {skeleton.names[high]}"
         raise InputError("skeleton", found, "limbs whose joints follow each other")
-    return tuple(way[way.index(high) :])
+    return tuple(joints[joints.index(high) :])
 
 
-def _known(skeleton: Skeleton, members: dict[str, tuple[int, ...]]) -> dict[str, tuple[int, ...]]:
+def _group_by_chain(skeleton: Skeleton, members: dict[str, tuple[int, ...]]) -> dict[str, tuple[int, ...]]:
     """Assign every joint to the chain of the nearest chain joint at or above it, joints above the hips to the hip.
 
     The first joint of a limb is also assigned to the chain that it hangs on, which determines its position.
     """
     owner = {joint: name for name, joints in members.items() for joint in joints}
-    found: dict[str, list[int]] = {name: [] for name in HIERARCHY}
-    of: list[str] = []
+    groups: dict[str, list[int]] = {name: [] for name in HIERARCHY}
+    chain_of_joint: list[str] = []
     # of[joint]: chain of the joint, inherited from its parent unless the joint is a chain member itself
     for joint, parent in enumerate(skeleton.parents):
-        of.append(owner.get(joint, of[parent] if parent >= 0 else "hip"))
-        found[of[-1]].append(joint)
-        if parent >= 0 and of[parent] != of[-1]:
-            found[of[parent]].append(joint)
-    return {name: tuple(joints) for name, joints in found.items()}
+        chain_of_joint.append(owner.get(joint, chain_of_joint[parent] if parent >= 0 else "hip"))
+        groups[chain_of_joint[-1]].append(joint)
+        if parent >= 0 and chain_of_joint[parent] != chain_of_joint[-1]:
+            groups[chain_of_joint[parent]].append(joint)
+    return {name: tuple(joints) for name, joints in groups.items()}

@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ...base.errors import InputError
-from ...motion.skeleton import frozen_array
-from .phases import motion_phase, warped_phase
+from ...motion.skeleton import freeze_array
+from .phases import compute_motion_phase, compute_warped_phase
 
 STEP = 0.1
 """Seconds between two samples of a window: 20 frames of Fredriksson's 200 Hz."""
@@ -50,7 +50,7 @@ class Description:
     def __post_init__(self):
         for name in ("effectors", "hands", "impact", "before", "after"):
             if getattr(self, name) is not None:
-                object.__setattr__(self, name, frozen_array(getattr(self, name)))
+                object.__setattr__(self, name, freeze_array(getattr(self, name)))
         count = len(self.effectors)
         shapes = {"effectors": (count, 4, 3), "hands": (count, 2, 3, 3), "impact": (3,)}
         for name, shape in shapes.items():
@@ -87,7 +87,7 @@ class Windows(NamedTuple):
     phase: np.ndarray
 
 
-def windows(description: Description, reference: np.ndarray | None = None) -> Windows:
+def build_windows(description: Description, reference: np.ndarray | None = None) -> Windows:
     """Build the windows (T, ...) of all frames.
 
     Between frames, positions are interpolated linearly; beyond the known ones they do not move. The `next` and
@@ -98,27 +98,27 @@ def windows(description: Description, reference: np.ndarray | None = None) -> Wi
         reference: (N,) speed curve for warped phases (section 9.3); None for phases by distance (eq. 7.2).
     """
     frames = np.arange(len(description))
-    seen = frames[:, None] + np.arange(-BACK, AHEAD + 1) * (STEP * description.fps)
-    points = places_at(description, seen)
+    sample_frames = frames[:, None] + np.arange(-BACK, AHEAD + 1) * (STEP * description.fps)
+    points = interpolate_positions(description, sample_frames)
     hands = description.hands
     return Windows(
-        points=np.swapaxes(points, 1, 2), deltas=np.swapaxes(places_at(description, seen + 1.0) - points, 1, 2),
-        next=places_at(description, frames + 1.0),
+        points=np.swapaxes(points, 1, 2), deltas=np.swapaxes(interpolate_positions(description, sample_frames + 1.0) - points, 1, 2),
+        next=interpolate_positions(description, frames + 1.0),
         hands_next=None if hands is None else hands[np.minimum(frames + 1, len(hands) - 1)],
         sides=np.broadcast_to(np.eye(2)[description.limb % 2], (len(frames), 2)),
-        impact=np.broadcast_to(description.impact, (len(frames), 3)), phase=phases(description, reference),
+        impact=np.broadcast_to(description.impact, (len(frames), 3)), phase=compute_phases(description, reference),
     )
 
 
-def phases(description: Description, reference: np.ndarray | None = None) -> np.ndarray:
+def compute_phases(description: Description, reference: np.ndarray | None = None) -> np.ndarray:
     """Compute the motion phase (T,) of the throwing limb, by travelled distance or warped to a reference curve (N,)."""
     effector = description.effectors[:, description.limb]
     if reference is None:
-        return motion_phase(effector, description.release, description.fps)
-    return warped_phase(effector, description.release, description.fps, reference)
+        return compute_motion_phase(effector, description.release, description.fps)
+    return compute_warped_phase(effector, description.release, description.fps, reference)
 
 
-def places_at(description: Description, frames: np.ndarray) -> np.ndarray:
+def interpolate_positions(description: Description, frames: np.ndarray) -> np.ndarray:
     """Interpolate the positions of the effectors (..., 4, 3) m at fractional frames (...), also beyond both ends."""
     before = np.zeros((0, 4, 3)) if description.before is None else description.before
     after = np.zeros((0, 4, 3)) if description.after is None else description.after
@@ -129,10 +129,10 @@ def places_at(description: Description, frames: np.ndarray) -> np.ndarray:
     return (1.0 - share) * known[low] + share * known[low + 1]
 
 
-def scaled(description: Description, ratio: float) -> Description:
+def scale_description(description: Description, ratio: float) -> Description:
     """Scale a description to a body `ratio` times as large, and its target with it (section 4.5)."""
-    larger = {
+    scaled_arrays = {
         name: None if getattr(description, name) is None else getattr(description, name) * ratio
         for name in ("effectors", "impact", "before", "after")
     }
-    return replace(description, **larger)
+    return replace(description, **scaled_arrays)

@@ -8,15 +8,15 @@ import numpy as np
 
 from ...base.errors import InputError
 from ...motion import quaternion
-from ...motion.humanoid import identify, stature
+from ...motion.humanoid import identify_joints, estimate_stature
 from ...motion.mirror import mirror
-from ...motion.motion import Motion, cubic_at, forward_kinematics, place
-from ...motion.skeleton import frozen_array
-from .chains import EFFECTORS, chains_of
+from ...motion.motion import Motion, sample_frames_cubic, forward_kinematics, place_motion
+from ...motion.skeleton import freeze_array
+from .chains import EFFECTORS, find_chains
 from .description import AHEAD, BACK, STEP, Description
-from .kinematics import Pose, matrices, pose_of
+from .kinematics import Pose, to_matrices, build_pose
 
-_NEAREST = 0.05  # metres over the ground from the hips to the impact, below which the direction is undefined
+_MIN_DISTANCE = 0.05  # metres over the ground from the hips to the impact, below which the direction is undefined
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,13 +50,13 @@ class Example:
     def __post_init__(self):
         for name in ("impact", "launch", "before", "after"):
             if getattr(self, name) is not None:
-                object.__setattr__(self, name, frozen_array(getattr(self, name)))
+                object.__setattr__(self, name, freeze_array(getattr(self, name)))
         if self.limb not in range(4) or not 0.0 <= self.release <= len(self.motion) - 1:
             found = f"limb {self.limb}, release at frame {self.release:g} of {len(self.motion)}"
             raise InputError(f"example {self.name}", found, "a limb of 0 to 3, a release within the motion")
 
 
-def example_of(
+def build_example(
     name: str, subject: str, motion: Motion, limb: int | str, release: float, impact, launch=None, fps: float = 30.0,
     span: tuple[float, float] | None = None,
 ) -> Example:
@@ -81,36 +81,36 @@ def example_of(
     if count < 2:
         raise InputError(f"example {name}", f"{last - first:.3f} s", "at least two frames",
                          "include more of the recording")  # fmt: skip
-    motion, turn, shift = _normalised(motion, np.asarray(impact, dtype=float), first * motion.fps, name)
-    taken, before, after = (_resampled(motion, frames, first, fps) for frames in _frames(motion, first, count, fps))
-    turned = quaternion.about_up(np.array(turn))
+    motion, angle, shift = _normalize(motion, np.asarray(impact, dtype=float), first * motion.fps, name)
+    resampled, before, after = (_resample(motion, frames, first, fps) for frames in _list_frames(motion, first, count, fps))
+    rotation = quaternion.from_up_angle(np.array(angle))
     return Example(
-        name=name, subject=subject, motion=taken, limb=EFFECTORS.index(limb) if isinstance(limb, str) else int(limb),
-        release=(release - first) * fps, impact=quaternion.rotate(turned, np.asarray(impact, dtype=float)) + shift,
-        launch=None if launch is None else quaternion.rotate(turned, np.asarray(launch, dtype=float)),
-        stature=stature(motion.skeleton), before=None if before is None else effectors_of(before),
-        after=None if after is None else effectors_of(after),
+        name=name, subject=subject, motion=resampled, limb=EFFECTORS.index(limb) if isinstance(limb, str) else int(limb),
+        release=(release - first) * fps, impact=quaternion.rotate(rotation, np.asarray(impact, dtype=float)) + shift,
+        launch=None if launch is None else quaternion.rotate(rotation, np.asarray(launch, dtype=float)),
+        stature=estimate_stature(motion.skeleton), before=None if before is None else compute_effectors(before),
+        after=None if after is None else compute_effectors(after),
     )
 
 
-def _normalised(motion: Motion, impact: np.ndarray, frame: float, name: str) -> tuple[Motion, float, np.ndarray]:
+def _normalize(motion: Motion, impact: np.ndarray, frame: float, name: str) -> tuple[Motion, float, np.ndarray]:
     """Move a motion to the frame whose origin is below the hips at `frame` and whose +X points to the impact.
 
     Returns:
         The motion, the angle (rad) of its rotation about the world's Z, and the translation (3,) m after it.
     """
-    root, rotations = cubic_at(motion, np.array([frame]))
+    root, rotations = sample_frames_cubic(motion, np.array([frame]))
     places, _ = forward_kinematics(Motion(motion.skeleton, root, rotations, motion.fps))
-    hips = places[0, identify(motion.skeleton).hips] * (1.0, 1.0, 0.0)
-    way = impact - hips
-    if not np.hypot(way[0], way[1]) > _NEAREST:
+    hips = places[0, identify_joints(motion.skeleton).hips] * (1.0, 1.0, 0.0)
+    direction = impact - hips
+    if not np.hypot(direction[0], direction[1]) > _MIN_DISTANCE:
         raise InputError(f"example {name}", "a target directly above or below the hips", "a target some distance away")
-    turn = -float(np.arctan2(way[1], way[0]))
-    shift = -quaternion.rotate(quaternion.about_up(np.array(turn)), hips)
-    return place(motion, turn, shift), turn, shift
+    angle = -float(np.arctan2(direction[1], direction[0]))
+    shift = -quaternion.rotate(quaternion.from_up_angle(np.array(angle)), hips)
+    return place_motion(motion, angle, shift), angle, shift
 
 
-def _frames(motion: Motion, first: float, count: int, fps: float) -> list[np.ndarray]:
+def _list_frames(motion: Motion, first: float, count: int, fps: float) -> list[np.ndarray]:
     """List the frames of an example, those known before it and those known after it, at `fps`.
 
     The example has `count` frames from second `first`; the others are limited to what windows include.
@@ -121,23 +121,23 @@ def _frames(motion: Motion, first: float, count: int, fps: float) -> list[np.nda
     return [np.arange(count), np.arange(-back, 0), np.arange(count, ahead + 1)]
 
 
-def _resampled(motion: Motion, frames: np.ndarray, first: float, fps: float) -> Motion | None:
+def _resample(motion: Motion, frames: np.ndarray, first: float, fps: float) -> Motion | None:
     """Resample a motion at frames (N,) counted at `fps` from second `first`; None if there are none."""
     if not len(frames):
         return None
-    root, rotations = cubic_at(motion, (first + frames / fps) * motion.fps)
+    root, rotations = sample_frames_cubic(motion, (first + frames / fps) * motion.fps)
     return Motion(motion.skeleton, root, rotations, fps)
 
 
-def effectors_of(motion: Motion) -> np.ndarray:
+def compute_effectors(motion: Motion) -> np.ndarray:
     """Compute the positions (T, 4, 3) m of the wrists and toes."""
-    return forward_kinematics(motion)[0][:, list(chains_of(motion.skeleton).effectors)]
+    return forward_kinematics(motion)[0][:, list(find_chains(motion.skeleton).effectors)]
 
 
-def describe(example: Example) -> Description:
+def build_description(example: Example) -> Description:
     """Build the description of an example: what is known of its motion before it is generated."""
     places, turns = forward_kinematics(example.motion)
-    joints = list(chains_of(example.motion.skeleton).effectors)
+    joints = list(find_chains(example.motion.skeleton).effectors)
     return Description(
         effectors=places[:, joints], hands=quaternion.to_matrix(turns[:, joints[:2]]), limb=example.limb,
         release=example.release, impact=example.impact, fps=example.motion.fps, before=example.before,
@@ -145,20 +145,20 @@ def describe(example: Example) -> Description:
     )
 
 
-def poses(example: Example) -> Pose:
+def compute_poses(example: Example) -> Pose:
     """Compute the states (T, ...) of an example's body; `moved` is backward, zero in the first frame."""
     motion = example.motion
-    pose = pose_of(motion.skeleton, motion.root_positions, matrices(motion))
+    pose = build_pose(motion.skeleton, motion.root_positions, to_matrices(motion))
     return pose._replace(moved=np.diff(pose.positions, axis=0, prepend=pose.positions[:1]))
 
 
-def mirrored(example: Example) -> Example:
+def mirror_example(example: Example) -> Example:
     """Mirror an example: the same throw with the other arm, or kick with the other leg."""
-    def side(effectors):
+    def mirror_effectors(effectors):
         return None if effectors is None else effectors[:, [1, 0, 3, 2]] * (1.0, -1.0, 1.0)
 
     return replace(
         example, motion=mirror(example.motion), limb=example.limb ^ 1, impact=example.impact * (1.0, -1.0, 1.0),
-        launch=None if example.launch is None else example.launch * (1.0, -1.0, 1.0), before=side(example.before),
-        after=side(example.after),
+        launch=None if example.launch is None else example.launch * (1.0, -1.0, 1.0), before=mirror_effectors(example.before),
+        after=mirror_effectors(example.after),
     )

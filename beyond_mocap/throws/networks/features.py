@@ -38,22 +38,22 @@ from functools import lru_cache
 
 import numpy as np
 
-from ...base.vectors import cross_level
-from .answers import network_output, origin, predicted
+from ...base.vectors import cross_on_ground
+from .answers import build_output, compute_origin, list_predicted_joints
 from .chains import LIMB_OF, Chains
 from .description import Windows
-from .kinematics import Pose, flat, picked, pose_of, six, spread, transposed
-from .limb_reach import bent_limb, hinge_axes
+from .kinematics import Pose, flatten, take_joints, build_pose, to_six, update_joints, transpose
+from .limb_reach import reach_limb, find_hinge_axes
 from .model import SINGLE, ModelSettings
-from .phases import distance_phase
+from .phases import compute_distance_phase
 
 HIP_GUIDES = 9
 """Number of values that `carry_hips` returns."""
-_COUNTS = np.array([1.0, 1.0, 3.0, 3.0]) / 8.0  # weights of both hands and both feet: feet are planted, hands swing
+_EFFECTOR_WEIGHTS = np.array([1.0, 1.0, 3.0, 3.0]) / 8.0  # weights of both hands and both feet: feet are planted, hands swing
 _TINY = 1e-12  # m^2; keeps the derivative of the square root finite
 
 
-def network_input(name: str, chains: Chains, settings: ModelSettings, pose: Pose, after: Pose, window: Windows, xp=np):
+def build_input(name: str, chains: Chains, settings: ModelSettings, pose: Pose, after: Pose, window: Windows, xp=np):
     """Build the input x (..., in) of a network of `settings.networks`.
 
     Args:
@@ -66,22 +66,22 @@ def network_input(name: str, chains: Chains, settings: ModelSettings, pose: Pose
         xp: numpy or jax.numpy.
     """
     if name == SINGLE:
-        return single_input(chains, settings, pose, window, xp)
+        return build_single_input(chains, settings, pose, window, xp)
     if name == "hip":
-        return hip_input(chains, settings, pose, window, xp)
+        return build_hip_input(chains, settings, pose, window, xp)
     if name == "body":
-        return body_input(chains, pose, after, window, xp)
+        return build_body_input(chains, pose, after, window, xp)
     number = LIMB_OF.index(name)
     if number < 2:
-        x = arm_input(number, chains, settings, pose=pose, after=after, window=window, xp=xp)
+        x = build_arm_input(number, chains, settings, pose=pose, after=after, window=window, xp=xp)
     else:
-        x = leg_input(number, chains, pose, after=after, window=window, xp=xp)
+        x = build_leg_input(number, chains, pose, after=after, window=window, xp=xp)
     if not settings.guided:
         return x
-    return xp.concatenate([x, reached(number, chains, settings, pose=pose, after=after, window=window, xp=xp)], axis=-1)
+    return xp.concatenate_motions([x, compute_reach_guide(number, chains, settings, pose=pose, after=after, window=window, xp=xp)], axis=-1)
 
 
-def phase_of(name: str, chains: Chains, after: Pose, window: Windows, leg_reach, xp=np):
+def compute_phase(name: str, chains: Chains, after: Pose, window: Windows, leg_reach, xp=np):
     """Compute the phase (...) at which a network is evaluated.
 
     Args:
@@ -94,129 +94,129 @@ def phase_of(name: str, chains: Chains, after: Pose, window: Windows, leg_reach,
     """
     if name not in LIMB_OF[2:]:
         return window.phase
-    return distance_phase(stretch(LIMB_OF.index(name), chains, after, window, xp)[..., 0], leg_reach[name[:-4]], xp)
+    return compute_distance_phase(measure_limb_distance(LIMB_OF.index(name), chains, after, window, xp)[..., 0], leg_reach[name[:-4]], xp)
 
 
-def hip_input(chains: Chains, settings: ModelSettings, pose: Pose, window: Windows, xp=np):
+def build_hip_input(chains: Chains, settings: ModelSettings, pose: Pose, window: Windows, xp=np):
     """Build (b_l, b_r, i, four trajectories, p_j, a_j), j = 14 (section 7.3)."""
-    told = [*_motion(chains, settings, pose, window, xp), *_joints(chains, settings, pose, chains.hip_sees, xp)]
+    parts = [*_build_motion_input(chains, settings, pose, window, xp), *_build_joint_input(chains, settings, pose, chains.hip_inputs, xp)]
     if settings.carried:
-        told.append(carry_hips(chains, pose, window, origin(chains, settings, pose), xp))
-    return xp.concatenate(told, axis=-1)
+        parts.append(carry_hips(chains, pose, window, compute_origin(chains, settings, pose), xp))
+    return xp.concatenate_motions(parts, axis=-1)
 
 
-def single_input(chains: Chains, settings: ModelSettings, pose: Pose, window: Windows, xp=np):
+def build_single_input(chains: Chains, settings: ModelSettings, pose: Pose, window: Windows, xp=np):
     """Build (b_l, b_r, i, four trajectories, p_j, a_j, v_j), j = all joints that networks move.
 
     Source: Fredriksson section 7.2, where j = 25.
     """
-    parts = _joints(chains, settings, pose, chains.joints, xp)
-    moved = flat(picked(pose.moved, chains.joints, -2, xp), 2)
-    return xp.concatenate([*_motion(chains, settings, pose, window, xp), *parts, moved], axis=-1)
+    parts = _build_joint_input(chains, settings, pose, chains.joints, xp)
+    moved = flatten(take_joints(pose.moved, chains.joints, -2, xp), 2)
+    return xp.concatenate_motions([*_build_motion_input(chains, settings, pose, window, xp), *parts, moved], axis=-1)
 
 
-def body_input(chains: Chains, pose: Pose, after: Pose, window: Windows, xp=np):
+def build_body_input(chains: Chains, pose: Pose, after: Pose, window: Windows, xp=np):
     """Build (b_l, b_r, i, both wrists' trajectories, o of both toes, δa_o, r_j, p_i, a_i), i = 8.
 
     Source: Fredriksson section 7.3, where j = 10.
     """
-    frame = _Frame(chains.references["body"], pose, after, xp)
-    seen = chains.body_sees
-    return xp.concatenate([
+    frame = _ReferenceFrame(chains.references["body"], pose, after, xp)
+    seen = chains.body_inputs
+    return xp.concatenate_motions([
         window.sides,
-        frame.place(window.impact),
-        *(_trajectory(frame, window, number) for number in (0, 1)),
-        *(frame.place(window.next[..., number, :]) for number in (2, 3)),
-        frame.turned,
-        flat(six(picked(pose.local, chains.members["body"], -3, xp), xp), 2),
-        flat(frame.places(picked(pose.positions, seen, -2, xp)), 2),
-        flat(six(frame.turns(picked(pose.turns, seen, -3, xp)), xp), 2),
+        frame.to_local_position(window.impact),
+        *(_build_trajectory(frame, window, number) for number in (0, 1)),
+        *(frame.to_local_position(window.next[..., number, :]) for number in (2, 3)),
+        frame.axes_change,
+        flatten(to_six(take_joints(pose.local, chains.members["body"], -3, xp), xp), 2),
+        flatten(frame.to_local_positions(take_joints(pose.positions, seen, -2, xp)), 2),
+        flatten(to_six(frame.to_local_rotations(take_joints(pose.turns, seen, -3, xp)), xp), 2),
     ], axis=-1)  # fmt: skip
 
 
-def arm_input(number: int, chains: Chains, settings: ModelSettings, pose: Pose, after: Pose, window: Windows, xp=np):
+def build_arm_input(number: int, chains: Chains, settings: ModelSettings, pose: Pose, after: Pose, window: Windows, xp=np):
     """Build (b_l, b_r, t_wrist, o_wrist, δa_o, r_wrist¹, d, r_upper, r_lower, p_i¹, a_k¹) of arm 0 or 1.
 
     Source: Fredriksson section 7.3.
     """
     name = LIMB_OF[number]
-    frame = _Frame(chains.references[name], pose, after, xp)
+    frame = _ReferenceFrame(chains.references[name], pose, after, xp)
     given = settings.wrist == "given"
-    wrist = [six(frame.turn(window.hands_next[..., number, :, :]), xp)] if given else []
-    return xp.concatenate([
+    wrist = [to_six(frame.to_local_rotation(window.hands_next[..., number, :, :]), xp)] if given else []
+    return xp.concatenate_motions([
         window.sides,
-        _trajectory(frame, window, number),
-        frame.place(window.next[..., number, :]),
-        frame.turned,
+        _build_trajectory(frame, window, number),
+        frame.to_local_position(window.next[..., number, :]),
+        frame.axes_change,
         *wrist,
-        stretch(number, chains, after, window, xp),
-        flat(six(picked(pose.local, predicted(name, chains, settings), -3, xp), xp), 2),
-        flat(frame.places(picked(after.positions, chains.arm_sees[number], -2, xp)), 2),
-        flat(six(frame.turns(picked(after.turns, chains.trunk, -3, xp)), xp), 2),
+        measure_limb_distance(number, chains, after, window, xp),
+        flatten(to_six(take_joints(pose.local, list_predicted_joints(name, chains, settings), -3, xp), xp), 2),
+        flatten(frame.to_local_positions(take_joints(after.positions, chains.arm_inputs[number], -2, xp)), 2),
+        flatten(to_six(frame.to_local_rotations(take_joints(after.turns, chains.trunk, -3, xp)), xp), 2),
     ], axis=-1)  # fmt: skip
 
 
-def leg_input(number: int, chains: Chains, pose: Pose, after: Pose, window: Windows, xp=np):
+def build_leg_input(number: int, chains: Chains, pose: Pose, after: Pose, window: Windows, xp=np):
     """Build (t_toe, o_toe, δa_o, d, r_j, p_i¹, a_k¹), j = 4, i = 3, k = 6, of leg 2 (left) or 3 (right).
 
     Source: Fredriksson section 7.3.
     """
     name = LIMB_OF[number]
-    frame = _Frame(chains.references[name], pose, after, xp)
+    frame = _ReferenceFrame(chains.references[name], pose, after, xp)
     others = (chains.head, *chains.sockets[:2])
-    return xp.concatenate([
-        _trajectory(frame, window, number),
-        frame.place(window.next[..., number, :]),
-        frame.turned,
-        stretch(number, chains, after, window, xp),
-        flat(six(picked(pose.local, chains.members[name], -3, xp), xp), 2),
-        flat(frame.places(picked(after.positions, others, -2, xp)), 2),
-        flat(six(frame.turns(picked(after.turns, chains.leg_sees, -3, xp)), xp), 2),
+    return xp.concatenate_motions([
+        _build_trajectory(frame, window, number),
+        frame.to_local_position(window.next[..., number, :]),
+        frame.axes_change,
+        measure_limb_distance(number, chains, after, window, xp),
+        flatten(to_six(take_joints(pose.local, chains.members[name], -3, xp), xp), 2),
+        flatten(frame.to_local_positions(take_joints(after.positions, others, -2, xp)), 2),
+        flatten(to_six(frame.to_local_rotations(take_joints(after.turns, chains.leg_inputs, -3, xp)), xp), 2),
     ], axis=-1)  # fmt: skip
 
 
-def reached(number: int, chains: Chains, settings: ModelSettings, pose: Pose, after: Pose, window: Windows, xp=np):
+def compute_reach_guide(number: int, chains: Chains, settings: ModelSettings, pose: Pose, after: Pose, window: Windows, xp=np):
     """Compute the relative rotations (..., 6 each) with which the limb of frame n would reach its target in n + 1.
 
     They are those of the joints that the limb's network predicts, by two-bone inverse kinematics.
     """
     name = LIMB_OF[number]
     local = {joint: pose.local[..., joint, :, :] for joint in chains.members[name]}
-    limb = spread(chains.skeleton, after, chains.known[name], root=after.root, local=local, given={}, xp=xp)
-    bent = bent_limb(number, chains, limb, wanted=window.next[..., number, :], share=1.0, axes=_hinges(chains),
-                     turn_kept=True, xp=xp)
-    return flat(six(picked(bent.local, predicted(name, chains, settings), -3, xp), xp), 2)
+    limb = update_joints(chains.skeleton, after, chains.known[name], root=after.root, local=local, given={}, xp=xp)
+    bent = reach_limb(number, chains, limb, requested=window.next[..., number, :], share=1.0, axes=_find_hinges(chains),
+                     keeps_rotation=True, xp=xp)
+    return flatten(to_six(take_joints(bent.local, list_predicted_joints(name, chains, settings), -3, xp), xp), 2)
 
 
-def guides(name: str, chains: Chains, settings: ModelSettings) -> int:
+def count_guides(name: str, chains: Chains, settings: ModelSettings) -> int:
     """Count the last inputs of a network that come from `compute_reach_guide` or, for the hip, from `carry_hips`."""
     if name == "hip":
         return HIP_GUIDES if settings.carried else 0
-    return 6 * len(predicted(name, chains, settings)) if settings.guided and name in LIMB_OF else 0
+    return 6 * len(list_predicted_joints(name, chains, settings)) if settings.guided and name in LIMB_OF else 0
 
 
 @lru_cache(maxsize=16)
-def _hinges(chains: Chains) -> np.ndarray:
+def _find_hinges(chains: Chains) -> np.ndarray:
     """Find the axes (4, 3) of elbows and knees; they count where a limb is straight."""
-    return hinge_axes(chains, None)
+    return find_hinge_axes(chains, None)
 
 
-def widths(chains: Chains, settings: ModelSettings) -> dict[str, tuple[int, int]]:
+def count_widths(chains: Chains, settings: ModelSettings) -> dict[str, tuple[int, int]]:
     """Count inputs and outputs of each network: {name: (in, out)}."""
     local = np.broadcast_to(np.eye(3), (len(chains.skeleton), 3, 3))
-    pose = pose_of(chains.skeleton, np.zeros(3), local)
+    pose = build_pose(chains.skeleton, np.zeros(3), local)
     window = Windows(
         points=np.zeros((4, 9, 3)), deltas=np.zeros((4, 9, 3)), next=np.zeros((4, 3)),
         hands_next=np.broadcast_to(np.eye(3), (2, 3, 3)), sides=np.zeros(2), impact=np.zeros(3), phase=np.zeros(()),
     )  # fmt: skip
     found = {}
     for name in settings.networks:
-        x = network_input(name, chains, settings, pose=pose, after=pose, window=window)
-        found[name] = (x.shape[-1], network_output(name, chains, settings, pose, pose).shape[-1])
+        x = build_input(name, chains, settings, pose=pose, after=pose, window=window)
+        found[name] = (x.shape[-1], build_output(name, chains, settings, pose, pose).shape[-1])
     return found
 
 
-class _Frame:
+class _ReferenceFrame:
     """The reference frame of a chain: its joint in frame n + 1.
 
     Attributes:
@@ -230,56 +230,56 @@ class _Frame:
         self.xp = xp
         self.origin = after.positions[..., joint, :]
         self.axes = after.turns[..., joint, :, :]
-        self.back = transposed(self.axes, xp)
-        step = xp.matmul(transposed(pose.turns[..., joint, :, :], xp), self.axes)
-        self.turned = six(step - np.eye(3), xp)
+        self.inverse_axes = transpose(self.axes, xp)
+        step = xp.matmul(transpose(pose.turns[..., joint, :, :], xp), self.axes)
+        self.axes_change = to_six(step - np.eye(3), xp)
 
-    def place(self, place):
+    def to_local_position(self, place):
         """Convert a position (..., 3) m from the world to this frame."""
-        return self.xp.matmul(self.back, (place - self.origin)[..., None])[..., 0]
+        return self.xp.matmul(self.inverse_axes, (place - self.origin)[..., None])[..., 0]
 
-    def places(self, places):
+    def to_local_positions(self, places):
         """Convert positions (..., N, 3) m from the world to this frame."""
         return self.xp.matmul(places - self.origin[..., None, :], self.axes)
 
-    def ways(self, ways):
+    def to_local_vectors(self, vectors):
         """Convert vectors (..., N, 3) m from the world to this frame."""
-        return self.xp.matmul(ways, self.axes)
+        return self.xp.matmul(vectors, self.axes)
 
-    def turn(self, turn):
+    def to_local_rotation(self, rotation):
         """Convert a rotation (..., 3, 3) from the world to this frame."""
-        return self.xp.matmul(self.back, turn)
+        return self.xp.matmul(self.inverse_axes, rotation)
 
-    def turns(self, turns):
+    def to_local_rotations(self, rotations):
         """Convert rotations (..., N, 3, 3) from the world to this frame."""
-        return self.xp.matmul(self.back[..., None, :, :], turns)
+        return self.xp.matmul(self.inverse_axes[..., None, :, :], rotations)
 
 
-def _trajectory(frame: _Frame, window: Windows, number: int):
+def _build_trajectory(frame: _ReferenceFrame, window: Windows, number: int):
     """Build t of one effector, 54 values, in a chain's frame (eq. 7.1)."""
-    points = frame.places(window.points[..., number, :, :])
-    deltas = frame.ways(window.deltas[..., number, :, :])
-    return flat(frame.xp.concatenate([points, deltas], axis=-2), 2)
+    points = frame.to_local_positions(window.points[..., number, :, :])
+    deltas = frame.to_local_vectors(window.deltas[..., number, :, :])
+    return flatten(frame.xp.concatenate_motions([points, deltas], axis=-2), 2)
 
 
-def _motion(chains: Chains, settings: ModelSettings, pose: Pose, window: Windows, xp) -> list:
+def _build_motion_input(chains: Chains, settings: ModelSettings, pose: Pose, window: Windows, xp) -> list:
     """Build x_m of hip and single: b_l, b_r, i and four trajectories, measured from `compute_origin`."""
-    start = origin(chains, settings, pose)
+    start = compute_origin(chains, settings, pose)
     points = window.points - start[..., None, None, :]
-    trajectories = xp.concatenate([points, window.deltas], axis=-2)
-    return [window.sides, window.impact - start, flat(trajectories, 3)]
+    trajectories = xp.concatenate_motions([points, window.deltas], axis=-2)
+    return [window.sides, window.impact - start, flatten(trajectories, 3)]
 
 
-def _joints(chains: Chains, settings: ModelSettings, pose: Pose, joints: tuple[int, ...], xp) -> list:
+def _build_joint_input(chains: Chains, settings: ModelSettings, pose: Pose, joints: tuple[int, ...], xp) -> list:
     """Build p_j and a_j of hip and single."""
-    places = picked(pose.positions, joints, -2, xp) - origin(chains, settings, pose)[..., None, :]
-    return [flat(places, 2), flat(six(picked(pose.turns, joints, -3, xp), xp), 2)]
+    places = take_joints(pose.positions, joints, -2, xp) - compute_origin(chains, settings, pose)[..., None, :]
+    return [flatten(places, 2), flatten(to_six(take_joints(pose.turns, joints, -3, xp), xp), 2)]
 
 
-def stretch(number: int, chains: Chains, after: Pose, window: Windows, xp=np):
+def measure_limb_distance(number: int, chains: Chains, after: Pose, window: Windows, xp=np):
     """Measure d: metres (..., 1) from a limb's first joint to the target of its end in frame n + 1."""
-    way = window.next[..., number, :] - after.positions[..., chains.sockets[number], :]
-    return xp.sqrt(xp.sum(way * way, axis=-1, keepdims=True))
+    to_target = window.next[..., number, :] - after.positions[..., chains.sockets[number], :]
+    return xp.sqrt(xp.sum(to_target * to_target, axis=-1, keepdims=True))
 
 
 def carry_hips(chains: Chains, pose: Pose, window: Windows, origin, xp=np):
@@ -297,18 +297,18 @@ def carry_hips(chains: Chains, pose: Pose, window: Windows, origin, xp=np):
     Returns:
         (..., 9): position less `origin`, and rotation as six numbers.
     """
-    now = picked(pose.positions, chains.effectors, -2, xp)
-    share = _COUNTS[:, None]
-    middle, wanted = (now * share).sum(-2), (window.next * share).sum(-2)
-    a, b = share * (now - middle[..., None, :]), window.next - wanted[..., None, :]
+    now = take_joints(pose.positions, chains.effectors, -2, xp)
+    share = _EFFECTOR_WEIGHTS[:, None]
+    middle, target_middle = (now * share).sum(-2), (window.next * share).sum(-2)
+    a, b = share * (now - middle[..., None, :]), window.next - target_middle[..., None, :]
     along = (a[..., :2] * b[..., :2]).sum((-1, -2))
-    across = cross_level(a, b).sum(-1)
-    turn = _about_up(along, across, xp)
-    place = xp.matmul(turn, (pose.positions[..., chains.hips, :] - middle)[..., None])[..., 0] + wanted
-    return xp.concatenate([place - origin, six(xp.matmul(turn, pose.turns[..., chains.hips, :, :]), xp)], axis=-1)
+    across = cross_on_ground(a, b).sum(-1)
+    turn = _build_vertical_rotation(along, across, xp)
+    place = xp.matmul(turn, (pose.positions[..., chains.hips, :] - middle)[..., None])[..., 0] + target_middle
+    return xp.concatenate_motions([place - origin, to_six(xp.matmul(turn, pose.turns[..., chains.hips, :, :]), xp)], axis=-1)
 
 
-def _about_up(along, across, xp):
+def _build_vertical_rotation(along, across, xp):
     """Build rotations (..., 3, 3) about the vertical by the angle of (`along`, `across`), both (...)."""
     long = xp.sqrt(along * along + across * across + _TINY)
     cosine, sine, nothing = along / long, across / long, xp.zeros_like(along)

@@ -14,21 +14,21 @@ import numpy as np
 
 from ...base.errors import InputError
 from . import answers, features
-from .chains import HIERARCHY, LIMB_OF, Chains, chains_of
+from .chains import HIERARCHY, LIMB_OF, Chains, find_chains
 from .description import BACK, SAMPLES, STEP, Windows
 from .kinematics import Pose
-from .limb_reach import LimbReach, posed
-from .limits import JointLimits, learn
+from .limb_reach import LimbReach, build_static_pose
+from .limits import JointLimits, estimate_joint_limits
 from .model import SINGLE, ThrowModel
 from .phases import weigh_points_at
 
-_SETTLES = 0.12
+_SETTLING_TIME = 0.12
 """Seconds in which tanh moves an offset trajectory back to the requested one by three quarters (section 7.7.3)."""
 
-_FELT = 2e-3
+_MIN_LIMIT_CORRECTION = 2e-3
 """Radians of limit correction above which the limbs reach again."""
 
-_SIX = np.array([1.0, 0.0, 0.0, 0.0, 1.0, 0.0])  # the identity rotation
+_IDENTITY_SIX = np.array([1.0, 0.0, 0.0, 0.0, 1.0, 0.0])  # the identity rotation
 _NEXT, _LAST = np.array([1, 2, 0]), np.array([2, 0, 1])
 _TINY = 1e-12
 _GROUND = np.array([1.0, 1.0, 0.0])
@@ -59,15 +59,15 @@ class Stepper:
     def __init__(self, model: ThrowModel):
         """Prepare the model; InputError if the networks' inputs and outputs do not match its settings."""
         self.model = model
-        self.chains = chains_of(model.skeleton)
+        self.chains = find_chains(model.skeleton)
         _check_widths(model, self.chains)
-        self.limits = JointLimits(model.skeleton, _limits_of(model))
+        self.limits = JointLimits(model.skeleton, _choose_limits(model))
         self.effectors = list(self.chains.effectors)
         self.floating_effectors = [self.chains.joints.index(joint) for joint in self.effectors]
-        self.hierarchy = OneFrame(model, self.chains) if model.settings.kind == "hierarchy" else None
+        self.hierarchy = HierarchyPredictor(model, self.chains) if model.settings.kind == "hierarchy" else None
         self.reach = LimbReach(self.chains, self.limits, model.settings.wrist == "given")
 
-    def step(self, pose: Pose, window: Windows, wanted: np.ndarray, share: np.ndarray | None, limited: bool) -> Step:
+    def predict_step(self, pose: Pose, window: Windows, requested: np.ndarray, share: np.ndarray | None, limited: bool) -> Step:
         """Predict frame n + 1 from the pose and window of frame n.
 
         Args:
@@ -77,19 +77,19 @@ class Stepper:
             share: (4,) share of the distance from prediction to target that each effector moves, None for none.
             limited: joints stay within their limits, and network inputs near the training data.
         """
-        after, floating = self.predicted(pose, window, limited)
-        said = after.positions[self.effectors] if floating is None else floating[self.floating_effectors]
+        after, floating = self.predict_pose(pose, window, limited)
+        predicted = after.positions[self.effectors] if floating is None else floating[self.floating_effectors]
         over = np.zeros(len(self.model.skeleton))
         if limited and share is None:
-            after, over = self._limited(after)
+            after, over = self._limit_joints(after)
         elif limited:
-            after, over = self._within_reach(after, wanted, share)
+            after, over = self._reach_within_limits(after, requested, share)
         elif share is not None:
-            after = self.reach(after, wanted, share)
-        state = after if floating is None or share is not None else self._afloat(after, floating)
-        return Step(after, state._replace(moved=state.positions - pose.positions), said, over, floating)
+            after = self.reach(after, requested, share)
+        state = after if floating is None or share is not None else self._replace_positions(after, floating)
+        return Step(after, state._replace(moved=state.positions - pose.positions), predicted, over, floating)
 
-    def predicted(self, pose: Pose, window: Windows, bounded: bool) -> tuple[Pose, np.ndarray | None]:
+    def predict_pose(self, pose: Pose, window: Windows, bounded: bool) -> tuple[Pose, np.ndarray | None]:
         """Predict the next frame with the networks alone.
 
         Args:
@@ -103,40 +103,40 @@ class Stepper:
             return self.hierarchy(pose, window, bounded), None
         network, settings = self.model.networks[SINGLE], self.model.settings
         theta = weigh_points_at(float(window.phase), network.points)
-        x = features.single_input(self.chains, settings, pose, window)
-        y = network.frame(np.clip(x, *network.bounds) if bounded else x, theta).astype(float)
-        floating = answers.floating(self.chains, settings, y, pose)[0]
-        return answers.answered(SINGLE, self.chains, settings, y=y, pose=pose, after=pose, window=window), floating
+        x = features.build_single_input(self.chains, settings, pose, window)
+        y = network.frame_network(np.clip(x, *network.input_bounds) if bounded else x, theta).astype(float)
+        floating = answers.split_single_output(self.chains, settings, y, pose)[0]
+        return answers.apply_output(SINGLE, self.chains, settings, y=y, pose=pose, after=pose, window=window), floating
 
-    def _afloat(self, pose: Pose, floating: np.ndarray) -> Pose:
+    def _replace_positions(self, pose: Pose, floating: np.ndarray) -> Pose:
         """Replace the positions of the joints that the single network moves."""
         places = pose.positions.copy()
         places[list(self.chains.joints)] = floating
         return pose._replace(positions=places)
 
-    def _within_reach(self, after: Pose, wanted: np.ndarray, share: np.ndarray) -> tuple[Pose, np.ndarray]:
+    def _reach_within_limits(self, after: Pose, requested: np.ndarray, share: np.ndarray) -> tuple[Pose, np.ndarray]:
         """Reach with the limbs and limit the joints; reach again with the rest where a limit changed a joint."""
-        after, over = self._limited(self.reach(after, wanted, share))
-        if over.max() > _FELT:
-            after, more = self._limited(self.reach(after, wanted, share))
+        after, over = self._limit_joints(self.reach(after, requested, share))
+        if over.max() > _MIN_LIMIT_CORRECTION:
+            after, more = self._limit_joints(self.reach(after, requested, share))
             over = np.maximum(over, more)
         return after, over
 
-    def _limited(self, pose: Pose) -> tuple[Pose, np.ndarray]:
+    def _limit_joints(self, pose: Pose) -> tuple[Pose, np.ndarray]:
         """Limit the joints of a pose; also return the excess (J,) rad."""
-        local, over = self.limits.within(pose.local)
-        return (pose, over) if local is pose.local else (posed(self.chains, pose.root, local), over)
+        local, over = self.limits.limit_rotations(pose.local)
+        return (pose, over) if local is pose.local else (build_static_pose(self.chains, pose.root, local), over)
 
 
 @lru_cache(maxsize=8)
-def stepper(model: ThrowModel) -> Stepper:
+def prepare_stepper(model: ThrowModel) -> Stepper:
     """Prepare a model; cached, since models are evaluated repeatedly."""
     return Stepper(model)
 
 
 def _check_widths(model: ThrowModel, chains: Chains) -> None:
     """Raise InputError if inputs or outputs of a network do not match the settings on this skeleton."""
-    for name, (inputs, outputs) in features.widths(chains, model.settings).items():
+    for name, (inputs, outputs) in features.count_widths(chains, model.settings).items():
         network = model.networks[name]
         if (network.inputs, network.outputs) != (inputs, outputs):
             found = f"{network.inputs} inputs and {network.outputs} outputs"
@@ -145,22 +145,22 @@ def _check_widths(model: ThrowModel, chains: Chains) -> None:
             )
 
 
-def _limits_of(model: ThrowModel) -> np.ndarray:
+def _choose_limits(model: ThrowModel) -> np.ndarray:
     """Return the model's joint limits, or estimate them from its examples."""
     if model.joint_limits is not None:
         return model.joint_limits
-    free = (0, *stillness(model))
-    return learn(np.concatenate([example.motion.rotations for example in model.examples]), free)
+    free = (0, *list_unlimited_joints(model))
+    return estimate_joint_limits(np.concatenate([example.motion.rotations for example in model.examples]), free)
 
 
-def stillness(model: ThrowModel) -> tuple[int, ...]:
+def list_unlimited_joints(model: ThrowModel) -> tuple[int, ...]:
     """List the joints without limits besides the root: those between it and the hips, and the hips."""
-    chains = chains_of(model.skeleton)
+    chains = find_chains(model.skeleton)
     return (*chains.above, chains.hips)
 
 
 @lru_cache(maxsize=8)
-def _fading(fps: float) -> tuple[np.ndarray, np.ndarray, float]:
+def _compute_fade(fps: float) -> tuple[np.ndarray, np.ndarray, float]:
     """Compute how an offset fades over a window.
 
     Returns:
@@ -168,13 +168,13 @@ def _fading(fps: float) -> tuple[np.ndarray, np.ndarray, float]:
     """
     seconds = (np.arange(SAMPLES) - BACK) * STEP
 
-    def left(t):
-        return 1.0 - np.tanh(np.maximum(t, 0.0) / _SETTLES)
+    def remaining_share(t):
+        return 1.0 - np.tanh(np.maximum(t, 0.0) / _SETTLING_TIME)
 
-    return left(seconds)[:, None], (left(seconds + 1.0 / fps) - left(seconds))[:, None], float(left(1.0 / fps))
+    return remaining_share(seconds)[:, None], (remaining_share(seconds + 1.0 / fps) - remaining_share(seconds))[:, None], float(remaining_share(1.0 / fps))
 
 
-def blended(window: Windows, offset: np.ndarray, fps: float) -> Windows:
+def blend_window(window: Windows, offset: np.ndarray, fps: float) -> Windows:
     """Blend a window's trajectories from the current positions of the effectors to the requested ones by tanh.
 
     Args:
@@ -183,35 +183,35 @@ def blended(window: Windows, offset: np.ndarray, fps: float) -> Windows:
         fps: frames per second.
     Source: Fredriksson section 7.7.3.
     """
-    left, change, following = _fading(fps)
+    left, change, following = _compute_fade(fps)
     return window._replace(
         points=window.points + offset[:, None, :] * left, deltas=window.deltas + offset[:, None, :] * change,
         next=window.next + offset * following,
     )
 
 
-class OneFrame:
+class HierarchyPredictor:
     """The networks of a hierarchy, prepared to predict one frame after another. Keeps no state between frames."""
 
     def __init__(self, model: ThrowModel, chains: Chains):
         """Prepare a `model` of kind hierarchy; `chains` are those of its skeleton."""
         settings = model.settings
         self.chains, self.points = chains, settings.points
-        self.static, self.given = settings.frame == "static", settings.wrist == "given"
-        self.carried = settings.carried
-        self.networks = [model.networks[name].frame for name in HIERARCHY]
-        self.bounds = [model.networks[name].bounds for name in HIERARCHY]
+        self.is_static, self.has_hand_rotations = settings.frame == "static", settings.wrist == "given"
+        self.has_carried_hips = settings.carried
+        self.networks = [model.networks[name].frame_network for name in HIERARCHY]
+        self.bounds = [model.networks[name].input_bounds for name in HIERARCHY]
         self.reach = [model.leg_reach[name[:-4]] for name in LIMB_OF[2:]]
         parents, offsets = chains.skeleton.parents, chains.skeleton.offsets
         self.plans = {name: [(joint, parents[joint], offsets[joint]) for joint in chains.known[name]]
                       for name in HIERARCHY}  # fmt: skip
-        self.said = [list(answers.predicted(name, chains, settings)) for name in HIERARCHY]
-        self.limb_joints = [joint for said in self.said[2:] for joint in said]
-        self.hip_sees, self.body_sees = list(chains.hip_sees), list(chains.body_sees)
+        self.predicted_joints = [list(answers.list_predicted_joints(name, chains, settings)) for name in HIERARCHY]
+        self.limb_joints = [joint for said in self.predicted_joints[2:] for joint in said]
+        self.hip_inputs, self.body_inputs = list(chains.hip_inputs), list(chains.body_inputs)
         self.references = [chains.references[name] for name in LIMB_OF]
         self.sockets, self.trunk = list(chains.sockets), list(chains.trunk)
-        self.others = [[self.trunk.index(joint) for joint in seen] for seen in chains.arm_sees]
-        self.leg_sees = list(chains.leg_sees)
+        self.arm_inputs = [[self.trunk.index(joint) for joint in seen] for seen in chains.arm_inputs]
+        self.leg_inputs = list(chains.leg_inputs)
         self.guide = LimbReach(chains, None, True) if settings.guided else None
 
     def __call__(self, pose: Pose, window: Windows, bounded: bool = False) -> Pose:
@@ -223,58 +223,58 @@ class OneFrame:
         after = Pose(pose.root, pose.local.copy(), pose.positions.copy(), pose.turns.copy(), pose.moved)
         sixes = pose.turns.swapaxes(1, 2)[:, :2].reshape(-1, 6)
         relative = pose.local.swapaxes(1, 2)[:, :2].reshape(-1, 6)
-        after = self._hips(after, self._ask(0, self._hip_input(pose, window, sixes), theta, bounded), pose)
-        turns = _rotations(self._ask(1, self._body_input(pose, after, window, relative), theta, bounded))
-        after.local[self.said[1]] = turns
-        _spread(self.plans["body"], after, {})
-        turns = _rotations(self._limbs(pose, after, window, relative=relative, theta=theta, bounded=bounded))
+        after = self._place_hips(after, self._evaluate_network(0, self._build_hip_input(pose, window, sixes), theta, bounded), pose)
+        turns = _from_six(self._evaluate_network(1, self._build_body_input(pose, after, window, relative), theta, bounded))
+        after.local[self.predicted_joints[1]] = turns
+        _update_joints(self.plans["body"], after, {})
+        turns = _from_six(self._evaluate_limbs(pose, after, window, relative=relative, theta=theta, bounded=bounded))
         after.local[self.limb_joints] = turns
         for number, name in enumerate(LIMB_OF):
-            hand = self.given and number < 2
+            hand = self.has_hand_rotations and number < 2
             given = {self.chains.effectors[number]: window.hands_next[number]} if hand else {}
-            _spread(self.plans[name], after, given)
+            _update_joints(self.plans[name], after, given)
         return after
 
-    def _ask(self, number: int, x: np.ndarray, theta: np.ndarray, bounded: bool) -> np.ndarray:
+    def _evaluate_network(self, number: int, x: np.ndarray, theta: np.ndarray, bounded: bool) -> np.ndarray:
         """Evaluate network `number` of the hierarchy."""
         if bounded:
             x = np.minimum(np.maximum(x, self.bounds[number][0]), self.bounds[number][1])
         return self.networks[number](x, theta)
 
-    def _hip_input(self, pose: Pose, window: Windows, sixes: np.ndarray) -> np.ndarray:
+    def _build_hip_input(self, pose: Pose, window: Windows, sixes: np.ndarray) -> np.ndarray:
         """Build the input of the hip network."""
-        start = pose.positions[self.chains.hips] * (0.0 if self.static else _GROUND)
+        start = pose.positions[self.chains.hips] * (0.0 if self.is_static else _GROUND)
         trajectories = np.concatenate([window.points - start, window.deltas], axis=1)
-        places = pose.positions[self.hip_sees] - start
-        guide = [features.carry_hips(self.chains, pose, window, start)] if self.carried else []
-        return _row(window.sides, window.impact - start, trajectories, places, sixes[self.hip_sees], *guide)
+        places = pose.positions[self.hip_inputs] - start
+        guide = [features.carry_hips(self.chains, pose, window, start)] if self.has_carried_hips else []
+        return _join_row(window.sides, window.impact - start, trajectories, places, sixes[self.hip_inputs], *guide)
 
-    def _hips(self, after: Pose, y: np.ndarray, pose: Pose) -> Pose:
+    def _place_hips(self, after: Pose, y: np.ndarray, pose: Pose) -> Pose:
         """Place the hips where the first network predicts them; joints above them only move."""
         y, hips, offsets = y.astype(float), self.chains.hips, self.chains.skeleton.offsets
-        place = y[:3] + (0.0 if self.static else pose.positions[hips] * _GROUND)
-        turn = _rotations(y[3:])[0]
+        place = y[:3] + (0.0 if self.is_static else pose.positions[hips] * _GROUND)
+        turn = _from_six(y[3:])[0]
         root, above = place, None
         for joint in (*self.chains.above, hips):
             if joint:
                 root = root - above @ offsets[joint]
             above = after.local[joint] if above is None else above @ after.local[joint]
         after = after._replace(root=root)
-        _spread(self.plans["hip"], after, {hips: turn})
+        _update_joints(self.plans["hip"], after, {hips: turn})
         return after
 
-    def _body_input(self, pose: Pose, after: Pose, window: Windows, relative: np.ndarray) -> np.ndarray:
+    def _build_body_input(self, pose: Pose, after: Pose, window: Windows, relative: np.ndarray) -> np.ndarray:
         """Build the input of the body network."""
         joint = self.chains.references["body"]
         origin, axes = after.positions[joint], after.turns[joint]
         trajectories = np.concatenate([window.points[:2] - origin, window.deltas[:2]], axis=1) @ axes
         toes, impact = (window.next[2:] - origin) @ axes, (window.impact - origin) @ axes
-        turned = _six(pose.turns[joint].T @ axes) - _SIX
-        places = (pose.positions[self.body_sees] - origin) @ axes
-        return _row(window.sides, impact, trajectories, toes, turned, relative[self.said[1]], places,
-                    _six(axes.T @ pose.turns[self.body_sees]))  # fmt: skip
+        turned = _to_six(pose.turns[joint].T @ axes) - _IDENTITY_SIX
+        places = (pose.positions[self.body_inputs] - origin) @ axes
+        return _join_row(window.sides, impact, trajectories, toes, turned, relative[self.predicted_joints[1]], places,
+                    _to_six(axes.T @ pose.turns[self.body_inputs]))  # fmt: skip
 
-    def _limbs(
+    def _evaluate_limbs(
         self, pose: Pose, after: Pose, window: Windows, relative: np.ndarray, theta: np.ndarray, bounded: bool
     ) -> np.ndarray:
         """Evaluate the networks of arms and legs: (rotations * 6,), one limb after the other."""
@@ -282,26 +282,26 @@ class OneFrame:
         origins, axes = after.positions[self.references][:, None], after.turns[self.references]
         back = axes.swapaxes(1, 2)
         # per limb 9 points, 9 deltas and the next position, in the axes of its reference joint
-        ways = np.concatenate([window.points - origins, window.deltas, window.next[:, None] - origins], axis=1) @ axes
-        turned = _six(pose.turns[self.references].swapaxes(1, 2) @ axes) - _SIX
+        trajectories = np.concatenate([window.points - origins, window.deltas, window.next[:, None] - origins], axis=1) @ axes
+        turned = _to_six(pose.turns[self.references].swapaxes(1, 2) @ axes) - _IDENTITY_SIX
         sockets = after.positions[self.sockets]
         stretch = np.sqrt(((window.next - sockets) ** 2).sum(-1))
         trunk = (after.positions[self.trunk] - origins[:2]) @ axes[:2]
         above = np.concatenate([after.positions[self.chains.head][None], sockets[:2]])
-        others = *(trunk[arm, self.others[arm]] for arm in (0, 1)), *((above - origins[2:]) @ axes[2:])
-        turns = *_six(back[:2, None] @ after.turns[self.trunk]), *_six(back[2:, None] @ after.turns[self.leg_sees])
-        hands = _six(back[:2] @ window.hands_next) if self.given else ()
-        answers, guides = [], self._guides(after, window)
+        others = *(trunk[arm, self.arm_inputs[arm]] for arm in (0, 1)), *((above - origins[2:]) @ axes[2:])
+        turns = *_to_six(back[:2, None] @ after.turns[self.trunk]), *_to_six(back[2:, None] @ after.turns[self.leg_inputs])
+        hands = _to_six(back[:2] @ window.hands_next) if self.has_hand_rotations else ()
+        outputs, guides = [], self._build_guides(after, window)
         for number in range(4):
             arm = number < 2
-            x = _row(*([window.sides] if arm else []), ways[number], turned[number],
-                     *([hands[number]] if arm and self.given else []), stretch[number : number + 1],
-                     relative[self.said[2 + number]], others[number], turns[number], *guides[number])  # fmt: skip
-            answers.append(self._ask(
-                2 + number, x, theta if arm else self._leg_theta(number, stretch[number]), bounded))
-        return np.concatenate(answers)
+            x = _join_row(*([window.sides] if arm else []), trajectories[number], turned[number],
+                     *([hands[number]] if arm and self.has_hand_rotations else []), stretch[number : number + 1],
+                     relative[self.predicted_joints[2 + number]], others[number], turns[number], *guides[number])  # fmt: skip
+            outputs.append(self._evaluate_network(
+                2 + number, x, theta if arm else self._weigh_leg_points(number, stretch[number]), bounded))
+        return np.concatenate(outputs)
 
-    def _guides(self, after: Pose, window: Windows) -> list[list[np.ndarray]]:
+    def _build_guides(self, after: Pose, window: Windows) -> list[list[np.ndarray]]:
         """Build what `features.compute_reach_guide` returns for each limb, empty if the model is not guided.
 
         The limbs in `after` are left as they hang on the body of the next frame with the rotations of this one.
@@ -309,17 +309,17 @@ class OneFrame:
         if self.guide is None:
             return [[]] * 4
         for name in LIMB_OF:
-            _spread(self.plans[name], after, {})
-        sixes = _six(self.guide.all_the_way(after, window.next))
-        return [[sixes[said]] for said in self.said[2:]]
+            _update_joints(self.plans[name], after, {})
+        sixes = _to_six(self.guide.reach_fully(after, window.next))
+        return [[sixes[said]] for said in self.predicted_joints[2:]]
 
-    def _leg_theta(self, number: int, stretch: float) -> np.ndarray:
+    def _weigh_leg_points(self, number: int, stretch: float) -> np.ndarray:
         """Compute the control point weights of a leg stretched to `stretch` metres (eq. 7.3)."""
         low, high = self.reach[number - 2]
         return np.array(weigh_points_at((float(stretch) - low) / (high - low), self.points), np.float32)
 
 
-def _spread(plan: list[tuple[int, int, np.ndarray]], after: Pose, given: dict[int, np.ndarray]) -> None:
+def _update_joints(plan: list[tuple[int, int, np.ndarray]], after: Pose, given: dict[int, np.ndarray]) -> None:
     """Update the joints of a plan (joint, parent, offset), parents first, in `after` itself.
 
     Local rotations are those of `after`; `given` contains world rotations, which replace them.
@@ -339,17 +339,17 @@ def _spread(plan: list[tuple[int, int, np.ndarray]], after: Pose, given: dict[in
         places[joint] = places[parent] + base @ offset
 
 
-def _row(*parts: np.ndarray) -> np.ndarray:
+def _join_row(*parts: np.ndarray) -> np.ndarray:
     """Join arrays to one input row, float32."""
     return np.concatenate([part.reshape(-1) for part in parts], dtype=np.float32, casting="same_kind")
 
 
-def _six(turns: np.ndarray) -> np.ndarray:
+def _to_six(turns: np.ndarray) -> np.ndarray:
     """Convert rotations (..., 3, 3) to six numbers (..., 6)."""
     return turns.swapaxes(-1, -2)[..., :2, :].reshape(*turns.shape[:-2], 6)
 
 
-def _rotations(values: np.ndarray) -> np.ndarray:
+def _from_six(values: np.ndarray) -> np.ndarray:
     """Convert values (6 N,) to the nearest rotations (N, 3, 3): Gram-Schmidt, the x axis first."""
     both = values.astype(float).reshape(-1, 2, 3)
     first, second = both[:, 0], both[:, 1]

@@ -16,20 +16,20 @@ import numpy as np
 from ...base.errors import InputError
 from ...motion import quaternion
 from ...motion.motion import Motion, forward_kinematics
-from .chains import chains_of
-from .description import Description, Windows, phases, windows
-from .frame_step import Step, Stepper, blended, stepper
-from .kinematics import Pose, matrices, motion_of, places_and_turns
+from .chains import find_chains
+from .description import Description, Windows, compute_phases, build_windows
+from .frame_step import Step, Stepper, blend_window, prepare_stepper
+from .kinematics import Pose, to_matrices, to_motion, compute_world_transforms
 from .model import ThrowModel
 
-_STILL, _MOVING = 0.15, 0.6  # m/s of a toe: slower ones are in contact with the ground, faster ones are not
-_LOW = 0.03  # metres above its lowest position up to which a toe may be in contact
-_FARTHEST = 1e4  # metres from the origin beyond which the generated body is invalid
+_CONTACT_SPEED, _FREE_SPEED = 0.15, 0.6  # m/s of a toe: slower ones are in contact with the ground, faster ones are not
+_CONTACT_HEIGHT = 0.03  # metres above its lowest position up to which a toe may be in contact
+_MAX_COORDINATE = 1e4  # metres from the origin beyond which the generated body is invalid
 _PATIENCE = 8  # iterations of the start pose allowed without an improvement of a millimetre
 
-_SECONDS = 0.12  # a difference in velocity counts as the distance it makes in this time
-_TURN = 0.25  # m per radian: cost of rotating an example, since a body with another heading throws differently
-_LATE = 0.5  # m: cost of a frame at the end of its example as the beginning of a movement
+_VELOCITY_SECONDS = 0.12  # a difference in velocity counts as the distance it makes in this time
+_ROTATION_COST = 0.25  # m per radian: cost of rotating an example, since a body with another heading throws differently
+_LATE_COST = 0.5  # m: cost of a frame at the end of its example as the beginning of a movement
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class Options:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Generated:
+class GeneratedMotion:
     """A generated motion.
 
     Attributes:
@@ -78,7 +78,7 @@ class Generated:
     motion: Motion
     effectors: np.ndarray
     predicted: np.ndarray
-    wanted: np.ndarray
+    requested: np.ndarray
     over: np.ndarray
     floating: np.ndarray | None
     iterations: int
@@ -87,22 +87,22 @@ class Generated:
     @property
     def deviation(self) -> np.ndarray:
         """Metres (T, 4) between each effector and its target (eq. 4.1)."""
-        return np.linalg.norm(self.effectors - self.wanted, axis=-1)
+        return np.linalg.norm(self.effectors - self.requested, axis=-1)
 
     @property
-    def raw(self) -> np.ndarray:
+    def network_deviation(self) -> np.ndarray:
         """Metres (T, 4) between the networks' prediction of each effector and its target."""
-        return np.linalg.norm(self.predicted - self.wanted, axis=-1)
+        return np.linalg.norm(self.predicted - self.requested, axis=-1)
 
     @property
-    def corrected(self) -> np.ndarray:
+    def correction_distance(self) -> np.ndarray:
         """Metres (T, 4) by which limits and inverse kinematics moved each effector."""
         return np.linalg.norm(self.effectors - self.predicted, axis=-1)
 
 
-def generate(
+def generate_motion(
     model: ThrowModel, description: Description, start: Pose | None = None, options: Options | None = None
-) -> Generated:
+) -> GeneratedMotion:
     """Generate the motion that follows a description.
 
     Args:
@@ -116,85 +116,85 @@ def generate(
             output is invalid.
     """
     options = options or Options()
-    _check(model, description)
-    began = time.perf_counter()
-    seen = _windows(model, description)
-    loop = _Loop(stepper(model), description, options)
+    _check_description(model, description)
+    start_time = time.perf_counter()
+    all_windows = _list_windows(model, description)
+    loop = _FrameLoop(prepare_stepper(model), description, options)
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-        first, iterations = loop.start(start, seen[0])
+        first, iterations = loop.predict_first_frame(start, all_windows[0])
         steps = [first]
         for frame in range(len(description) - 1):
-            steps.append(loop.step(steps[-1].state, seen[frame + 1], frame, frame + 1))
-    return _generated(model, description, steps, iterations, time.perf_counter() - began)
+            steps.append(loop.predict_frame(steps[-1].state, all_windows[frame + 1], frame, frame + 1))
+    return _build_result(model, description, steps, iterations, time.perf_counter() - start_time)
 
 
-class _Loop:
+class _FrameLoop:
     """Values that stay the same from frame to frame."""
 
-    def __init__(self, ready: Stepper, description: Description, options: Options):
-        self.ready, self.options = ready, options
-        self.wanted = description.effectors
+    def __init__(self, stepper: Stepper, description: Description, options: Options):
+        self.stepper, self.options = stepper, options
+        self.requested = description.effectors
         self.fps, self.limb = description.fps, description.limb
-        self.shares = _shares(description, options) if options.ik else None
+        self.shares = _compute_shares(description, options) if options.ik else None
 
-    def step(self, pose: Pose, window: Windows, now: int, then: int) -> Step:
+    def predict_frame(self, pose: Pose, window: Windows, now: int, then: int) -> Step:
         """Predict frame `then` from the pose of frame `now`."""
         if self.options.blend:
-            window = blended(window, pose.positions[self.ready.effectors] - self.wanted[now], self.fps)
+            window = blend_window(window, pose.positions[self.stepper.effectors] - self.requested[now], self.fps)
         share = None if self.shares is None else self.shares[then]
-        made = self.ready.step(pose, window, self.wanted[then], share, self.options.limits)
-        _check_numbers(made, then)
-        return made
+        step = self.stepper.predict_step(pose, window, self.requested[then], share, self.options.limits)
+        _check_pose(step, then)
+        return step
 
-    def start(self, pose: Pose | None, window: Windows) -> tuple[Step, int]:
+    def predict_first_frame(self, pose: Pose | None, window: Windows) -> tuple[Step, int]:
         """Predict the first frame (section 7.7.1): the best result of the iterations, and their number."""
         if pose is None:
-            velocities = (self.wanted[1] - self.wanted[0]) * self.fps
-            pose = start_pose(self.ready.model, self.wanted[0], velocities, self.limb)
-        places = pose.positions[self.ready.effectors]
-        single = self.ready.model.settings.kind == "single"
-        floating = pose.positions[list(self.ready.chains.joints)] if single else None
-        best = Step(pose, pose, places, np.zeros(len(self.ready.model.skeleton)), floating)
-        least, stale, count = self._off(best), 0, 0
+            velocities = (self.requested[1] - self.requested[0]) * self.fps
+            pose = choose_start_pose(self.stepper.model, self.requested[0], velocities, self.limb)
+        places = pose.positions[self.stepper.effectors]
+        single = self.stepper.model.settings.kind == "single"
+        floating = pose.positions[list(self.stepper.chains.joints)] if single else None
+        best = Step(pose, pose, places, np.zeros(len(self.stepper.model.skeleton)), floating)
+        least, stale, count = self._measure_error(best), 0, 0
         last = best
         while least > self.options.tolerance and count < self.options.pose_iterations and stale < _PATIENCE:
-            last = self.step(last.state, window, 0, 0)
+            last = self.predict_frame(last.state, window, 0, 0)
             count, stale = count + 1, stale + 1
-            if self._off(last) < least - 1e-3:
-                best, least, stale = last, self._off(last), 0
+            if self._measure_error(last) < least - 1e-3:
+                best, least, stale = last, self._measure_error(last), 0
         return best, count
 
-    def _off(self, step: Step) -> float:
+    def _measure_error(self, step: Step) -> float:
         """Measure the largest distance (m) of an effector from its target in the first frame."""
-        places = step.state.positions[self.ready.effectors]
-        return float(np.sqrt(((places - self.wanted[0]) ** 2).sum(-1)).max())
+        places = step.state.positions[self.stepper.effectors]
+        return float(np.sqrt(((places - self.requested[0]) ** 2).sum(-1)).max())
 
 
-def _shares(description: Description, options: Options) -> np.ndarray:
+def _compute_shares(description: Description, options: Options) -> np.ndarray:
     """Compute the share (T, 4) of the distance to its target that each effector moves: 1 for feet in contact."""
     places = description.effectors
     speed = np.linalg.norm(np.gradient(places, 1.0 / description.fps, axis=0), axis=-1)
     height = places[..., 2] - places[..., 2].min(axis=0)
-    still = np.clip((_MOVING - speed) / (_MOVING - _STILL), 0.0, 1.0) * np.clip(2.0 - height / _LOW, 0.0, 1.0)
-    still[:, :2] = 0.0
-    return options.share + (1.0 - options.share) * still
+    contact = np.clip((_FREE_SPEED - speed) / (_FREE_SPEED - _CONTACT_SPEED), 0.0, 1.0) * np.clip(2.0 - height / _CONTACT_HEIGHT, 0.0, 1.0)
+    contact[:, :2] = 0.0
+    return options.share + (1.0 - options.share) * contact
 
 
-def _windows(model: ThrowModel, description: Description) -> list[Windows]:
+def _list_windows(model: ThrowModel, description: Description) -> list[Windows]:
     """Build the window of the frame before the first, then those of all frames; the first two have the same phase."""
     before = description.effectors[:1] if description.before is None else description.before[-1:]
-    longer = replace(
+    extended = replace(
         description, effectors=np.concatenate([before, description.effectors]),
         before=None if description.before is None or len(description.before) < 2 else description.before[:-1],
         hands=None if description.hands is None else np.concatenate([description.hands[:1], description.hands]),
         release=description.release + 1.0,
     )
-    phase = phases(description, model.reference)
-    every = windows(longer)._replace(phase=np.concatenate([phase[:1], phase]))
-    return [Windows(*(None if part is None else part[n] for part in every)) for n in range(len(longer))]
+    phase = compute_phases(description, model.reference)
+    all_windows = build_windows(extended)._replace(phase=np.concatenate([phase[:1], phase]))
+    return [Windows(*(None if part is None else part[n] for part in all_windows)) for n in range(len(extended))]
 
 
-def _check(model: ThrowModel, description: Description) -> None:
+def _check_description(model: ThrowModel, description: Description) -> None:
     """Raise InputError if frame rate or hand rotations do not match the model."""
     if abs(description.fps - model.settings.fps) > 1e-6:
         found = f"{description.fps:g} frames per second"
@@ -203,22 +203,22 @@ def _check(model: ThrowModel, description: Description) -> None:
         raise InputError("description", "no hand rotations", "hand rotations, which the model was trained with")
 
 
-def _check_numbers(step: Step, frame: int) -> None:
+def _check_pose(step: Step, frame: int) -> None:
     """Raise InputError if the body is invalid: networks may return NaN or huge values far from their training data."""
-    if not (np.isfinite(step.pose.positions).all() and np.abs(step.pose.positions).max() < _FARTHEST):
+    if not (np.isfinite(step.pose.positions).all() and np.abs(step.pose.positions).max() < _MAX_COORDINATE):
         raise InputError("model", f"an invalid body in frame {frame}", "a body near its description",
                          "choose a target like those of the examples, or train the model longer")  # fmt: skip
 
 
-def _generated(model, description: Description, steps: list[Step], iterations: int, seconds: float) -> Generated:
+def _build_result(model, description: Description, steps: list[Step], iterations: int, seconds: float) -> GeneratedMotion:
     """Build the result from the predicted frames."""
     root = np.stack([step.pose.root for step in steps])
     local = np.stack([step.pose.local for step in steps])
-    effectors = list(stepper(model).effectors)
-    return Generated(
-        motion=motion_of(model.skeleton, root, local, description.fps),
+    effectors = list(prepare_stepper(model).effectors)
+    return GeneratedMotion(
+        motion=to_motion(model.skeleton, root, local, description.fps),
         effectors=np.stack([step.pose.positions[effectors] for step in steps]),
-        predicted=np.stack([step.predicted for step in steps]), wanted=description.effectors,
+        predicted=np.stack([step.predicted for step in steps]), requested=description.effectors,
         over=np.stack([step.over for step in steps]),
         floating=None if steps[0].floating is None else np.stack([step.floating for step in steps]),
         iterations=iterations, seconds=seconds,
@@ -226,7 +226,7 @@ def _generated(model, description: Description, steps: list[Step], iterations: i
 
 
 @dataclass(frozen=True, eq=False)
-class Stock:
+class ExampleFrames:
     """All frames of the examples.
 
     Attributes:
@@ -243,11 +243,11 @@ class Stock:
     limb: np.ndarray
     example: np.ndarray
     frame: np.ndarray
-    late: np.ndarray
+    progress: np.ndarray
 
 
 @lru_cache(maxsize=8)
-def stock(model: ThrowModel) -> Stock:
+def collect_frames(model: ThrowModel) -> ExampleFrames:
     """Collect all frames of a model's examples; cached, since models are evaluated repeatedly.
 
     Raises:
@@ -255,7 +255,7 @@ def stock(model: ThrowModel) -> Stock:
     """
     if not model.examples:
         raise InputError("model: examples", "none", "at least one, for the start pose", "train the model again")
-    effectors = list(chains_of(model.skeleton).effectors)
+    effectors = list(find_chains(model.skeleton).effectors)
     rows = []
     for index, example in enumerate(model.examples):
         places = forward_kinematics(example.motion)[0][:, effectors]
@@ -263,10 +263,10 @@ def stock(model: ThrowModel) -> Stock:
         velocity = np.gradient(places, 1.0 / example.motion.fps, axis=0) if count > 1 else np.zeros_like(places)
         many = np.full(count, 1)
         rows.append((places, velocity, many * example.limb, many * index, np.arange(count), np.linspace(0, 1, count)))
-    return Stock(*(np.concatenate(column) for column in zip(*rows)))
+    return ExampleFrames(*(np.concatenate(column) for column in zip(*rows)))
 
 
-def nearest(model: ThrowModel, places: np.ndarray, velocities: np.ndarray, limb: int) -> tuple[int, int, float]:
+def find_nearest_frame(model: ThrowModel, places: np.ndarray, velocities: np.ndarray, limb: int) -> tuple[int, int, float]:
     """Find the frame of the examples that best fits effectors; frames of the same limb are preferred to all others.
 
     A candidate may be moved over the ground and rotated about the vertical; its heights have to match.
@@ -279,45 +279,45 @@ def nearest(model: ThrowModel, places: np.ndarray, velocities: np.ndarray, limb:
     Returns:
         Index of the example, its frame, and the rotation about the vertical, rad.
     """
-    among = stock(model)
-    mine = places[:, :2] - places[:, :2].mean(axis=0)
-    theirs = among.places[..., :2] - among.places[..., :2].mean(axis=1, keepdims=True)
+    candidates = collect_frames(model)
+    requested = places[:, :2] - places[:, :2].mean(axis=0)
+    level_positions = candidates.places[..., :2] - candidates.places[..., :2].mean(axis=1, keepdims=True)
     # best rotation of each candidate about the vertical through the middle of the effectors (2D Procrustes)
     turn = np.arctan2(
-        (theirs[..., 0] * mine[:, 1] - theirs[..., 1] * mine[:, 0]).sum(-1), (theirs * mine).sum((-1, -2))
+        (level_positions[..., 0] * requested[:, 1] - level_positions[..., 1] * requested[:, 0]).sum(-1), (level_positions * requested).sum((-1, -2))
     )
-    turned = quaternion.turned_level(theirs, turn[:, None])
-    swift = quaternion.turned_level(among.velocities[..., :2], turn[:, None])
-    cost = ((turned - mine) ** 2).sum((-1, -2)) + ((among.places[..., 2] - places[:, 2]) ** 2).sum(-1)
-    change = ((swift - velocities[:, :2]) ** 2).sum((-1, -2))
-    change = change + ((among.velocities[..., 2] - velocities[:, 2]) ** 2).sum(-1)
-    cost = cost + _SECONDS**2 * change + (_TURN * turn) ** 2 + (_LATE * among.late) ** 2
-    cost = cost + 1e3 * (among.limb != limb)
+    rotated_positions = quaternion.rotate_level(level_positions, turn[:, None])
+    rotated_velocities = quaternion.rotate_level(candidates.velocities[..., :2], turn[:, None])
+    cost = ((rotated_positions - requested) ** 2).sum((-1, -2)) + ((candidates.places[..., 2] - places[:, 2]) ** 2).sum(-1)
+    change = ((rotated_velocities - velocities[:, :2]) ** 2).sum((-1, -2))
+    change = change + ((candidates.velocities[..., 2] - velocities[:, 2]) ** 2).sum(-1)
+    cost = cost + _VELOCITY_SECONDS**2 * change + (_ROTATION_COST * turn) ** 2 + (_LATE_COST * candidates.progress) ** 2
+    cost = cost + 1e3 * (candidates.limb != limb)
     best = int(np.argmin(cost))
-    return int(among.example[best]), int(among.frame[best]), float(turn[best])
+    return int(candidates.example[best]), int(candidates.frame[best]), float(turn[best])
 
 
-def placed(model: ThrowModel, example: int, frame: int, turn: float, places: np.ndarray) -> Pose:
+def place_frame(model: ThrowModel, example: int, frame: int, turn: float, places: np.ndarray) -> Pose:
     """Place the pose of an example's frame so that its effectors lie about `places` (4, 3) m.
 
     It is rotated by `turn` rad about the vertical; its joints have the velocities of the example.
     """
     motion = model.examples[example].motion
     both = slice(max(frame - 1, 0), frame + 1)
-    local = matrices(motion.frames(both.start, both.stop))
+    local = to_matrices(motion.frames(both.start, both.stop))
     root = motion.root_positions[both]
-    spin = quaternion.to_matrix(quaternion.about_up(np.array(turn)))
+    spin = quaternion.to_matrix(quaternion.from_up_angle(np.array(turn)))
     local = np.concatenate([(spin @ local[:, 0])[:, None], local[:, 1:]], axis=1)
     root = root @ spin.T
-    positions, turns = places_and_turns(model.skeleton.offsets, model.skeleton.parents, root, local, np)
-    effectors = list(chains_of(model.skeleton).effectors)
+    positions, turns = compute_world_transforms(model.skeleton.offsets, model.skeleton.parents, root, local, np)
+    effectors = list(find_chains(model.skeleton).effectors)
     shift = np.append((places - positions[-1, effectors])[:, :2].mean(axis=0), 0.0)
     return Pose(root[-1] + shift, local[-1], positions[-1] + shift, turns[-1], positions[-1] - positions[0])
 
 
-def start_pose(model: ThrowModel, places: np.ndarray, velocities: np.ndarray, limb: int) -> Pose:
+def choose_start_pose(model: ThrowModel, places: np.ndarray, velocities: np.ndarray, limb: int) -> Pose:
     """Choose and place the pose of the examples that best begins a movement.
 
     Arguments as of `find_nearest_frame`.
     """
-    return placed(model, *nearest(model, places, velocities, limb), places)
+    return place_frame(model, *find_nearest_frame(model, places, velocities, limb), places)

@@ -38,7 +38,7 @@ class Pose(NamedTuple):
     moved: np.ndarray
 
 
-def places_and_turns(offsets, parents, root, local, xp=np):
+def compute_world_transforms(offsets, parents, root, local, xp=np):
     """Compute positions and rotations of all joints in the world (forward kinematics).
 
     Args:
@@ -58,7 +58,7 @@ def places_and_turns(offsets, parents, root, local, xp=np):
     return xp.stack(positions, axis=-2), xp.stack(turns, axis=-3)
 
 
-def one_pose(offsets, parents: tuple[int, ...], root, local) -> tuple[np.ndarray, np.ndarray]:
+def compute_pose_transforms(offsets, parents: tuple[int, ...], root, local) -> tuple[np.ndarray, np.ndarray]:
     """Compute the same for one pose with numpy, several times as fast: root (3,), local (J, 3, 3).
 
     All joints of one depth are computed at once, rotation and position as one 4 x 4 matrix.
@@ -66,13 +66,13 @@ def one_pose(offsets, parents: tuple[int, ...], root, local) -> tuple[np.ndarray
     moves = np.zeros((len(parents), 4, 4))
     moves[:, :3, :3], moves[:, :3, 3], moves[:, 3, 3] = local, offsets, 1.0
     moves[0, :3, 3] = root
-    for joints, above in _levels(tuple(parents)):
+    for joints, above in _group_by_depth(tuple(parents)):
         moves[joints] = moves[above] @ moves[joints]
     return moves[:, :3, 3].copy(), moves[:, :3, :3].copy()
 
 
 @lru_cache(maxsize=32)
-def _levels(parents: tuple[int, ...]) -> list[tuple[np.ndarray, np.ndarray]]:
+def _group_by_depth(parents: tuple[int, ...]) -> list[tuple[np.ndarray, np.ndarray]]:
     """Group the joints by depth below the root, with their parents."""
     depths = []
     for parent in parents:
@@ -82,61 +82,61 @@ def _levels(parents: tuple[int, ...]) -> list[tuple[np.ndarray, np.ndarray]]:
     return [(joints, above[joints]) for joints in every]
 
 
-def pose_of(skeleton: Skeleton, root, local, xp=np) -> Pose:
+def build_pose(skeleton: Skeleton, root, local, xp=np) -> Pose:
     """Build the state of a body without motion from its root (..., 3) m and local rotations (..., J, 3, 3)."""
-    positions, turns = places_and_turns(skeleton.offsets, skeleton.parents, root, local, xp)
+    positions, turns = compute_world_transforms(skeleton.offsets, skeleton.parents, root, local, xp)
     return Pose(root, local, positions, turns, xp.zeros_like(positions))
 
 
-def six(turns, xp=np):
+def to_six(turns, xp=np):
     """Convert rotations (..., 3, 3) to their x and y axes: (..., 6)."""
-    return xp.concatenate([turns[..., :, 0], turns[..., :, 1]], axis=-1)
+    return xp.concatenate_motions([turns[..., :, 0], turns[..., :, 1]], axis=-1)
 
 
 def from_six(values, xp=np):
     """Convert values (..., 6) to the nearest rotations (..., 3, 3): Gram-Schmidt, the x axis first."""
-    first = _unit(values[..., :3], xp)
+    first = _normalize(values[..., :3], xp)
     second = values[..., 3:]
-    second = _unit(second - xp.sum(first * second, axis=-1, keepdims=True) * first, xp)
+    second = _normalize(second - xp.sum(first * second, axis=-1, keepdims=True) * first, xp)
     third = first[..., _NEXT] * second[..., _LAST] - first[..., _LAST] * second[..., _NEXT]
     return xp.stack([first, second, third], axis=-1)
 
 
-def _unit(vectors, xp):
+def _normalize(vectors, xp):
     return vectors / xp.sqrt(xp.sum(vectors * vectors, axis=-1, keepdims=True) + _TINY)
 
 
-def transposed(turns, xp=np):
+def transpose(turns, xp=np):
     """Invert rotations (..., 3, 3)."""
     return xp.swapaxes(turns, -1, -2)
 
 
-def matrices(motion: Motion) -> np.ndarray:
+def to_matrices(motion: Motion) -> np.ndarray:
     """Convert a motion's local rotations to matrices (T, J, 3, 3)."""
     return quaternion.to_matrix(motion.rotations)
 
 
-def motion_of(skeleton: Skeleton, root: np.ndarray, local: np.ndarray, fps: float) -> Motion:
+def to_motion(skeleton: Skeleton, root: np.ndarray, local: np.ndarray, fps: float) -> Motion:
     """Build the motion with root positions (T, 3) m and local rotations (T, J, 3, 3)."""
     return Motion(skeleton, root, quaternion.from_matrix(np.asarray(local, dtype=float)), fps)
 
 
-def flat(values, axes: int):
+def flatten(values, axes: int):
     """Merge the last `axes` axes into one."""
     return values.reshape(*values.shape[:-axes], -1)
 
 
-def picked(values, joints: tuple[int, ...], axis: int, xp=np):
+def take_joints(values, joints: tuple[int, ...], axis: int, xp=np):
     """Take some joints of values whose joints lie along `axis` (-2 for positions, -3 for rotations)."""
-    return xp.take(values, _index(joints), axis=axis)
+    return xp.take(values, _build_index(joints), axis=axis)
 
 
 @lru_cache(maxsize=256)
-def _index(joints: tuple[int, ...]) -> np.ndarray:
+def _build_index(joints: tuple[int, ...]) -> np.ndarray:
     return np.array(joints)
 
 
-def spread(skeleton: Skeleton, pose: Pose, joints: tuple[int, ...], root, local: dict, given: dict, xp=np) -> Pose:
+def update_joints(skeleton: Skeleton, pose: Pose, joints: tuple[int, ...], root, local: dict, given: dict, xp=np) -> Pose:
     """Update some joints of a pose with new rotations; all other joints stay as they are.
 
     Args:
@@ -158,22 +158,22 @@ def spread(skeleton: Skeleton, pose: Pose, joints: tuple[int, ...], root, local:
         base = turns[parent] if parent in turns else pose.turns[..., parent, :, :]
         start = places[parent] if parent in places else pose.positions[..., parent, :]
         if joint in given:
-            changed[joint] = xp.matmul(transposed(base, xp), given[joint])
+            changed[joint] = xp.matmul(transpose(base, xp), given[joint])
         turns[joint] = xp.matmul(base, changed[joint] if joint in changed else pose.local[..., joint, :, :])
         places[joint] = start + xp.matmul(base, skeleton.offsets[joint])
     return pose._replace(
-        root=root, local=_put(pose.local, changed, -3, xp), positions=_put(pose.positions, places, -2, xp),
-        turns=_put(pose.turns, turns, -3, xp),
+        root=root, local=_replace_joints(pose.local, changed, -3, xp), positions=_replace_joints(pose.positions, places, -2, xp),
+        turns=_replace_joints(pose.turns, turns, -3, xp),
     )
 
 
-def _put(values, new: dict, axis: int, xp):
+def _replace_joints(values, replacements: dict, axis: int, xp):
     """Replace the values of some joints, in a new array."""
     if xp is np:
         changed = values.copy()
-        for joint, value in new.items():
+        for joint, value in replacements.items():
             changed[(..., joint, *(slice(None),) * (-1 - axis))] = value
         return changed
     order = np.arange(values.shape[axis])
-    order[list(new)] = len(order) + np.arange(len(new))
-    return xp.take(xp.concatenate([values, xp.stack(list(new.values()), axis=axis)], axis=axis), order, axis=axis)
+    order[list(replacements)] = len(order) + np.arange(len(replacements))
+    return xp.take(xp.concatenate_motions([values, xp.stack(list(replacements.values()), axis=axis)], axis=axis), order, axis=axis)

@@ -12,13 +12,13 @@ from __future__ import annotations
 import numpy as np
 
 from ...base.vectors import unit_vector
-from ...motion.limb import soft_distance
+from ...motion.limb import soften_distance
 from .chains import LIMB_OF, Chains
-from .kinematics import Pose, one_pose, spread, transposed
+from .kinematics import Pose, compute_pose_transforms, update_joints, transpose
 from .limits import JointLimits
 
 _STRETCH = 0.995  # share of a limb's length beyond which the body moves too
-_MOST = 0.05  # metres that the body moves in one frame at most
+_MAX_DISPLACEMENT = 0.05  # metres that the body moves in one frame at most
 _ROUNDS = 4  # iterations of moving the body towards targets out of reach
 _ONES = np.ones((3, 1))
 _CROSS = np.zeros((9, 3))  # the nine products of two vectors' components -> their cross product
@@ -26,11 +26,11 @@ _CROSS[[5, 6, 1], [0, 1, 2]], _CROSS[[7, 2, 3], [0, 1, 2]] = 1.0, -1.0
 _SKEW = np.zeros((3, 9))  # a vector -> the matrix of the cross product with it
 _SKEW[[0, 1, 2], [7, 2, 3]], _SKEW[[0, 1, 2], [5, 6, 1]] = 1.0, -1.0
 _EYE = np.eye(3)
-_STRAIGHT = 0.03  # weight of the given hinge axis against the sine of the limb's own bend
+_HINGE_WEIGHT = 0.03  # weight of the given hinge axis against the sine of the limb's own bend
 _TINY = 1e-12  # m^2: square roots keep a finite derivative at zero
 
 
-def hinge_axes(chains: Chains, limits: JointLimits | None) -> np.ndarray:
+def find_hinge_axes(chains: Chains, limits: JointLimits | None) -> np.ndarray:
     """Find the unit axes (4, 3) about which elbows and knees bend, in the axes of the middle joint's parent.
 
     They come from the limits; where those show none (or are None), from the line between the hips of the rest pose.
@@ -43,7 +43,7 @@ def hinge_axes(chains: Chains, limits: JointLimits | None) -> np.ndarray:
     return np.stack([known.get(joint, side) for joint, side in zip(chains.middles, sides)])
 
 
-def bent_limb(number: int, chains: Chains, after: Pose, wanted, share, axes: np.ndarray, turn_kept: bool, xp) -> Pose:
+def reach_limb(number: int, chains: Chains, after: Pose, requested, share, axes: np.ndarray, keeps_rotation: bool, xp) -> Pose:
     """Move one limb towards its target.
 
     Args:
@@ -59,19 +59,19 @@ def bent_limb(number: int, chains: Chains, after: Pose, wanted, share, axes: np.
     Returns:
         The pose; all joints of the limb are valid, in numpy and in jax.
     """
-    upper, middle, end, effector = _joints(chains, number)
+    upper, middle, end, effector = _list_limb_joints(chains, number)
     places, turns, parents = after.positions, after.turns, chains.skeleton.parents
     tip = places[..., effector, :]
-    target = toward(tip, wanted, share) - (tip - places[..., end, :])
+    target = interpolate_target(tip, requested, share) - (tip - places[..., end, :])
     hinge = xp.matmul(turns[..., parents[middle], :, :], axes[number])
-    first, second, _ = bend_to(
+    first, second, _ = solve_two_bones(
         places[..., upper, :], places[..., middle, :], places[..., end, :], target=target, hinge=hinge, xp=xp
     )
-    given = {joint: xp.matmul(first, turns[..., joint, :, :]) for joint in _between(chains, upper, middle)}
-    given |= {joint: xp.matmul(second, turns[..., joint, :, :]) for joint in _between(chains, middle, end)}
-    if turn_kept:
+    given = {joint: xp.matmul(first, turns[..., joint, :, :]) for joint in _list_joints_between(chains, upper, middle)}
+    given |= {joint: xp.matmul(second, turns[..., joint, :, :]) for joint in _list_joints_between(chains, middle, end)}
+    if keeps_rotation:
         given[end] = turns[..., end, :, :]
-    return spread(chains.skeleton, after, chains.known[LIMB_OF[number]], root=after.root, local={}, given=given, xp=xp)
+    return update_joints(chains.skeleton, after, chains.known[LIMB_OF[number]], root=after.root, local={}, given=given, xp=xp)
 
 
 class LimbReach:
@@ -79,20 +79,20 @@ class LimbReach:
 
     def __init__(self, chains: Chains, limits: JointLimits | None, hands_given: bool):
         self.chains = chains
-        self._axes = hinge_axes(chains, limits)
-        joints = [_joints(chains, number) for number in range(4)]
+        self._axes = find_hinge_axes(chains, limits)
+        joints = [_list_limb_joints(chains, number) for number in range(4)]
         self._upper, self._middle, self._end, self._tip = (list(column) for column in zip(*joints))
         parents = chains.skeleton.parents
         self._above_upper, self._above_middle, self._above_end = (
             [parents[joint] for joint in column] for column in (self._upper, self._middle, self._end)
         )
         middle, end = (
-            self._way_down(high, low) for high, low in ((self._upper, self._middle), (self._middle, self._end))
+            self._measure_bones(high, low) for high, low in ((self._upper, self._middle), (self._middle, self._end))
         )
         self._lengths = middle + end
-        self._kept = [0, 1, 2, 3] if hands_given else [2, 3]
+        self._rotation_keepers = [0, 1, 2, 3] if hands_given else [2, 3]
 
-    def __call__(self, pose: Pose, wanted: np.ndarray, share: np.ndarray) -> Pose:
+    def __call__(self, pose: Pose, requested: np.ndarray, share: np.ndarray) -> Pose:
         """Move the effectors of a pose towards their targets; root and trunk keep their rotations.
 
         Args:
@@ -102,39 +102,39 @@ class LimbReach:
         """
         places, turns = pose.positions, pose.turns
         tip, end = places[self._tip], places[self._end]
-        target = toward(tip, wanted, share[:, None]) - (tip - end)
-        given = self._give(places[self._upper], end, target)
-        places, end, root = places + given, end + given, pose.root + given
-        return posed(self.chains, root, self._bent(pose.local, places, turns, end, target))
+        target = interpolate_target(tip, requested, share[:, None]) - (tip - end)
+        displacement = self._compute_displacement(places[self._upper], end, target)
+        places, end, root = places + displacement, end + displacement, pose.root + displacement
+        return build_static_pose(self.chains, root, self._bend_limbs(pose.local, places, turns, end, target))
 
-    def all_the_way(self, pose: Pose, wanted: np.ndarray) -> np.ndarray:
+    def reach_fully(self, pose: Pose, requested: np.ndarray) -> np.ndarray:
         """Compute local rotations (J, 3, 3) that bring the effectors as near to `requested` (4, 3) m as possible."""
         tip, end = pose.positions[self._tip], pose.positions[self._end]
-        return self._bent(pose.local, pose.positions, pose.turns, end, wanted - (tip - end))
+        return self._bend_limbs(pose.local, pose.positions, pose.turns, end, requested - (tip - end))
 
-    def _bent(self, local, places, turns, end, target) -> np.ndarray:
+    def _bend_limbs(self, local, places, turns, end, target) -> np.ndarray:
         """Compute local rotations that bring the limbs' ends from `end` (4, 3) m to `target` (4, 3) m."""
         hinge = (turns[self._above_middle] @ self._axes[:, :, None])[..., 0]
-        first, second, _ = bend_to(places[self._upper], places[self._middle], end, target=target, hinge=hinge, xp=np)
+        first, second, _ = solve_two_bones(places[self._upper], places[self._middle], end, target=target, hinge=hinge, xp=np)
         local = local.copy()
-        local[self._upper] = transposed(turns[self._above_upper]) @ first @ turns[self._upper]
-        bent = transposed(first @ turns[self._above_middle])
+        local[self._upper] = transpose(turns[self._above_upper]) @ first @ turns[self._upper]
+        bent = transpose(first @ turns[self._above_middle])
         local[self._middle] = bent @ second @ turns[self._middle]
-        carried = transposed(second @ turns[self._above_end])
-        local[[self._end[n] for n in self._kept]] = (carried @ turns[self._end])[self._kept]
+        carried = transpose(second @ turns[self._above_end])
+        local[[self._end[n] for n in self._rotation_keepers]] = (carried @ turns[self._end])[self._rotation_keepers]
         return local
 
-    def _way_down(self, high: list[int], low: list[int]) -> np.ndarray:
+    def _measure_bones(self, high: list[int], low: list[int]) -> np.ndarray:
         """Measure the distances (4,) m from joints down to others, joints between them at rest."""
-        ways = []
+        lengths = []
         for top, joint in zip(high, low):
-            way = np.zeros(3)
+            vector = np.zeros(3)
             while joint != top:
-                way, joint = way + self.chains.skeleton.offsets[joint], self.chains.skeleton.parents[joint]
-            ways.append(np.linalg.norm(way))
-        return np.array(ways)
+                vector, joint = vector + self.chains.skeleton.offsets[joint], self.chains.skeleton.parents[joint]
+            lengths.append(np.linalg.norm(vector))
+        return np.array(lengths)
 
-    def _give(self, top: np.ndarray, end: np.ndarray, target: np.ndarray) -> np.ndarray:
+    def _compute_displacement(self, top: np.ndarray, end: np.ndarray, target: np.ndarray) -> np.ndarray:
         """Compute the displacement (3,) m of the whole body towards targets out of the limbs' reach.
 
         Args:
@@ -142,31 +142,31 @@ class LimbReach:
             end: (4, 3) m, ends of the limbs; limbs reach at least as far as they already do.
             target: (4, 3) m.
         """
-        given, now = np.zeros(3), end - top
+        displacement, now = np.zeros(3), end - top
         reach = np.maximum(_STRETCH * self._lengths, np.sqrt((now * now).sum(-1)))
         for _ in range(_ROUNDS):
-            way = target - top - given
-            far = np.sqrt((way * way).sum(-1))
+            remaining = target - top - displacement
+            far = np.sqrt((remaining * remaining).sum(-1))
             short = np.maximum(far - reach, 0.0)
             if short.max() < 1e-6:
                 break
-            given = given + (way * (short / far)[:, None]).sum(0)
-        return given * min(1.0, _MOST / max(float(np.sqrt(given @ given)), 1e-9))
+            displacement = displacement + (remaining * (short / far)[:, None]).sum(0)
+        return displacement * min(1.0, _MAX_DISPLACEMENT / max(float(np.sqrt(displacement @ displacement)), 1e-9))
 
 
-def posed(chains: Chains, root: np.ndarray, local: np.ndarray) -> Pose:
+def build_static_pose(chains: Chains, root: np.ndarray, local: np.ndarray) -> Pose:
     """Build a pose from local rotations (J, 3, 3) and a root at (3,) m; its joint displacements are zero."""
-    places, turns = one_pose(chains.skeleton.offsets, chains.skeleton.parents, root, local)
+    places, turns = compute_pose_transforms(chains.skeleton.offsets, chains.skeleton.parents, root, local)
     return Pose(root, local, places, turns, np.zeros_like(places))
 
 
-def _joints(chains: Chains, number: int) -> tuple[int, int, int, int]:
+def _list_limb_joints(chains: Chains, number: int) -> tuple[int, int, int, int]:
     """List upper, middle and end joint and effector of a limb; a foot ends its leg, its toe is the effector."""
     end = chains.effectors[number] if number < 2 else chains.ankles[number - 2]
     return chains.sockets[number], chains.middles[number], end, chains.effectors[number]
 
 
-def _between(chains: Chains, high: int, low: int) -> list[int]:
+def _list_joints_between(chains: Chains, high: int, low: int) -> list[int]:
     """List the joints from `high` (included) down to `low` (not included)."""
     joint, found = chains.skeleton.parents[low], []
     while joint != high:
@@ -175,16 +175,16 @@ def _between(chains: Chains, high: int, low: int) -> list[int]:
     return [*found, high]
 
 
-def toward(predicted, wanted, share):
+def interpolate_target(predicted, requested, share):
     """Interpolate the point (..., 3) m to reach, at `share` from the predicted to the requested point.
 
     A linearly interpolated point avoids over-correction of the joints.
     Source: Fredriksson section 7.7.3.
     """
-    return predicted + share * (wanted - predicted)
+    return predicted + share * (requested - predicted)
 
 
-def bend_to(top, middle, end, target, hinge, xp, soft: float = 0.01):
+def solve_two_bones(top, middle, end, target, hinge, xp, soft: float = 0.01):
     """Solve the world rotations that bring a limb's end joint to a target.
 
     Bones keep their lengths; a target out of reach is approached along its line, one too close to `top` is kept at
@@ -204,29 +204,29 @@ def bend_to(top, middle, end, target, hinge, xp, soft: float = 0.01):
         rotations, and the end joint's new position (..., 3) m.
     """
     upper, lower = middle - top, end - middle
-    long_upper, long_lower = _length(upper, xp), _length(lower, xp)
+    long_upper, long_lower = _measure_length(upper, xp), _measure_length(lower, xp)
     along, down = upper / long_upper, lower / long_lower
-    axis = _cross(along, down) + _STRAIGHT * hinge
-    axis = _unit(axis - _dot(axis, along) * along, xp)
-    way = target - top
-    asked = _length(way, xp)
+    axis = _cross(along, down) + _HINGE_WEIGHT * hinge
+    axis = _normalize(axis - _dot(axis, along) * along, xp)
+    to_target = target - top
+    requested = _measure_length(to_target, xp)
     # the limb does not shorten where it is already straighter than the eased reach
-    reach = xp.maximum(_eased(asked, long_upper, long_lower, soft, xp), xp.minimum(asked, _length(end - top, xp)))
+    reach = xp.maximum(_ease_reach(requested, long_upper, long_lower, soft, xp), xp.minimum(requested, _measure_length(end - top, xp)))
     cosine = (reach * reach - long_upper * long_upper - long_lower * long_lower) / (2.0 * long_upper * long_lower)
     cosine = xp.clip(cosine, -1.0, 1.0)
     # limited after squaring: in float32 no number between 1 - 1e-9 and 1 keeps the derivative of the root finite
     bent = cosine * along + xp.sqrt(xp.maximum(1.0 - cosine * cosine, 2e-9)) * _cross(axis, along)
-    swing = _shortest(_unit(long_upper * along + long_lower * bent, xp), way / asked)
-    return swing, swing @ _shortest(down, bent), top + way * (reach / asked)
+    swing = _compute_shortest_arc(_normalize(long_upper * along + long_lower * bent, xp), to_target / requested)
+    return swing, swing @ _compute_shortest_arc(down, bent), top + to_target * (reach / requested)
 
 
-def _eased(asked, upper, lower, soft, xp):
+def _ease_reach(requested, upper, lower, soft, xp):
     """Compute the eased reach for a requested one, metres."""
     longest = upper + lower
-    return xp.maximum(soft_distance(asked, longest, soft, xp), xp.abs(upper - lower) + 0.02 * longest)
+    return xp.maximum(soften_distance(requested, longest, soft, xp), xp.abs(upper - lower) + 0.02 * longest)
 
 
-def _shortest(one, other):
+def _compute_shortest_arc(one, other):
     """Compute rotations (..., 3, 3) from unit vectors `one` (..., 3) to unit vectors `other` by the shortest arc."""
     cosine = _dot(one, other)[..., None]
     axis = _cross(one, other)
@@ -244,9 +244,9 @@ def _dot(a, b):
     return (a * b) @ _ONES
 
 
-def _length(v, xp):
+def _measure_length(v, xp):
     return xp.sqrt((v * v) @ _ONES + _TINY)
 
 
-def _unit(v, xp):
-    return v / _length(v, xp)
+def _normalize(v, xp):
+    return v / _measure_length(v, xp)

@@ -27,21 +27,21 @@ import numpy as np
 from ...base.errors import InputError
 from ...base.vectors import arctan2, unit_vector
 from ...motion import quaternion
-from ...motion.humanoid import identify
-from ...motion.motion import Motion, pose_kinematics
-from ...motion.skeleton import Skeleton, frozen_array
-from .kinematics import transposed
+from ...motion.humanoid import identify_joints
+from ...motion.motion import Motion, compute_pose
+from ...motion.skeleton import Skeleton, freeze_array
+from .kinematics import transpose
 
-FREE = 4.0
+FREE_RANGE = 4.0
 """Half-range in radians of a joint without limits: offsets are never that long."""
 _MARGIN = np.radians(10.0)  # added to the range of the data on either side
 _SHARE = 0.08  # share of the range, added on either side
 _ROUNDS = 8  # iterations of the mean rotation and of the middle of a range
-_CLEAR = np.radians(6.0)  # below this mean bend the direction in which a hinge bends is unknown
-_BACK = np.radians(5.0)  # allowed backward bend of elbows and knees: people have it, and joint centres are not exact
-_OFF = 1e-9  # radians: smaller excess is ignored
-_TURNS = 6  # alternations between ranges and hinges, until both are satisfied
-_LONG = 2.0  # radians: above this the other sign of the rotation vector is considered too
+_MIN_MEAN_BEND = np.radians(6.0)  # below this mean bend the direction in which a hinge bends is unknown
+_MAX_BACKWARD_BEND = np.radians(5.0)  # allowed backward bend of elbows and knees: people have it, and joint centres are not exact
+_MIN_EXCESS = 1e-9  # radians: smaller excess is ignored
+_MAX_ALTERNATIONS = 6  # alternations between ranges and hinges, until both are satisfied
+_LONG_OFFSET = 2.0  # radians: above this the other sign of the rotation vector is considered too
 _TINY = 1e-12  # metres: shorter vectors have no direction
 _ONES = np.ones(3)
 _PARTS = np.zeros((9, 4))  # the nine elements of a matrix -> its skew part as a vector, and its trace
@@ -51,7 +51,7 @@ _MIRROR = np.diag([1.0, -1.0, 1.0])
 _FRAMES = 24  # frames of a motion from which the joint axes are estimated
 
 
-def learn(rotations: np.ndarray, free: tuple[int, ...] = (0,)) -> np.ndarray:
+def estimate_joint_limits(rotations: np.ndarray, free_joints: tuple[int, ...] = (0,)) -> np.ndarray:
     """Estimate joint limits from local rotations.
 
     The limits are the range of the data, widened by 10 degrees and 8 % of the range: a few people do not show
@@ -64,7 +64,7 @@ def learn(rotations: np.ndarray, free: tuple[int, ...] = (0,)) -> np.ndarray:
         (J, 3, 3) rad: middle as a rotation vector, lowest and highest offset from it.
     """
     q = np.asarray(rotations, dtype=float)
-    middle = _mean(q)
+    middle = _compute_mean_rotation(q)
     for _ in range(_ROUNDS):
         offsets = quaternion.to_rotation_vector(quaternion.multiply(quaternion.inverse(middle), q))
         low, high = offsets.min(axis=0), offsets.max(axis=0)
@@ -74,17 +74,17 @@ def learn(rotations: np.ndarray, free: tuple[int, ...] = (0,)) -> np.ndarray:
     low, high = offsets.min(axis=0), offsets.max(axis=0)
     margin = _MARGIN + _SHARE * (high - low)
     out = np.stack([quaternion.to_rotation_vector(middle), low - margin, high + margin], axis=1)
-    out[list(free), 1:] = np.array([[-FREE], [FREE]])
+    out[list(free_joints), 1:] = np.array([[-FREE_RANGE], [FREE_RANGE]])
     return out
 
 
-def _mean(q: np.ndarray) -> np.ndarray:
+def _compute_mean_rotation(q: np.ndarray) -> np.ndarray:
     """Compute the mean rotation (J, 4) of unit quaternions (N, J, 4), by steps along the mean offset (Karcher mean)."""
-    middle = quaternion.normalized(np.sum(np.where(np.sum(q * q[:1], axis=-1, keepdims=True) < 0, -q, q), axis=0))
+    middle = quaternion.normalize(np.sum(np.where(np.sum(q * q[:1], axis=-1, keepdims=True) < 0, -q, q), axis=0))
     for _ in range(_ROUNDS):
         offset = quaternion.to_rotation_vector(quaternion.multiply(quaternion.inverse(middle), q)).mean(axis=0)
         middle = quaternion.multiply(middle, quaternion.from_rotation_vector(offset))
-    return quaternion.normalized(middle)
+    return quaternion.normalize(middle)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -117,7 +117,7 @@ class JointLimits:
     """
 
     def __init__(self, skeleton: Skeleton, limits: np.ndarray):
-        limits = frozen_array(limits)
+        limits = freeze_array(limits)
         if limits.shape != (len(skeleton), 3, 3) or not np.isfinite(limits).all():
             raise InputError("joint limits", f"an array {limits.shape}", f"finite numbers ({len(skeleton)}, 3, 3)")
         if np.any(limits[:, 1] > limits[:, 2]):
@@ -126,9 +126,9 @@ class JointLimits:
         self.middle = quaternion.to_matrix(quaternion.from_rotation_vector(limits[:, 0]))
         self._back = np.ascontiguousarray(self.middle.swapaxes(-1, -2))
         self.low, self.high = limits[:, 1], limits[:, 2]
-        self._hold(_hinges(skeleton, self.middle))
+        self._set_hinges(_find_hinges(skeleton, self.middle))
 
-    def _hold(self, hinges: tuple[Hinge, ...]) -> None:
+    def _set_hinges(self, hinges: tuple[Hinge, ...]) -> None:
         """Store hinges with their bones and bending planes as arrays."""
         self.hinges = hinges
         self._joints = np.array([hinge.joint for hinge in self.hinges], dtype=int)
@@ -136,7 +136,7 @@ class JointLimits:
         axes = [(np.cross(hinge.across, hinge.along), hinge.along) for hinge in self.hinges]
         self._axes = np.array(axes).reshape(-1, 2, 3)
 
-    def of_joints(self, joints: Sequence[int]) -> JointLimits:
+    def select_joints(self, joints: Sequence[int]) -> JointLimits:
         """Return the limits of the given joints only.
 
         Arrays passed to the result have just these joints, in this order.
@@ -145,10 +145,10 @@ class JointLimits:
         part.middle, part._back, part.low, part.high = (
             values[joints] for values in (self.middle, self._back, self.low, self.high)
         )
-        part._hold(tuple(replace(one, joint=joints.index(one.joint)) for one in self.hinges if one.joint in joints))
+        part._set_hinges(tuple(replace(one, joint=joints.index(one.joint)) for one in self.hinges if one.joint in joints))
         return part
 
-    def offsets(self, local: np.ndarray) -> np.ndarray:
+    def compute_offsets(self, local: np.ndarray) -> np.ndarray:
         """Compute rotation vectors (..., J, 3) rad from the middle to local rotations (..., J, 3, 3)."""
         m = self._back @ local
         parts = m.reshape(*m.shape[:-2], 9) @ _PARTS  # twice the sine times the axis, and the trace
@@ -157,26 +157,26 @@ class JointLimits:
         angle = arctan2(length, 0.5 * (parts[..., 3] - 1.0))
         scale = np.where(length > 1e-7, angle / np.maximum(length, 1e-7), 1.0)
         offsets = scale[..., None] * sine
-        return self._other_way_round(offsets, angle) if angle.max() > _LONG else offsets
+        return self._unwrap_offsets(offsets, angle) if angle.max() > _LONG_OFFSET else offsets
 
-    def _other_way_round(self, offsets: np.ndarray, angle: np.ndarray) -> np.ndarray:
+    def _unwrap_offsets(self, offsets: np.ndarray, angle: np.ndarray) -> np.ndarray:
         """Replace long offsets (..., J, 3) by their equivalent of opposite sign where that is nearer to the range.
 
         Beyond half a revolution the short vector flips to the opposite side.
         """
-        long = offsets * (1.0 - 2.0 * np.pi / np.maximum(angle, _LONG))[..., None]
+        long = offsets * (1.0 - 2.0 * np.pi / np.maximum(angle, _LONG_OFFSET))[..., None]
         over = [np.abs(way - np.clip(way, self.low, self.high)).max(-1) for way in (offsets, long)]
-        return np.where(((angle > _LONG) & (over[1] < over[0]))[..., None], long, offsets)
+        return np.where(((angle > _LONG_OFFSET) & (over[1] < over[0]))[..., None], long, offsets)
 
-    def beyond(self, local: np.ndarray) -> np.ndarray:
+    def measure_excess(self, local: np.ndarray) -> np.ndarray:
         """Measure the excess (..., J) rad of local rotations (..., J, 3, 3): outside the range, or bent backwards."""
-        offsets = self.offsets(local)
+        offsets = self.compute_offsets(local)
         out = np.linalg.norm(offsets - np.clip(offsets, self.low, self.high), axis=-1)
         joints = [hinge.joint for hinge in self.hinges]
-        out[..., joints] = np.maximum(out[..., joints], self._backwards(local))
+        out[..., joints] = np.maximum(out[..., joints], self._measure_backward_bend(local))
         return out
 
-    def within(self, local: np.ndarray, given: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+    def limit_rotations(self, local: np.ndarray, permitted: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
         """Limit local rotations to their ranges.
 
         Args:
@@ -185,33 +185,33 @@ class JointLimits:
         Returns:
             The limited rotations, and by how much each joint was outside, (..., J) rad.
         """
-        low, high, most = self.low, self.high, _BACK
-        if given is not None:
-            allowed = self.offsets(given)
+        low, high, most = self.low, self.high, _MAX_BACKWARD_BEND
+        if permitted is not None:
+            allowed = self.compute_offsets(permitted)
             low, high = np.minimum(low, allowed), np.maximum(high, allowed)
-            most = np.maximum(most, -self.bends(given))
+            most = np.maximum(most, -self.measure_bends(permitted))
         over = np.zeros(())
-        for _ in range(_TURNS):  # correcting a hinge may leave the range, and the reverse
-            local, out = self._in_box(local, low, high)
-            over, back = np.maximum(over, out), self._backwards(local, most)
-            if not (back > _OFF).any():
+        for _ in range(_MAX_ALTERNATIONS):  # correcting a hinge may leave the range, and the reverse
+            local, out = self._limit_to_range(local, low, high)
+            over, back = np.maximum(over, out), self._measure_backward_bend(local, most)
+            if not (back > _MIN_EXCESS).any():
                 break
-            local, over = self._forward(local, over, back)
+            local, over = self._unbend_hinges(local, over, back)
         return local, over
 
-    def _in_box(self, local, low, high) -> tuple[np.ndarray, np.ndarray]:
+    def _limit_to_range(self, local, low, high) -> tuple[np.ndarray, np.ndarray]:
         """Clip the offsets of joints to their ranges; also return the excess (..., J) rad."""
-        offsets = self.offsets(local)
+        offsets = self.compute_offsets(local)
         kept = np.minimum(np.maximum(offsets, low), high)
         over = np.abs(offsets - kept).max(-1)
-        outside = over > _OFF
+        outside = over > _MIN_EXCESS
         if outside.any():
             local, joints = local.copy(), np.nonzero(outside)
             turns = quaternion.to_matrix(quaternion.from_rotation_vector(kept[joints]))
             local[joints] = self.middle[joints[-1]] @ turns
         return local, over
 
-    def _forward(self, local, over, back) -> tuple[np.ndarray, np.ndarray]:
+    def _unbend_hinges(self, local, over, back) -> tuple[np.ndarray, np.ndarray]:
         """Rotate hinges about their bending axes by the excess `back` (..., H) rad; also return the total excess."""
         local, over = local.copy(), over.copy()
         for number, hinge in enumerate(self.hinges):
@@ -220,38 +220,38 @@ class JointLimits:
             over[..., hinge.joint] = np.maximum(over[..., hinge.joint], back[..., number])
         return local, over
 
-    def bends(self, local: np.ndarray) -> np.ndarray:
+    def measure_bends(self, local: np.ndarray) -> np.ndarray:
         """Measure the bend (..., H) rad of each hinge in local rotations (..., J, 3, 3): negative is backwards."""
         bones = local[..., self._joints, :, :] @ self._bones
         shares = self._axes @ bones
         return arctan2(shares[..., 0, 0], shares[..., 1, 0])
 
-    def _backwards(self, local: np.ndarray, most: float | np.ndarray = _BACK) -> np.ndarray:
+    def _measure_backward_bend(self, local: np.ndarray, most: float | np.ndarray = _MAX_BACKWARD_BEND) -> np.ndarray:
         """Measure by how much (..., H) rad hinges bend further backwards than `most`."""
-        return np.maximum(-most - self.bends(local), 0.0)
+        return np.maximum(-most - self.measure_bends(local), 0.0)
 
 
-def _hinges(skeleton: Skeleton, middle: np.ndarray) -> tuple[Hinge, ...]:
+def _find_hinges(skeleton: Skeleton, middle: np.ndarray) -> tuple[Hinge, ...]:
     """Find the elbows and knees whose mean pose, local rotations (J, 3, 3), shows in which direction they bend."""
-    body = identify(skeleton)
+    body = identify_joints(skeleton)
     found = []
     for limb in (body.left, body.right):
         for upper, lower, end in ((limb.upper_arm, limb.lower_arm, limb.hand),
                                   (limb.upper_leg, limb.lower_leg, limb.foot)):
             if None not in (upper, lower, end):
-                found.append(_hinge(skeleton, middle, lower, end))
+                found.append(_build_hinge(skeleton, middle, lower, end))
     return tuple(hinge for hinge in found if hinge is not None)
 
 
-def _hinge(skeleton: Skeleton, middle: np.ndarray, lower: int, end: int) -> Hinge | None:
+def _build_hinge(skeleton: Skeleton, middle: np.ndarray, lower: int, end: int) -> Hinge | None:
     """Build a hinge; None if there are joints between the two bones, or if the mean pose is straight."""
     if skeleton.parents[end] != lower:
         return None
-    along = unit_vector(skeleton.offsets[lower], least=_TINY)
-    across = np.cross(along, unit_vector(middle[lower] @ skeleton.offsets[end], least=_TINY))
-    if np.linalg.norm(across) < np.sin(_CLEAR):
+    along = unit_vector(skeleton.offsets[lower], min_length=_TINY)
+    across = np.cross(along, unit_vector(middle[lower] @ skeleton.offsets[end], min_length=_TINY))
+    if np.linalg.norm(across) < np.sin(_MIN_MEAN_BEND):
         return None
-    return Hinge(joint=lower, end=end, across=unit_vector(across, least=_TINY), along=along, bone=skeleton.offsets[end])
+    return Hinge(joint=lower, end=end, across=unit_vector(across, min_length=_TINY), along=along, bone=skeleton.offsets[end])
 
 
 @dataclass(frozen=True, eq=False)
@@ -267,12 +267,12 @@ class LimbLimits:
 
     limits: JointLimits
     joints: tuple[int, ...]
-    above: np.ndarray
+    parent_axes: np.ndarray
     axes: np.ndarray
 
     @classmethod
-    def of(
-        cls, limits: JointLimits, own: Motion, own_joints: tuple[int, ...], shown: Motion, joints: tuple[int, ...],
+    def from_motions(
+        cls, limits: JointLimits, own: Motion, own_joints: tuple[int, ...], target_motion: Motion, joints: tuple[int, ...],
         mirrored: bool = False,
     ) -> LimbLimits:
         """Estimate the axes of a limb from one motion on two bodies, frame by frame at the same place.
@@ -286,37 +286,37 @@ class LimbLimits:
             mirrored: the body has the mirror image at y = 0.
         """
         frames = np.unique(np.linspace(0, len(own) - 1, _FRAMES).astype(int))
-        poses = [(m.skeleton, m.root_positions[frames], m.rotations[frames]) for m in (own, shown)]
-        turns = [quaternion.to_matrix(pose_kinematics(*pose)[1]) for pose in poses]
+        poses = [(m.skeleton, m.root_positions[frames], m.rotations[frames]) for m in (own, target_motion)]
+        turns = [quaternion.to_matrix(compute_pose(*pose)[1]) for pose in poses]
         image = _MIRROR if mirrored else np.eye(3)
 
-        def between(theirs: list[int], mine: list[int]) -> np.ndarray:
-            both = transposed(turns[0][:, theirs]) @ image @ turns[1][:, mine]
+        def estimate_axes(theirs: list[int], mine: list[int]) -> np.ndarray:
+            both = transpose(turns[0][:, theirs]) @ image @ turns[1][:, mine]
             left, _, right = np.linalg.svd(both.mean(axis=0))
             return left @ right
 
         parents = [
-            [motion.skeleton.parents[joint] for joint in limb] for motion, limb in ((own, own_joints), (shown, joints))
+            [motion.skeleton.parents[joint] for joint in limb] for motion, limb in ((own, own_joints), (target_motion, joints))
         ]
         return cls(
-            limits.of_joints(own_joints), tuple(joints), between(*parents), between(list(own_joints), list(joints))
+            limits.select_joints(own_joints), tuple(joints), estimate_axes(*parents), estimate_axes(list(own_joints), list(joints))
         )
 
-    def held(self, rotations: np.ndarray, given: np.ndarray) -> np.ndarray:
+    def limit_rotations(self, rotations: np.ndarray, permitted: np.ndarray) -> np.ndarray:
         """Limit local rotations (W, C, 4) of the limb's joints.
 
         Where `permitted` (W, C, 4) exceeds the limits, it is the limit.
         """
-        local, over = self.limits.within(self._carried(rotations), self._carried(given))
+        local, over = self.limits.limit_rotations(self._to_model_axes(rotations), self._to_model_axes(permitted))
         if not over.any():
             return rotations
-        back = quaternion.from_matrix(transposed(self.above) @ local @ self.axes)
-        return np.where(over[..., None] > 0.0, quaternion.signed_like(back, rotations), rotations)
+        back = quaternion.from_matrix(transpose(self.parent_axes) @ local @ self.axes)
+        return np.where(over[..., None] > 0.0, quaternion.match_signs(back, rotations), rotations)
 
-    def beyond(self, motion: Motion) -> np.ndarray:
+    def measure_excess(self, motion: Motion) -> np.ndarray:
         """Measure the excess (T, C) rad of the limb's joints beyond their limits."""
-        return self.limits.beyond(self._carried(motion.rotations[:, list(self.joints)]))
+        return self.limits.measure_excess(self._to_model_axes(motion.rotations[:, list(self.joints)]))
 
-    def _carried(self, rotations: np.ndarray) -> np.ndarray:
+    def _to_model_axes(self, rotations: np.ndarray) -> np.ndarray:
         """Convert rotations (..., C, 4) of the body's limb to matrices (..., C, 3, 3) of the model's joints."""
-        return self.above @ quaternion.to_matrix(rotations) @ transposed(self.axes)
+        return self.parent_axes @ quaternion.to_matrix(rotations) @ transpose(self.axes)

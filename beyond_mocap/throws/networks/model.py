@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...base.errors import InputError
-from ...motion.skeleton import Skeleton, frozen_array
+from ...motion.skeleton import Skeleton, freeze_array
 from .chains import HIERARCHY
 from .network import PhaseNetwork
 
@@ -27,7 +27,7 @@ _CHOICES = {
     "phase": ("distance", "warped"), "action": ("throw", "kick"),
 }  # fmt: skip
 _RANGES = {"points": (1, 16), "layers": (1, 16), "units": (1, 4096)}
-SLOWEST, FASTEST = 10.0, 500.0
+MIN_FPS, MAX_FPS = 10.0, 500.0
 """Range of frame rates, frames per second, at which a model may be trained."""
 
 
@@ -77,8 +77,8 @@ class ModelSettings:
         for name in ("ik_layer", "conditioned", "guided", "carried"):
             if not isinstance(getattr(self, name), bool):
                 raise InputError(f"model settings: {name}", str(getattr(self, name))[:40], "true or false")
-        if isinstance(self.fps, bool) or not isinstance(self.fps, (int, float)) or not SLOWEST <= self.fps <= FASTEST:
-            raise InputError("model settings: fps", str(self.fps)[:40], f"{SLOWEST:g} to {FASTEST:g} frames per second")
+        if isinstance(self.fps, bool) or not isinstance(self.fps, (int, float)) or not MIN_FPS <= self.fps <= MAX_FPS:
+            raise InputError("model settings: fps", str(self.fps)[:40], f"{MIN_FPS:g} to {MAX_FPS:g} frames per second")
 
     @property
     def networks(self) -> tuple[str, ...]:
@@ -123,7 +123,7 @@ class ThrowModel:
         object.__setattr__(self, "notes", tuple(str(note) for note in self.notes))
         for name in ("joint_limits", "reference"):
             if getattr(self, name) is not None:
-                object.__setattr__(self, name, frozen_array(getattr(self, name)))
+                object.__setattr__(self, name, freeze_array(getattr(self, name)))
         _check_networks(self)
         _check_body(self)
 
@@ -158,7 +158,7 @@ def _check_body(model: ThrowModel) -> None:
         raise InputError("model: reference", f"shape {reference.shape}", "(N,) finite speeds")
     for example in model.examples:
         where = f"model: example {example.name}"
-        if not example.motion.skeleton.same_bones(model.skeleton):
+        if not example.motion.skeleton.has_same_bones(model.skeleton):
             raise InputError(where, "a different skeleton", "the model's skeleton")
         if abs(example.motion.fps - model.settings.fps) > 1e-9:
             raise InputError(where, f"{example.motion.fps:g} frames per second", f"{model.settings.fps:g}, the model's")

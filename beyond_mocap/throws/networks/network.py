@@ -13,12 +13,12 @@ from functools import cached_property
 import numpy as np
 
 from ...base.errors import InputError
-from ...motion.skeleton import frozen_array
+from ...motion.skeleton import freeze_array
 from .phases import weigh_points
 
-BOUND = 8.0
+INPUT_BOUND = 8.0
 """Standard deviations from the mean of the training data within which a network's output is reliable."""
-LEAST_SPAN = 0.5
+MIN_INPUT_SPAN = 0.5
 """Metres, or shares of an axis, from the mean that are always allowed: some inputs hardly vary in the training data."""
 
 
@@ -41,13 +41,13 @@ def forward(weights, biases, x, theta, xp=np, keep=None):
     for layer, (weight, bias) in enumerate(zip(weights, biases)):
         if keep is not None and keep[layer] is not None:
             x = x * keep[layer]
-        x = _layer(weight, bias, x, theta, xp)
+        x = _evaluate_layer(weight, bias, x, theta, xp)
         if layer < last:
             x = elu(x, xp)
     return x
 
 
-def _layer(weight, bias, x, theta, xp):
+def _evaluate_layer(weight, bias, x, theta, xp):
     """Evaluate one layer: the output of every control point, then their weighted sum.
 
     This is eq. 3.24 and 3.20 in the other order, with the same result, and avoids blending (out, in) weights for
@@ -87,12 +87,12 @@ class PhaseNetwork:
 
     def __post_init__(self):
         for name in ("weights", "biases"):
-            arrays = tuple(frozen_array(one, _float_of(one)) for one in getattr(self, name))
+            arrays = tuple(freeze_array(one, _choose_float(one)) for one in getattr(self, name))
             object.__setattr__(self, name, arrays)
         for name in ("input_mean", "input_scale", "output_mean", "output_scale"):
             one = getattr(self, name)
-            object.__setattr__(self, name, frozen_array(one, _float_of(one)))
-        _check(self)
+            object.__setattr__(self, name, freeze_array(one, _choose_float(one)))
+        _check_network(self)
 
     @property
     def points(self) -> int:
@@ -124,14 +124,14 @@ class PhaseNetwork:
         return forward(self.weights, self.biases, normal, theta) * self.output_scale + self.output_mean
 
     @property
-    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+    def input_bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """Lowest and highest input (in,) near the training data, float32; see `INPUT_BOUND` and `MIN_INPUT_SPAN`."""
         mean = self.input_mean.astype(float)
-        span = np.maximum(BOUND * np.abs(self.input_scale.astype(float)), LEAST_SPAN)
+        span = np.maximum(INPUT_BOUND * np.abs(self.input_scale.astype(float)), MIN_INPUT_SPAN)
         return (mean - span).astype(np.float32), (mean + span).astype(np.float32)
 
     @cached_property
-    def frame(self) -> "FrameNetwork":
+    def frame_network(self) -> "FrameNetwork":
         """The same network for one frame at a time, in float32; prepared once."""
         return FrameNetwork(self)
 
@@ -145,7 +145,7 @@ class FrameNetwork:
     """
 
     def __init__(self, network: PhaseNetwork):
-        weights, biases = _without_scales(network)
+        weights, biases = _merge_scales(network)
         self.points = network.points
         self._layers = [
             (np.asfortranarray(w.reshape(-1, w.shape[2]), np.float32), np.ascontiguousarray(b, np.float32))
@@ -165,7 +165,7 @@ class FrameNetwork:
         return x
 
 
-def _without_scales(network: PhaseNetwork) -> tuple[list[np.ndarray], list[np.ndarray]]:
+def _merge_scales(network: PhaseNetwork) -> tuple[list[np.ndarray], list[np.ndarray]]:
     """Merge the normalisation into the weights and biases of the first and last layer, in float64."""
     weights = [np.asarray(w, float) for w in network.weights]
     biases = [np.asarray(b, float) for b in network.biases]
@@ -178,12 +178,12 @@ def _without_scales(network: PhaseNetwork) -> tuple[list[np.ndarray], list[np.nd
     return weights, biases
 
 
-def _float_of(values) -> np.dtype:
+def _choose_float(values) -> np.dtype:
     """Choose float32 for float32 values, float64 for all others."""
     return np.dtype(np.float32 if getattr(values, "dtype", None) == np.float32 else np.float64)
 
 
-def _check(network: PhaseNetwork) -> None:
+def _check_network(network: PhaseNetwork) -> None:
     """Raise InputError if shapes do not match or a value is not finite."""
     if not network.weights or len(network.weights) != len(network.biases):
         raise InputError("network", f"{len(network.weights)} weights, {len(network.biases)} biases",
@@ -191,8 +191,8 @@ def _check(network: PhaseNetwork) -> None:
     width = len(network.input_mean) if network.input_mean.ndim == 1 else -1
     points = network.weights[0].shape[0]
     for layer, (weight, bias) in enumerate(zip(network.weights, network.biases), 1):
-        wrong = weight.ndim != 3 or weight.size == 0 or weight.shape[0] != points or weight.shape[2] != width
-        if wrong or bias.shape != weight.shape[:2]:
+        is_wrong = weight.ndim != 3 or weight.size == 0 or weight.shape[0] != points or weight.shape[2] != width
+        if is_wrong or bias.shape != weight.shape[:2]:
             raise InputError(f"network: layer {layer}", f"weights {weight.shape}, biases {bias.shape}",
                              f"({points}, out, {width}) and ({points}, out)")  # fmt: skip
         width = weight.shape[1]

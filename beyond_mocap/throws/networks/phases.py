@@ -17,17 +17,17 @@ from collections.abc import Iterable
 import numpy as np
 
 from ...base.errors import InputError
-from ...base.vectors import distance_along
+from ...base.vectors import distances_along
 
 AT_RELEASE = 0.66
 """c of eq. 7.2: the phase at which the ball leaves, near the third control point."""
-_STILL = 1e-6  # metres of travel below which time replaces distance
+_MIN_TRAVEL = 1e-6  # metres of travel below which time replaces distance
 _POINTS = 100  # samples of a reference curve on each side of the release
-_REACH = 0.25  # share of a curve's length: half-width of the warping band about the diagonal
-_PACE = 0.02  # share of the highest speed: cost of a step that advances only one of the two curves
+_BAND = 0.25  # share of a curve's length: half-width of the warping band about the diagonal
+_STEP_COST = 0.02  # share of the highest speed: cost of a step that advances only one of the two curves
 
 
-def motion_phase(effector: np.ndarray, release: float, fps: float) -> np.ndarray:
+def compute_motion_phase(effector: np.ndarray, release: float, fps: float) -> np.ndarray:
     """Compute the motion phase (T,) of each frame: the travelled share of the path of the limb's end (eq. 7.2).
 
     The second branch is printed as c + part; since the phase has to end at 1, it is c + (1 - c) part. Where the limb
@@ -40,28 +40,28 @@ def motion_phase(effector: np.ndarray, release: float, fps: float) -> np.ndarray
     Returns:
         Phases (T,) of 0 to 1.
     """
-    _check(effector, fps)
+    _check_effector(effector, fps)
     at = np.arange(len(effector), dtype=float)
-    gone = distance_along(effector)
-    return _pinned(at, gone, float(np.clip(release, 0.0, at[-1])))
+    travelled = distances_along(effector)
+    return _pin_release(at, travelled, float(np.clip(release, 0.0, at[-1])))
 
 
-def _pinned(at: np.ndarray, gone: np.ndarray, release: float) -> np.ndarray:
+def _pin_release(at: np.ndarray, quantity: np.ndarray, release: float) -> np.ndarray:
     """Compute phases from an increasing quantity (T,): 0 at the start, c at the release, 1 at the end."""
-    then = np.interp(release, at, gone)
-    before = _part(gone, gone[0], then, at=at, first=at[0], last=release)
-    after = _part(gone, then, gone[-1], at=at, first=release, last=at[-1])
+    at_release = np.interp(release, at, quantity)
+    before = _compute_share(quantity, quantity[0], at_release, at=at, first=at[0], last=release)
+    after = _compute_share(quantity, at_release, quantity[-1], at=at, first=release, last=at[-1])
     return np.where(at < release, AT_RELEASE * before, AT_RELEASE + (1.0 - AT_RELEASE) * after)
 
 
-def _part(gone, low, high, at, first, last) -> np.ndarray:
+def _compute_share(quantity, low, high, at, first, last) -> np.ndarray:
     """Compute the share of low .. high, or of first .. last in time if that range is empty, clipped to 0 .. 1."""
-    if high - low < _STILL:
-        gone, low, high = at, first, last
-    return np.clip((gone - low) / max(high - low, 1e-12), 0.0, 1.0)
+    if high - low < _MIN_TRAVEL:
+        quantity, low, high = at, first, last
+    return np.clip((quantity - low) / max(high - low, 1e-12), 0.0, 1.0)
 
 
-def distance_phase(distance, reach: tuple[float, float], xp=np):
+def compute_distance_phase(distance, reach: tuple[float, float], xp=np):
     """Compute the phase of a leg from the distance between its top and its toe (eq. 7.3).
 
     Args:
@@ -75,7 +75,7 @@ def distance_phase(distance, reach: tuple[float, float], xp=np):
     return xp.clip((distance - low) / (high - low), 0.0, 1.0)
 
 
-def speed_curve(effector: np.ndarray, release: float, fps: float, points: int = _POINTS) -> np.ndarray:
+def compute_speed_curve(effector: np.ndarray, release: float, fps: float, points: int = _POINTS) -> np.ndarray:
     """Compute the speed of a limb as a curve by which examples are compared.
 
     Args:
@@ -86,7 +86,7 @@ def speed_curve(effector: np.ndarray, release: float, fps: float, points: int = 
     Returns:
         (2 points - 1,) speeds, the release in the middle, the highest speed 1.
     """
-    _check(effector, fps)
+    _check_effector(effector, fps)
     at = np.arange(len(effector), dtype=float)
     release = float(np.clip(release, 0.0, at[-1]))
     speed = np.linalg.norm(np.gradient(effector, axis=0), axis=1) * fps if len(at) > 1 else np.zeros(1)
@@ -95,7 +95,7 @@ def speed_curve(effector: np.ndarray, release: float, fps: float, points: int = 
     return curve / max(curve.max(), 1e-12)
 
 
-def reference_curve(examples: Iterable[tuple[np.ndarray, float]], fps: float, rounds: int = 3) -> np.ndarray:
+def compute_reference_curve(examples: Iterable[tuple[np.ndarray, float]], fps: float, rounds: int = 3) -> np.ndarray:
     """Compute the speed curve (N,) to which examples are warped.
 
     It is their mean; the curves are warped to it and averaged again `rounds` times, so that common features stay
@@ -108,16 +108,16 @@ def reference_curve(examples: Iterable[tuple[np.ndarray, float]], fps: float, ro
     Raises:
         InputError: if there is no example.
     """
-    curves = [speed_curve(effector, release, fps) for effector, release in examples]
+    curves = [compute_speed_curve(effector, release, fps) for effector, release in examples]
     if not curves:
         raise InputError("reference curve", "no example", "at least one")
     mean = np.mean(curves, axis=0)
     for _ in range(rounds):
-        mean = np.mean([_warped_to(curve, mean) for curve in curves], axis=0)
+        mean = np.mean([_warp_curve(curve, mean) for curve in curves], axis=0)
     return mean
 
 
-def warped_phase(effector: np.ndarray, release: float, fps: float, reference: np.ndarray) -> np.ndarray:
+def compute_warped_phase(effector: np.ndarray, release: float, fps: float, reference: np.ndarray) -> np.ndarray:
     """Compute the phase (T,) of each frame by dynamic time warping of the limb's speed to a reference curve.
 
     Similar moments then have the same phase, also where one subject winds up longer than another. The release stays
@@ -130,28 +130,28 @@ def warped_phase(effector: np.ndarray, release: float, fps: float, reference: np
         reference: curve from `compute_reference_curve`.
     Source: Fredriksson section 9.3.
     """
-    _check(effector, fps)
+    _check_effector(effector, fps)
     half = (len(reference) + 1) // 2
-    curve = speed_curve(effector, release, fps, half)
+    curve = compute_speed_curve(effector, release, fps, half)
     at = np.arange(len(effector), dtype=float)
     release = float(np.clip(release, 0.0, at[-1]))
-    before = warp(curve[:half], reference[:half]) / (half - 1)
-    after = warp(curve[half - 1 :], reference[half - 1 :]) / (half - 1)
+    before = align_curves(curve[:half], reference[:half]) / (half - 1)
+    after = align_curves(curve[half - 1 :], reference[half - 1 :]) / (half - 1)
     early = np.interp(at, np.linspace(0.0, max(release, 1e-9), half), before)
     late = np.interp(at, np.linspace(release, max(at[-1], release + 1e-9), half), after)
     return np.where(at < release, AT_RELEASE * early, AT_RELEASE + (1.0 - AT_RELEASE) * late)
 
 
-def _warped_to(curve: np.ndarray, reference: np.ndarray) -> np.ndarray:
+def _warp_curve(curve: np.ndarray, reference: np.ndarray) -> np.ndarray:
     """Shift the samples of a speed curve to where the reference is most similar."""
     half = (len(curve) + 1) // 2
     sides = []
-    for mine, theirs in ((curve[:half], reference[:half]), (curve[half - 1 :], reference[half - 1 :])):
-        sides.append(np.interp(np.arange(half), warp(mine, theirs), mine))
+    for half_curve, half_reference in ((curve[:half], reference[:half]), (curve[half - 1 :], reference[half - 1 :])):
+        sides.append(np.interp(np.arange(half), align_curves(half_curve, half_reference), half_curve))
     return np.concatenate([sides[0], sides[1][1:]])
 
 
-def warp(curve: np.ndarray, reference: np.ndarray) -> np.ndarray:
+def align_curves(curve: np.ndarray, reference: np.ndarray) -> np.ndarray:
     """Align a curve with a reference by dynamic time warping (Sakoe and Chiba 1978).
 
     The path of lowest cost through |curve_i - reference_j| is searched within a band about the diagonal. A sample
@@ -169,36 +169,36 @@ def warp(curve: np.ndarray, reference: np.ndarray) -> np.ndarray:
     # best[i + 1, j + 1]: lowest cost of a path from the pair (0, 0) to the pair (i, j); row and column 0 are a border
     best = np.full((count + 1, length + 1), np.inf)
     best[0, 0] = 0.0
-    band = max(int(_REACH * length), abs(count - length) + 1)
+    band = max(int(_BAND * length), abs(count - length) + 1)
     for i in range(count):
         centre = i * (length - 1) // max(count - 1, 1)
         for j in range(max(0, centre - band), min(length, centre + band + 1)):
             # predecessors: both curves advance, only the curve advances, only the reference advances
-            step = min(best[i, j], best[i, j + 1] + _PACE, best[i + 1, j] + _PACE)
+            step = min(best[i, j], best[i, j + 1] + _STEP_COST, best[i + 1, j] + _STEP_COST)
             best[i + 1, j + 1] = cost[i, j] + step
-    return _rising(_middles(_road(best), count), length)
+    return _make_increasing(_average_matches(_trace_path(best), count), length)
 
 
-def _road(best: np.ndarray) -> list[tuple[int, int]]:
+def _trace_path(best: np.ndarray) -> list[tuple[int, int]]:
     """Trace the path of lowest cost back from the last pair; return its pairs (i, j) from the first."""
     i, j = best.shape[0] - 1, best.shape[1] - 1
-    road = []
+    path = []
     while i and j:
-        road.append((i - 1, j - 1))
-        choices = ((best[i - 1, j - 1], i - 1, j - 1), (best[i - 1, j] + _PACE, i - 1, j),
-                   (best[i, j - 1] + _PACE, i, j - 1))  # fmt: skip
+        path.append((i - 1, j - 1))
+        choices = ((best[i - 1, j - 1], i - 1, j - 1), (best[i - 1, j] + _STEP_COST, i - 1, j),
+                   (best[i, j - 1] + _STEP_COST, i, j - 1))  # fmt: skip
         _, i, j = min(choices, key=lambda choice: choice[0])
-    return road[::-1]
+    return path[::-1]
 
 
-def _middles(road: list[tuple[int, int]], count: int) -> np.ndarray:
+def _average_matches(path: list[tuple[int, int]], count: int) -> np.ndarray:
     """Average the reference indices that the path pairs with each of `count` samples."""
-    pairs = np.array(road)
+    pairs = np.array(path)
     number = np.bincount(pairs[:, 0], minlength=count)
     return np.bincount(pairs[:, 0], pairs[:, 1], minlength=count) / number
 
 
-def _rising(indices: np.ndarray, length: int) -> np.ndarray:
+def _make_increasing(indices: np.ndarray, length: int) -> np.ndarray:
     """Interpolate through the middles of the flat parts of a path: from 0 to length - 1, strictly increasing."""
     values, place = np.unique(indices, return_inverse=True)
     at = np.bincount(place, np.arange(len(indices))) / np.bincount(place)
@@ -207,7 +207,7 @@ def _rising(indices: np.ndarray, length: int) -> np.ndarray:
     return np.interp(np.arange(len(indices)), at, values)
 
 
-def _check(effector: np.ndarray, fps: float) -> None:
+def _check_effector(effector: np.ndarray, fps: float) -> None:
     """Raise InputError if the positions are not (T, 3) finite metres or the frame rate is not positive."""
     if np.ndim(effector) != 2 or np.shape(effector)[1] != 3 or not len(effector):
         raise InputError("phase", f"positions of shape {np.shape(effector)}", "(T, 3), at least one frame")
@@ -233,9 +233,9 @@ def weigh_points(phase, points: int = 4, xp=np):
     phase = xp.clip(xp.asarray(phase), 0.0, 1.0)[..., None]
     if points == 1:
         return xp.ones_like(phase)
-    every = _kernel(xp.abs(phase * (points - 1) - xp.arange(-1, points + 1)), xp)
+    every = _evaluate_kernel(xp.abs(phase * (points - 1) - xp.arange(-1, points + 1)), xp)
     first, last = every[..., 0:1] + every[..., 1:2], every[..., -2:-1] + every[..., -1:]
-    return xp.concatenate([first, every[..., 2:-2], last], -1)
+    return xp.concatenate_motions([first, every[..., 2:-2], last], -1)
 
 
 def weigh_points_at(phase: float, points: int = 4) -> list[float]:
@@ -257,7 +257,7 @@ def weigh_points_at(phase: float, points: int = 4) -> list[float]:
     return out
 
 
-def _kernel(d, xp):
+def _evaluate_kernel(d, xp):
     """Evaluate a point's weight at a distance of `d` >= 0 points."""
     near = 1.0 + d * d * (1.5 * d - 2.5)
     far = 2.0 + d * (d * (2.5 - 0.5 * d) - 4.0)

@@ -8,12 +8,12 @@ from typing import NamedTuple
 import numpy as np
 
 from ...base.errors import InputError
-from .chains import LIMB_OF, Chains, chains_of
-from .description import Description, Windows, windows
-from .example import Example, describe, mirrored, poses
-from .features import stretch
+from .chains import LIMB_OF, Chains, find_chains
+from .description import Description, Windows, build_windows
+from .example import Example, build_description, mirror_example, compute_poses
+from .features import measure_limb_distance
 from .kinematics import Pose
-from .phases import reference_curve
+from .phases import compute_reference_curve
 
 _MARGIN = 1e-6  # metres by which a leg's reach is widened, so that it is never empty
 
@@ -32,28 +32,28 @@ class Steps(NamedTuple):
     window: Windows
 
 
-def steps(example: Example, reference: np.ndarray | None = None) -> Steps:
+def build_steps(example: Example, reference: np.ndarray | None = None) -> Steps:
     """Build the steps of an example.
 
     Args:
         example: the example.
         reference: (N,) speed curve for warped phases, or None.
     """
-    states, window = poses(example), windows(describe(example), reference)
-    return Steps(_rows(states, slice(-1)), _rows(states, slice(1, None)), _rows(window, slice(-1)))
+    states, window = compute_poses(example), build_windows(build_description(example), reference)
+    return Steps(_slice_rows(states, slice(-1)), _slice_rows(states, slice(1, None)), _slice_rows(window, slice(-1)))
 
 
-def joined(all_steps: Sequence[Steps]) -> Steps:
+def join_steps(all_steps: Sequence[Steps]) -> Steps:
     """Join the steps of several examples."""
-    return Steps(*(_stacked([steps[i] for steps in all_steps]) for i in range(3)))
+    return Steps(*(_stack_rows([steps[i] for steps in all_steps]) for i in range(3)))
 
 
-def with_mirrors(examples: Iterable[Example]) -> list[Example]:
+def add_mirror_images(examples: Iterable[Example]) -> list[Example]:
     """Return each example, followed by its mirror image."""
-    return [one for example in examples for one in (example, mirrored(example))]
+    return [variant for example in examples for variant in (example, mirror_example(example))]
 
 
-def shared_chains(examples: Sequence[Example]) -> Chains:
+def find_shared_chains(examples: Sequence[Example]) -> Chains:
     """Find the chains of the skeleton that all examples share.
 
     Raises:
@@ -63,34 +63,34 @@ def shared_chains(examples: Sequence[Example]) -> Chains:
         raise InputError("examples", "none", "at least one throw or kick")
     first = examples[0].motion.skeleton
     for example in examples:
-        if not example.motion.skeleton.same_bones(first):
+        if not example.motion.skeleton.has_same_bones(first):
             raise InputError(f"example {example.name}", "a different skeleton", "the skeleton of the other examples",
                              "retarget them first")  # fmt: skip
-    return chains_of(first)
+    return find_chains(first)
 
 
-def leg_reach(examples: Sequence[Example]) -> dict[str, tuple[float, float]]:
+def measure_leg_reach(examples: Sequence[Example]) -> dict[str, tuple[float, float]]:
     """Measure the shortest and longest distance, metres, from the top of each leg to its toe (eq. 7.3)."""
-    chains = shared_chains(examples)
-    whole = joined([steps(example) for example in examples])
+    chains = find_shared_chains(examples)
+    all_steps = join_steps([build_steps(example) for example in examples])
     found = {}
     for number in (2, 3):
-        distance = stretch(number, chains, whole.after, whole.window)[..., 0]
+        distance = measure_limb_distance(number, chains, all_steps.after, all_steps.window)[..., 0]
         found[LIMB_OF[number][:-4]] = (float(distance.min()) - _MARGIN, float(distance.max()) + _MARGIN)
     return found
 
 
-def reference_of(examples: Iterable[Example]) -> np.ndarray:
+def build_reference_curve(examples: Iterable[Example]) -> np.ndarray:
     """Build the speed curve (N,) to which warped phases of these examples are warped (section 9.3)."""
-    told: list[Description] = [describe(example) for example in examples]
-    return reference_curve([(one.effectors[:, one.limb], one.release) for one in told], told[0].fps if told else 1.0)
+    descriptions: list[Description] = [build_description(example) for example in examples]
+    return compute_reference_curve([(description.effectors[:, description.limb], description.release) for description in descriptions], descriptions[0].fps if descriptions else 1.0)
 
 
-def _rows(arrays, cut: slice):
+def _slice_rows(arrays, cut: slice):
     """Slice every array of a Pose or Windows; None stays None."""
     return type(arrays)(*(None if array is None else array[cut] for array in arrays))
 
 
-def _stacked(parts: list):
+def _stack_rows(parts: list):
     """Join Poses or Windows along the first axis."""
     return type(parts[0])(*(None if rows[0] is None else np.concatenate(rows) for rows in zip(*parts)))

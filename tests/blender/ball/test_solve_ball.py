@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 import pytest
 from conftest import EXTENSION
-from undo import assert_one_step, press, state
+from undo import assert_one_step, press_operator, collect_state
 
 MATCH = pathlib.Path(__file__).resolve().parents[3] / "sample_blend" / "match"
 KICKS = {"player1": (8.5, 24.8), "player2": (16.5,)}  # as the sample's words say
@@ -39,33 +39,33 @@ def touches(kind):
 
 
 def test_the_sample_s_touches_are_found_and_become_key_moments(match, lanes):
-    assert press(bpy.ops.beyond_mocap.solve_ball) == {"FINISHED"}
+    assert press_operator(bpy.ops.beyond_mocap.solve_ball) == {"FINISHED"}
     for name in KICKS:
         assert touches("kick")[name] == pytest.approx(KICKS[name], abs=0.05)
         assert set(RECEIVED[name]) <= {round(time, 1) for time in touches("receive")[name]}
-    assert press(bpy.ops.beyond_mocap.accept_touches) == {"FINISHED"}
+    assert press_operator(bpy.ops.beyond_mocap.accept_touches) == {"FINISHED"}
     for player in match.beyond_mocap.players:
-        moments = lanes.moments(player.dot)
+        moments = lanes.list_moments(player.dot)
         kicks = [moment.key.time for moment in moments if moment.key.words[0] == "kick"]
         assert kicks == pytest.approx(KICKS[player.name], abs=0.05)
-    before = state()
+    before = collect_state()
     assert "none selected with labels" in refused(bpy.ops.beyond_mocap.accept_touches)
-    assert state() == before
+    assert collect_state() == before
 
 
 def refused(operator):
     with pytest.raises(RuntimeError) as told:
-        press(operator)
+        press_operator(operator)
     return str(told.value)
 
 
 def test_the_ball_is_where_the_samples_have_it(match):
-    press(bpy.ops.beyond_mocap.solve_ball)
+    press_operator(bpy.ops.beyond_mocap.solve_ball)
     table = np.genfromtxt(MATCH / "player1.csv", delimiter=",", names=True)
     ball, off = bpy.data.objects["Solved Ball"], []
-    clock = importlib.import_module(f"{EXTENSION}.scene.core.measure").scene_clock(match)
+    clock = importlib.import_module(f"{EXTENSION}.scene.core.measure").build_scene_clock(match)
     for row in table[:: len(table) // 20]:
-        frame = clock.frame(row["time_s"])
+        frame = clock.to_frame(row["time_s"])
         match.frame_set(int(np.floor(frame)), subframe=frame - np.floor(frame))
         off.append(
             np.linalg.norm(np.array(ball.matrix_world.translation) / 100.0 - [row[f"ball_{axis}_m"] for axis in "xyz"])
@@ -74,15 +74,15 @@ def test_the_ball_is_where_the_samples_have_it(match):
 
 
 def test_a_key_moment_that_is_there_already_stays_alone(match, lanes):
-    press(bpy.ops.beyond_mocap.solve_ball)
+    press_operator(bpy.ops.beyond_mocap.solve_ball)
     bpy.ops.beyond_mocap.choose_player(player="player2")
     match.frame_set(int(round(16.4 * 24 / 1.001)))
     bpy.ops.beyond_mocap.add_moment(words="kick left")
-    press(bpy.ops.beyond_mocap.accept_touches, active=True)
+    press_operator(bpy.ops.beyond_mocap.accept_touches, active=True)
     player = match.beyond_mocap.players["player2"]
-    words = [moment.key.words for moment in lanes.moments(player.dot)]
+    words = [moment.key.words for moment in lanes.list_moments(player.dot)]
     assert words.count(("kick",)) == 0 and ("receive", "foot") in words and ("kick", "left") in words
-    assert not lanes.has(match.beyond_mocap.players["player1"].dot) or not lanes.moments(
+    assert not lanes.has_label_tracks(match.beyond_mocap.players["player1"].dot) or not lanes.list_moments(
         match.beyond_mocap.players["player1"].dot
     )
 
@@ -93,19 +93,19 @@ def test_each_is_one_step_of_undo(match):
 
 
 def test_solved_again_it_is_the_same_ball_and_still_carried(match):
-    press(bpy.ops.beyond_mocap.solve_ball)
+    press_operator(bpy.ops.beyond_mocap.solve_ball)
     ball, data = bpy.data.objects["Solved Ball"], bpy.data.armatures.new("Stick")
     ball.name, stick = "My Ball", bpy.data.objects.new("Stick", data)
-    match.collection.objects.link(stick)
+    match.find_or_create_collection.objects.link(stick)
     bpy.context.view_layer.objects.active = stick
     bpy.ops.object.mode_set(mode="EDIT")
     data.edit_bones.new("Bone").tail = 0.0, 0.0, 1.0
     bpy.ops.object.mode_set(mode="OBJECT")
     ball.select_set(True)
-    press(bpy.ops.beyond_mocap.take_ball, bone="Bone", first=20, last=40)
-    press(bpy.ops.beyond_mocap.solve_ball)
+    press_operator(bpy.ops.beyond_mocap.take_ball, bone="Bone", first=20, last=40)
+    press_operator(bpy.ops.beyond_mocap.solve_ball)
     assert "Solved Ball" not in bpy.data.objects and ball.animation_data.action.name.endswith("carried")
-    press(bpy.ops.beyond_mocap.free_ball)
+    press_operator(bpy.ops.beyond_mocap.free_ball)
     assert ball.animation_data.action.name.endswith("path") and not len(ball.constraints)
 
 
@@ -113,6 +113,6 @@ def test_without_a_ball_it_says_so(tmp_path):
     lines = ["time_s,x_m,y_m", *(f"{0.1 * n:.1f},{0.2 * n:.2f},0" for n in range(40))]
     (tmp_path / "alone.csv").write_text("\n".join(lines))
     bpy.ops.beyond_mocap.import_tracking(filepath=str(tmp_path / "alone.csv"))
-    before = state()
+    before = collect_state()
     assert "ball" in refused(bpy.ops.beyond_mocap.solve_ball)
-    assert state() == before
+    assert collect_state() == before

@@ -18,7 +18,7 @@ def rooms(extension):
 
 @pytest.fixture
 def body(core, rooms):
-    return rooms["rigs.armature"].create(bpy.context, made.skeleton(core), "Body")
+    return rooms["rigs.armature"].create_armature(bpy.context, made.build_skeleton(core), "Body")
 
 
 def set_rate(name):
@@ -38,9 +38,9 @@ def assert_same(a, b, tolerance=2e-6):
 @pytest.mark.parametrize("rate", RATES)
 def test_there_and_back(core, rooms, body, rate):
     fps = set_rate(rate)
-    motion = made.motion(core)
-    rooms["core.action"].write(body, motion, bpy.context.scene)
-    assert_same(rooms["core.action"].read(body, bpy.context.scene), core("motion.motion").resample(motion, fps))
+    motion = made.build_motion(core)
+    rooms["core.action"].write_motion(body, motion, bpy.context.scene)
+    assert_same(rooms["core.action"].read_motion(body, bpy.context.scene), core("motion.motion").resample(motion, fps))
     render = bpy.context.scene.render
     assert (render.fps, pytest.approx(render.fps_base)) == RATES[rate]
 
@@ -50,33 +50,33 @@ def test_what_blender_poses_is_what_the_core_computes(core, rooms, body):
     set_rate("30")
     scene.unit_settings.scale_length = 0.5  # the armature was made at scale 1: it is now half as large
     body.location, body.rotation_euler, body.scale = (3, -2, 0.5), (0.3, 0.2, 1.1), (2, 2, 2)
-    motion = made.motion(core)
-    rooms["core.action"].write(body, motion, scene, start=10)
+    motion = made.build_motion(core)
+    rooms["core.action"].write_motion(body, motion, scene, start=10)
     positions, _ = core("motion.motion").forward_kinematics(motion)
     for frame in (10, 25, 70):
         scene.frame_set(frame)
         posed = np.array([(body.matrix_world @ body.pose.bones[name].matrix).translation for name in made.NAMES]) * 0.5
         np.testing.assert_allclose(posed, positions[frame - 10], atol=2e-5)
-    assert_same(rooms["core.action"].read(body, scene), motion, 1e-5)
+    assert_same(rooms["core.action"].read_motion(body, scene), motion, 1e-5)
 
 
 def test_a_fractional_start_keys_whole_frames_only(core, rooms, body):
     set_rate("30")
-    motion = made.motion(core)
-    action = rooms["core.action"].write(body, motion, bpy.context.scene, start=4.25)
+    motion = made.build_motion(core)
+    action = rooms["core.action"].write_motion(body, motion, bpy.context.scene, start=4.25)
     assert tuple(action.frame_range) == (5, 64)
-    read = rooms["core.action"].read(body, bpy.context.scene)
-    root, _ = core("motion.motion").at_frames(motion, np.arange(60) + 0.75)
+    read = rooms["core.action"].read_motion(body, bpy.context.scene)
+    root, _ = core("motion.motion").sample_frames(motion, np.arange(60) + 0.75)
     np.testing.assert_allclose(read.root_positions, root, atol=2e-6)
 
 
 def test_signs_are_continuous(core, rooms, body):
-    motion = made.motion(core, frames=200)
-    action = rooms["core.action"].write(body, motion, bpy.context.scene)
-    curves = rooms["core.channels"].curves(action, body.animation_data.action_slot)
+    motion = made.build_motion(core, frames=200)
+    action = rooms["core.action"].write_motion(body, motion, bpy.context.scene)
+    curves = rooms["core.channels"].collect_curves(action, body.animation_data.action_slot)
     for bone in made.NAMES:
         path = f'pose.bones["{bone}"].rotation_quaternion'
-        values = np.stack([rooms["core.channels"].sample(curves[path, i], np.arange(1, 160)) for i in range(4)], axis=1)
+        values = np.stack([rooms["core.channels"].sample_curve(curves[path, i], np.arange(1, 160)) for i in range(4)], axis=1)
         assert np.sum(values[1:] * values[:-1], axis=1).min() > 0
 
 
@@ -89,7 +89,7 @@ def test_other_rotation_modes_are_read(core, rooms, body, mode):
         path = "rotation_axis_angle" if mode == "AXIS_ANGLE" else "rotation_euler"
         setattr(bone, path, values)
         bone.keyframe_insert(path, frame=frame)
-    read = rooms["core.action"].read(body, bpy.context.scene)
+    read = rooms["core.action"].read_motion(body, bpy.context.scene)
     positions, _ = core("motion.motion").forward_kinematics(read)
     for frame in (1, 2, 3):
         bpy.context.scene.frame_set(frame)
@@ -100,27 +100,27 @@ def test_other_rotation_modes_are_read(core, rooms, body, mode):
 def test_the_action_before_is_kept(core, rooms, body):
     body.keyframe_insert("location", frame=1)
     before = body.animation_data.action
-    rooms["core.action"].write(body, made.motion(core), bpy.context.scene)
+    rooms["core.action"].write_motion(body, made.build_motion(core), bpy.context.scene)
     assert before.use_fake_user and before in list(bpy.data.actions)
 
 
 def test_marked_results_do_not_pile_up(core, rooms, body):
     for _ in range(3):
-        rooms["core.channels"].discard(body, "take")
-        rooms["core.action"].write(body, made.motion(core), bpy.context.scene, name="Take")["take"] = True
+        rooms["core.channels"].remove_marked_action(body, "take")
+        rooms["core.action"].write_motion(body, made.build_motion(core), bpy.context.scene, name="Take")["take"] = True
     assert [action.name for action in bpy.data.actions] == ["Take"]
     body.animation_data.action["take"] = False
-    rooms["core.channels"].discard(body, "take")
+    rooms["core.channels"].remove_marked_action(body, "take")
     assert body.animation_data.action is not None
 
 
 def test_missing_things_are_named(core, rooms, body):
     error = core("base.errors").InputError
     with pytest.raises(error, match="plays no action"):
-        rooms["core.action"].read(body, bpy.context.scene)
+        rooms["core.action"].read_motion(body, bpy.context.scene)
     with pytest.raises(error, match="no key on any bone"):
-        rooms["core.action"].read(body, bpy.context.scene, bpy.data.actions.new("Empty"))
-    with rooms["rigs.armature"]._editing(bpy.context, body):
+        rooms["core.action"].read_motion(body, bpy.context.scene, bpy.data.actions.new("Empty"))
+    with rooms["rigs.armature"]._edit_mode(bpy.context, body):
         body.data.edit_bones.remove(body.data.edit_bones["Neck"])
     with pytest.raises(error, match="bones missing: Neck"):
-        rooms["core.action"].write(body, made.motion(core), bpy.context.scene)
+        rooms["core.action"].write_motion(body, made.build_motion(core), bpy.context.scene)

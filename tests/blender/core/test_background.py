@@ -28,7 +28,7 @@ def test_result_and_progress(background):
 
     job = background.Job("test", work)
     wait(job)
-    assert job.result is True and (job.fraction, job.text) == (0.5, "half") and not job.stale
+    assert job.result is True and (job.fraction, job.text) == (0.5, "half") and not job.is_stale
 
 
 def test_errors_are_carried_over(background):
@@ -37,21 +37,21 @@ def test_errors_are_carried_over(background):
 
     job = background.Job("test", work)
     wait(job)
-    assert isinstance(job.error, ValueError) and not background.cancelled(job)
+    assert isinstance(job.error, ValueError) and not background.is_cancelled(job)
 
 
 def test_cancel_reaches_the_work(background, core):
     def work(progress, cancelled, hurry):
         while not cancelled():
             time.sleep(0.005)
-        raise core("base.errors").Cancelled("stopped")
+        raise core("base.errors").UserCancelledError("stopped")
 
     job = background.Job("test", work)
-    background.stop("another kind")
-    assert not job.stale
-    background.stop("test")
+    background.cancel_jobs("another kind")
+    assert not job.is_stale
+    background.cancel_jobs("test")
     wait(job)
-    assert job.stale and background.cancelled(job)
+    assert job.is_stale and background.is_cancelled(job)
 
 
 def test_what_keeps_its_results_ends_early_when_asked_and_is_cancelled_when_asked_again(background, core):
@@ -63,22 +63,22 @@ def test_what_keeps_its_results_ends_early_when_asked_and_is_cancelled_when_aske
     def stubborn(progress, cancelled, hurry):
         while not cancelled():
             time.sleep(0.005)
-        raise core("base.errors").Cancelled("stopped")
+        raise core("base.errors").UserCancelledError("stopped")
 
     job = background.Job("test", patient, keeps=True)
-    background.end()
+    background.end_jobs()
     wait(job)
-    assert job.ending and not job.stale and job.result == "half"
+    assert job.is_ending and not job.is_stale and job.result == "half"
     again = background.Job("test", stubborn, keeps=True)
-    background.end()
+    background.end_jobs()
     assert again.ending and not again.stale
-    background.end()
+    background.end_jobs()
     wait(again)
-    assert background.cancelled(again)
+    assert background.is_cancelled(again)
     keeps_nothing = background.Job("test", stubborn)
-    background.end()
+    background.end_jobs()
     wait(keeps_nothing)
-    assert background.cancelled(keeps_nothing)
+    assert background.is_cancelled(keeps_nothing)
 
 
 def test_a_newer_job_makes_the_older_one_stale(background):

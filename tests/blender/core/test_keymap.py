@@ -60,7 +60,7 @@ def test_the_rows_for_the_preferences_find_our_keymaps(keymap, monkeypatch):
         patch.setattr(keymap, "ENTRIES", (keymap.Entry("NLA Editor", "NLA_EDITOR", "beyond_mocap.mirror", "F19"),))
         keymap.register()
         configuration = bpy.context.window_manager.keyconfigs.addon
-        assert [found.name for found in rows._with_our_keys(configuration)] == ["NLA Editor"]
-        assert rows._with_our_keys(None) == []
+        assert [found.name for found in rows._find_keymaps(configuration)] == ["NLA Editor"]
+        assert rows._find_keymaps(None) == []
         keymap.unregister()
     keymap.register()

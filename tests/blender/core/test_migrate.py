@@ -6,7 +6,7 @@ import shutil
 
 import bpy
 import pytest
-from undo import assert_one_step, state
+from undo import assert_one_step, collect_state
 from worlds import CLIPS, SAMPLE
 
 OLD = pathlib.Path(__file__).resolve().parents[2] / "data" / "before_the_editor.blend"
@@ -58,7 +58,7 @@ def test_the_words_count_before_and_after_they_are_on_the_timeline(old, rooms):
 
     def words():
         settings = bpy.context.scene.beyond_mocap
-        return [rooms["result.plans"].timeline_of(player, 30.0, rooms["player.tracks"].read_track(settings, player))
+        return [rooms["result.plans"].read_timeline(player, 30.0, rooms["player.tracks"].read_track(settings, player))
                 for player in settings.players]
 
     before = words()
@@ -67,41 +67,41 @@ def test_the_words_count_before_and_after_they_are_on_the_timeline(old, rooms):
     assert_one_step(bpy.ops.beyond_mocap.place_players)
     settings = bpy.context.scene.beyond_mocap
     for player in settings.players:
-        assert player.dot is not None and rooms["timeline.strips"].read(player, bpy.context.scene) is not None
+        assert player.dot is not None and rooms["timeline.strips"].read_player_timeline(player, bpy.context.scene) is not None
     assert words() == before
     assert settings.players[1].annotation_text.as_string() == "1.0 3.0 walking\n"
     assert not bpy.ops.beyond_mocap.place_players.poll()
 
 
-def test_a_player_whose_track_is_gone_is_told_and_the_other_is_placed(old):
+def test_a_player_whose_track_is_gone_is_reported_and_the_other_is_placed(old):
     (old.parent / "player1.csv").unlink()
     first, second = opened(old).players
     assert bpy.ops.beyond_mocap.place_players() == {"FINISHED"}
     assert first.dot is None and second.dot is not None
     (old.parent / "player2.csv").unlink()
     opened(old)
-    before = state()
+    before = collect_state()
     with pytest.raises(RuntimeError, match="player1.csv"):
         bpy.ops.beyond_mocap.place_players()
-    assert state() == before
+    assert collect_state() == before
 
 
 def test_one_goes_on_where_one_had_stopped(old, rooms):
     """A new synthesis replaces the old bake on the same bodies, and Discard brings the old one back."""
     settings = opened(old)
     bodies = [player.body.name for player in settings.players]
-    before = {name: value for name, value in state().items() if name in ("keys", "animated")}
+    before = {name: value for name, value in collect_state().items() if name in ("keys", "animated")}
     bpy.ops.beyond_mocap.place_players()
     assert bpy.ops.beyond_mocap.synthesize() == {"FINISHED"}
     settings = bpy.context.scene.beyond_mocap
     assert [player.body.name for player in settings.players] == bodies
     assert bpy.ops.beyond_mocap.discard() == {"FINISHED"}
-    after = state()
+    after = collect_state()
     assert set(before["animated"]) <= set(after["animated"])
     assert before["keys"].items() <= after["keys"].items()
     bpy.ops.beyond_mocap.synthesize()
     assert bpy.ops.beyond_mocap.accept() == {"FINISHED"}
-    rooms["core.session"].clear()
+    rooms["core.session"].clear_session()
 
 
 def test_what_this_version_saves_is_left_alone(old, rooms, tmp_path):
@@ -110,16 +110,16 @@ def test_what_this_version_saves_is_left_alone(old, rooms, tmp_path):
     new = bpy.data.scenes.new("Second")
     assert new.beyond_mocap.version == 0
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "new.blend"))
-    saved = state()
+    saved = collect_state()
     opened(tmp_path / "new.blend")
-    assert state() == saved
+    assert collect_state() == saved
     assert {scene.beyond_mocap.version for scene in bpy.data.scenes} == {rooms["core.migrate"].VERSION}
 
 
 def test_takes_of_another_session_are_never_mistaken_for_this_one_s(old, rooms):
     """Names of takes are kept in files; a file from elsewhere must not find a take of this session under one."""
-    rooms["core.session"].clear()
-    name = rooms["core.session"].keep_take(None, None)
-    assert [rooms["core.session"].made(player.take) for player in opened(old).players] == [None, None]
+    rooms["core.session"].clear_session()
+    name = rooms["core.session"].store_take(None, None)
+    assert [rooms["core.session"].find_take(player.take) for player in opened(old).players] == [None, None]
     assert not name.removeprefix("take-").isdigit()
-    rooms["core.session"].clear()
+    rooms["core.session"].clear_session()

@@ -36,15 +36,15 @@ def clips(tmp_path):
 def test_a_library_is_kept_where_the_preferences_say(rooms, clips, tmp_path):
     preferences, session = rooms
     chosen, place = preferences.get(), tmp_path / "caches"
-    assert (chosen.cache_folder, chosen.threads) == ("", 0)
-    chosen.cache_folder = str(place)
+    assert (chosen.find_cache_folder, chosen.count_threads) == ("", 0)
+    chosen.find_cache_folder = str(place)
     assert bpy.ops.beyond_mocap.build_library() == {"FINISHED"}
     assert not (clips / ".beyond_mocap").exists()
     own, = place.iterdir()
-    assert (own / "library.npz").is_file() and preferences.cache_folder(str(clips)) == str(own)
-    assert preferences.cache_folder(str(tmp_path)) != str(own)
-    session.clear()
-    chosen.cache_folder = ""
+    assert (own / "library.npz").is_file() and preferences.find_cache_folder(str(clips)) == str(own)
+    assert preferences.find_cache_folder(str(tmp_path)) != str(own)
+    session.clear_session()
+    chosen.find_cache_folder = ""
     assert bpy.ops.beyond_mocap.build_library() == {"FINISHED"}
     assert (clips / ".beyond_mocap" / "library.npz").is_file()
 
@@ -53,10 +53,10 @@ def test_threads_change_no_bit(rooms, clips):
     preferences, session = rooms
     built = []
     for threads in (1, 3):
-        preferences.get().threads = threads
-        assert preferences.threads() == threads
+        preferences.get().count_threads = threads
+        assert preferences.count_threads() == threads
         assert bpy.ops.beyond_mocap.build_library(rebuild=True) == {"FINISHED"}
-        built.append(session.library(str(clips), None))
+        built.append(session.find_library(str(clips), None))
     assert built[0] is not built[1]
     for one, other in zip(built[0].clips, built[1].clips, strict=True):
         assert one.path == other.path and one.mirrored == other.mirrored
@@ -67,13 +67,13 @@ def test_threads_change_no_bit(rooms, clips):
 def test_it_works_without_preferences(rooms, clips, monkeypatch):
     preferences, _ = rooms
     monkeypatch.setattr(preferences, "get", lambda: None)
-    assert preferences.threads() >= 1 and preferences.cache_folder(str(clips)) is None
+    assert preferences.count_threads() >= 1 and preferences.find_cache_folder(str(clips)) is None
     assert bpy.ops.beyond_mocap.build_library() == {"FINISHED"}
 
 
-def test_a_cache_folder_that_cannot_be_made_is_told_and_does_no_harm(rooms, clips, tmp_path):
+def test_a_cache_folder_that_cannot_be_made_is_reported_and_does_no_harm(rooms, clips, tmp_path):
     preferences, session = rooms
     (tmp_path / "file").write_text("")
-    preferences.get().cache_folder = str(tmp_path / "file" / "caches")
+    preferences.get().find_cache_folder = str(tmp_path / "file" / "caches")
     assert bpy.ops.beyond_mocap.build_library() == {"FINISHED"}
-    assert any("cannot be written" in note for note in session.library(str(clips), None).notes)
+    assert any("cannot be written" in note for note in session.find_library(str(clips), None).notes)

@@ -76,7 +76,7 @@ def test_a_row_is_a_property_and_is_collected(sharpness):
         assert (own.name, own.description, own.default) == ("Sharpness", "How sharp corners are", 0.25)
         assert (own.hard_min, own.hard_max, own.precision, own.unit) == (0.0, 1.0, 2, "TIME_ABSOLUTE")
         kept.sharpness = 0.5
-        assert properties.property_values(Corners, kept, "synthesis") == {"sharpness": 0.5}
+        assert properties.read_property_values(Corners, kept, "synthesis") == {"sharpness": 0.5}
     finally:
         del bpy.types.Scene.some_settings
         bpy.utils.unregister_class(Settings)
@@ -84,8 +84,8 @@ def test_a_row_is_a_property_and_is_collected(sharpness):
 
 def test_what_is_not_set_is_left_to_the_core(core):
     """0 seconds, 0 processes, the usual ball: the core's own default."""
-    order = core("match.order").MatchOrder
-    values = import_module(f"{EXTENSION}.scene.core.properties").property_values
+    order = core("match.order").MatchRequest
+    values = import_module(f"{EXTENSION}.scene.core.properties").read_property_values
     match = bpy.context.scene.beyond_mocap_match
     assert not {"start", "end", "workers"} & set(values(order, match, "match.section", "match.work"))
     match.end, match.workers = 12.5, 3
@@ -95,5 +95,5 @@ def test_what_is_not_set_is_left_to_the_core(core):
 
 def test_presets_keep_what_the_table_says(core):
     stored = {text.removeprefix("settings.") for text in bpy.types.BEYOND_MOCAP_OT_add_preset.preset_values}
-    assert stored == {row.identifier for row in core("base.settings").rows_of("synthesis") if row.in_preset}
+    assert stored == {row.identifier for row in core("base.settings").list_settings("synthesis") if row.in_preset}
     assert len(stored) == 14

@@ -101,7 +101,7 @@ def test_classes_are_found_in_order_and_undone(extension, tmp_path, monkeypatch,
 def test_a_registration_error_is_passed_on_and_undone(extension, monkeypatch):
     before = our_classes()
     extension.unregister()
-    last = sys.modules[f"{extension.__name__}.{extension.ROOMS[-1]}"]
+    last = sys.modules[f"{extension.__name__}.{extension.PACKAGES[-1]}"]
 
     def broken():
         raise RuntimeError("planted")

@@ -57,7 +57,7 @@ def hand(extension, ready, session, monkeypatch):  # noqa: F811
              for name in ("operators.turns", "scene.result.orders", "scene.result.queue", "scene.core.background")}
     turns, orders, queue, background = rooms.values()
     bpy.ops.beyond_mocap.build_library()
-    real, hand = orders.work, SimpleNamespace(
+    real, hand = orders.process_request, SimpleNamespace(
         pause=0.0, made=[], told=[], context=Context(), queue=queue, orders=orders
     )
 
@@ -69,9 +69,9 @@ def hand(extension, ready, session, monkeypatch):  # noqa: F811
         hand.made.append(order)
         return real(order, library, progress, cancelled, lambda: False)
 
-    monkeypatch.setattr(orders, "work", work)
+    monkeypatch.setattr(orders, "process_request", work)
 
-    class Button(turns.TurnsVerb):
+    class Button(turns.TakeOperator):
         bl_label, player = "Synthesize", ""
 
         def report(self, kind, text):
@@ -82,8 +82,8 @@ def hand(extension, ready, session, monkeypatch):  # noqa: F811
         if how:
             button.wanted = lambda context: how
         for entry in button.entries(hand.context):
-            queue.add(entry)
-        button.entry, button.job, button.told, button.wrote = None, None, [], 0
+            queue.add_entry(entry)
+        button.entry, button.job, button.told, button.stored_count = None, None, [], 0
         button.seen, button.drawn, button.clock = None, 0.0, "timer"
         return button
 
@@ -99,8 +99,8 @@ def hand(extension, ready, session, monkeypatch):  # noqa: F811
 
     hand.press, hand.run, hand.background = press, run, background
     yield hand
-    queue.clear()
-    background.stop()
+    queue.clear_queue()
+    background.cancel_jobs()
 
 
 def states():
@@ -109,7 +109,7 @@ def states():
 
 def test_each_result_is_written_as_it_arrives(hand, ready):  # noqa: F811
     button = hand.press()
-    assert hand.queue.names() == ["player1", "player2"]
+    assert hand.queue.list_players() == ["player1", "player2"]
     hand.run(button, until=lambda: states()[0] == "PREVIEW")
     assert states() == ["PREVIEW", "NONE"]
     assert hand.run(button) == {"FINISHED"}
@@ -129,7 +129,7 @@ def test_finish_early_keeps_the_one_and_leaves_the_others(hand):
     hand.pause = 5.0
     button = hand.press()
     hand.run(button, until=lambda: button.job is not None)
-    hand.background.end()
+    hand.background.end_jobs()
     assert hand.run(button, limit=20.0) == {"FINISHED"}
     assert states() == ["PREVIEW", "NONE"]
 
@@ -143,7 +143,7 @@ def test_changed_meanwhile_is_made_again(hand, ready, session):  # noqa: F811
     assert hand.run(button) == {"FINISHED"}
     assert [round(order.plan.alpha, 3) for order in hand.made] == [0.2, 0.4]
     assert "generated again" in " ".join(hand.told)
-    assert session.made(ready.players[0].take).plan.alpha == pytest.approx(0.4)
+    assert session.find_take(ready.players[0].take).plan.alpha == pytest.approx(0.4)
 
 
 def test_who_keeps_changing_is_dropped(hand, ready):  # noqa: F811
@@ -204,10 +204,10 @@ def test_a_file_is_loaded(hand, ready):  # noqa: F811
     button = hand.press()
     hand.run(button, until=lambda: button.job is not None)
     button.cancel(hand.context)
-    assert hand.queue.names() == [] and button.job.stale
+    assert hand.queue.list_players() == [] and button.job.is_stale
 
 
-def test_trouble_of_one_is_told_and_the_next_goes_on(hand, ready, match):  # noqa: F811
+def test_trouble_of_one_is_reported_and_the_next_goes_on(hand, ready, match):  # noqa: F811
     (match / "player1.txt").write_text("6.0 header\n")
     ready.players[0].annotation_file = str(match / "player1.txt")
     button = hand.press()
@@ -218,15 +218,15 @@ def test_trouble_of_one_is_told_and_the_next_goes_on(hand, ready, match):  # noq
 def test_waiting_twice_is_waiting_once(hand, ready):  # noqa: F811
     hand.press()
     hand.press()
-    assert hand.queue.names() == ["player1", "player2"]
-    assert hand.queue.remove("player1") and not hand.queue.remove("player1")
+    assert hand.queue.list_players() == ["player1", "player2"]
+    assert hand.queue.remove_player("player1") and not hand.queue.remove_player("player1")
 
 
 def test_the_fingerprint_is_of_what_is_asked(hand, ready):  # noqa: F811
-    how = hand.orders.How()
+    how = hand.orders.SynthesisMode()
     player = ready.players[0]
-    one = hand.orders.order_of(ready, player, how).fingerprint
+    one = hand.orders.build_request(ready, player, how).fingerprint
     player.name = "Anna"
-    assert hand.orders.order_of(ready, player, how).fingerprint == one
+    assert hand.orders.build_request(ready, player, how).fingerprint == one
     ready.seam_window = 0.5
-    assert hand.orders.order_of(ready, player, how).fingerprint != one
+    assert hand.orders.build_request(ready, player, how).fingerprint != one

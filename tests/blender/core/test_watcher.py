@@ -12,7 +12,7 @@ import pytest
 from conftest import EXTENSION
 from test_players import library_folder, match, ready, session  # noqa: F401  (fixtures)
 from test_turns import Context, Windows, hand  # noqa: F401
-from undo import state
+from undo import collect_state
 
 SAMPLE = pathlib.Path(__file__).resolve().parents[3] / "sample_blend" / "library"
 
@@ -77,8 +77,8 @@ def test_what_raises_is_reported_once_and_the_next_look_comes(live, capsys):
         raise ValueError("planted trouble")
 
     watcher = planted(live, look=look, restored=look)
-    assert [watcher.tick() for _ in range(3)] == [live.IDLE] * 3
-    watcher.hear("restored")
+    assert [watcher.run_tick() for _ in range(3)] == [live.IDLE] * 3
+    watcher.handle_event("restored")
     assert len(looks) == 4 and watcher.dirty
     assert capsys.readouterr().err.count("ValueError: planted trouble") == 1
     work = bpy.context.window_manager.beyond_mocap_work
@@ -103,18 +103,18 @@ def test_what_has_failed_is_said_until_it_succeeds(live, does):
 
     def again():
         if what == "saving":
-            watcher.hear(what)
+            watcher.handle_event(what)
             return
-        watcher.mark()
-        watcher.since -= live.RESTED
-        watcher.tick()
+        watcher.mark_dirty()
+        watcher.since -= live.IDLE_SECONDS
+        watcher.run_tick()
 
     again()
     assert work.trouble == "Planted has failed; see the system console"
-    live.guard("Another", lambda: None)
+    live.call_guarded("Another", lambda: None)
     if what in ("settle", "follow"):
-        watcher.tick()  # there is nothing to do
-        watcher.hear("changed", None, None)
+        watcher.run_tick()  # there is nothing to do
+        watcher.handle_event("changed", None, None)
     assert work.trouble == "Planted has failed; see the system console" and len(fails) == 1
     again()
     assert work.trouble == "" and not fails
@@ -135,10 +135,10 @@ def test_a_wish_of_meanwhile_is_not_lost(live):
     answers = [True, False]
     watcher = planted(live, settle=lambda scene: answers.pop(0))
     for left in (1, 0, 0):
-        watcher.tick()
+        watcher.run_tick()
         assert len(answers) == left
-    watcher = planted(live, settle=lambda scene: watcher.mark())
-    watcher.tick()
+    watcher = planted(live, settle=lambda scene: watcher.mark_dirty())
+    watcher.run_tick()
     assert watcher.dirty
 
 
@@ -147,13 +147,13 @@ def test_it_waits_until_the_hand_rests(live, monkeypatch):
     monkeypatch.setattr(live, "is_running", lambda names: "TRANSFORM_OT" in names and "A_OT_b" in names and holds[0])
     watcher = planted(live, held_by=("A_OT_b",), settle=lambda scene: seen.append("settle"),
                       dragged=lambda scene: seen.append("drag"))
-    watcher.tick()
+    watcher.run_tick()
     holds[0] = False
-    watcher.mark()
-    watcher.tick()
+    watcher.mark_dirty()
+    watcher.run_tick()
     assert seen == ["drag"]
-    watcher.since -= live.RESTED
-    watcher.tick()
+    watcher.since -= live.IDLE_SECONDS
+    watcher.run_tick()
     assert seen == ["drag", "settle"]
 
 
@@ -161,11 +161,11 @@ def test_what_is_to_come_soon_comes_once_and_as_often_as_it_asks(live, windowed)
     waits = [0.1, None]
 
     def action():
-        live.soon(action, 0.1)  # while it runs
+        live.call_soon(action, 0.1)  # while it runs
         return waits.pop(0)
 
-    live.soon(action, 0.1)
-    live.soon(action, 0.1)
+    live.call_soon(action, 0.1)
+    live.call_soon(action, 0.1)
     call = live._timers[action]
     assert call() is None and live._timers[action] is not call  # the newer one goes on
     newer = live._timers.pop(action)
@@ -187,8 +187,8 @@ def rider(room):
 def look(room):
     """What the timer does once something has changed."""
     watcher = room("scene.path_editing.live").WATCHER
-    watcher.mark()
-    watcher.tick()
+    watcher.mark_dirty()
+    watcher.run_tick()
     assert not watcher.dirty
 
 
@@ -198,7 +198,7 @@ def test_undo_between_two_looks_brings_everything_back(room, order):
     """Whichever looks come before and after the step that undo takes back, nothing of what they wrote is left after the
     next one; and redo likewise."""
     rider(room)
-    before = state()
+    before = collect_state()
     for what in order.split():
         if what == "edit":
             bpy.context.object.data.splines[0].bezier_points[1].co.y += 1.0
@@ -207,18 +207,18 @@ def test_undo_between_two_looks_brings_everything_back(room, order):
             bpy.ops.ed.undo_push(message="moved")
         else:
             look(room)
-    moved = [*state()["drawn"].values()]
+    moved = [*collect_state()["drawn"].values()]
     bpy.ops.ed.undo()
     assert room("scene.path_editing.live").WATCHER.dirty  # it has heard of the undo, which no change has to tell
-    room("scene.path_editing.live").WATCHER.tick()
-    assert state() == before
+    room("scene.path_editing.live").WATCHER.run_tick()
+    assert collect_state() == before
     bpy.ops.ed.redo()
-    room("scene.path_editing.live").WATCHER.tick()
-    after = state()
+    room("scene.path_editing.live").WATCHER.run_tick()
+    after = collect_state()
     assert [*after["drawn"].values()] == moved and after["keys"] != before["keys"]
     bpy.ops.ed.undo()
-    room("scene.path_editing.live").WATCHER.tick()
-    assert state() == before
+    room("scene.path_editing.live").WATCHER.run_tick()
+    assert collect_state() == before
 
 
 def test_update_then_a_look_then_undo_is_one_step(room):
@@ -226,16 +226,16 @@ def test_update_then_a_look_then_undo_is_one_step(room):
     rider(room)
     bpy.context.object.data.splines[0].bezier_points[1].co.y += 1.0
     bpy.ops.ed.undo_push(message="moved")
-    moved = state()
+    moved = collect_state()
     assert bpy.ops.beyond_mocap.update_path("EXEC_DEFAULT", True) == {"FINISHED"}
-    after = state()
+    after = collect_state()
     look(room)
-    assert state() == after
+    assert collect_state() == after
     bpy.ops.ed.undo()
-    assert state() == moved
+    assert collect_state() == moved
     bpy.ops.ed.redo()
     look(room)
-    assert state() == after
+    assert collect_state() == after
 
 
 def test_what_undo_has_taken_back_is_neither_measured_nor_drawn(room, monkeypatch):
@@ -248,12 +248,12 @@ def test_what_undo_has_taken_back_is_neither_measured_nor_drawn(room, monkeypatc
     figures = body.beyond_mocap_ride.figures
     bpy.context.object.location.y += 1.0
     bpy.context.view_layer.update()
-    riders.renew(bpy.context.scene, body)
+    riders.update_motion(bpy.context.scene, body)
     bpy.ops.ed.undo_push(message="moved")
     monkeypatch.setattr(measure, "REST", 0.0)
     monkeypatch.setattr(measure, "_figures", lambda *_: go.wait(10.0) and {"root_error_m": "of what was undone"})
     while not measure._running:
-        measure.FIGURES.tick()
+        measure.FIGURES.run_tick()
     job = measure._running[0][0]
     bpy.ops.ed.undo()
     body = bpy.data.objects[name]
@@ -261,10 +261,10 @@ def test_what_undo_has_taken_back_is_neither_measured_nor_drawn(room, monkeypatc
     while not job.poll():
         time.sleep(0.01)
     for _ in range(5):
-        measure.FIGURES.tick()
-    assert body.beyond_mocap_ride.figures == figures and riders.shown(body) is None
+        measure.FIGURES.run_tick()
+    assert body.beyond_mocap_ride.figures == figures and riders.find_computed_edit(body) is None
     bpy.ops.ed.redo()
-    assert riders.shown(bpy.data.objects[name]) is not None
+    assert riders.find_computed_edit(bpy.data.objects[name]) is not None
 
 
 def left_over(room):
@@ -275,11 +275,11 @@ def left_over(room):
     found += [f"menu: {function}" for name in dir(bpy.types) for function in drawn_in(getattr(bpy.types, name))
               if function.__module__.startswith(EXTENSION)]
     window, live = room("scene.core.window"), room("scene.core.live")
-    found += [*map(str, (*window._drawn, *window._clocks, *live._timers, *room("scene.result.queue").names()))]
-    found += [job.kind for job in room("scene.core.background")._newest.values() if not job.stale]
+    found += [*map(str, (*window._draw_handlers, *window._timers, *live._timers, *room("scene.result.queue").list_players()))]
+    found += [job.kind for job in room("scene.core.background")._newest.values() if not job.is_stale]
     found += ["stream"] if room("scene.stream.follow").current_listener() is not None else []
-    found += ["rally"] if room("scene.stream.play").rally() is not None else []
-    return found + ["queue"] * room("scene.result.queue").worked()
+    found += ["rally"] if room("scene.stream.play").current_rally() is not None else []
+    return found + ["queue"] * room("scene.result.queue").is_busy()
 
 
 def drawn_in(menu):
@@ -294,11 +294,11 @@ def endless(progress, cancelled, _hurry=None):
 
 def a_background_job(room, context):
     """A button whose work goes on in a thread, as Build Library or Make Match."""
-    button = room("operators.verb").BackgroundVerb()
+    button = room("operators.verb").BackgroundOperator()
     button.bl_label, button.kind = "Button", "test"
     button.job = room("scene.core.background").Job("test", endless)
     context.workspace = SimpleNamespace(status_text_set=lambda text: None)
-    button.started(context)
+    button.start_polling(context)
     while not button.job.fraction:
         button.modal(context, SimpleNamespace(type="TIMER"))
 
@@ -312,7 +312,7 @@ def a_match_child(room, _context):
     child.subprocess, kept = SimpleNamespace(**vars(child.subprocess)), child.subprocess
     child.subprocess.Popen = lambda command, **options: kept.Popen([command[0], "-c", script], **options)
     try:
-        job = background.Job("match", lambda progress, cancelled, _: child.run(["match"], progress, cancelled))
+        job = background.Job("match", lambda progress, cancelled, _: child.run_command(["match"], progress, cancelled))
         while not job.fraction:
             job.poll()
     finally:
@@ -321,7 +321,7 @@ def a_match_child(room, _context):
 
 def a_stream(room, _context):
     room("scene.stream.follow").start_listening(bpy.context.scene.beyond_mocap_stream)
-    room("scene.stream.follow").began()
+    room("scene.stream.follow").reset_status()
 
 
 def a_live_update(room, _context):
@@ -329,23 +329,23 @@ def a_live_update(room, _context):
     job = room("scene.core.background").Job
     jobs = [job(room(f"scene.{name}").KIND, endless)
             for name in ("throws.shown", "passes.live", "overlays.store", "path_editing.live")]
-    room("scene.throws.shown")._seen["job"] = "body", 0, jobs[0]
+    room("scene.throws.shown")._state["job"] = "body", 0, jobs[0]
     room("scene.passes.live")._running.append(jobs[1])
     room("scene.overlays.store")._running.append((jobs[2], "take"))
     room("scene.path_editing.live")._running.append((jobs[3], 0, 0))
-    room("scene.core.live").soon(room("scene.timeline.strip_events")._later, 0.1)
+    room("scene.core.live").call_soon(room("scene.timeline.strip_events")._run_scheduled, 0.1)
 
 
 def a_menu_of_words(room, _context):
     """Annotate by Keys draws over every editor of time and space."""
-    room("operators.annotate")._watch()
+    room("operators.annotate")._start_drawing()
 
 
 STARTS = (a_background_job, a_match_child, a_stream, a_live_update, a_menu_of_words)
 
 
 def assert_nothing_is_left(extension, room, windowed):
-    assert room("scene.core.live")._timers and room("scene.core.window")._drawn
+    assert room("scene.core.live")._timers and room("scene.core.window")._draw_handlers
     timers = [*room("scene.core.live")._timers.values()]
     assert all(map(bpy.app.timers.is_registered, timers))
     extension.unregister()
@@ -374,7 +374,7 @@ def test_switched_off_while_players_are_made_nothing_is_left(hand, extension, ro
     hand.pause = 20.0
     button = hand.press()
     hand.run(button, until=lambda: button.job is not None and button.job.fraction == 0.5)
-    hand.queue.work(True)
-    button.clock = room("scene.core.window").start_clock(hand.context)
-    assert hand.context.window_manager.beyond_mocap_work.kind and hand.queue.names()
+    hand.queue.set_busy(True)
+    button.clock = room("scene.core.window").start_timer(hand.context)
+    assert hand.context.window_manager.beyond_mocap_work.kind and hand.queue.list_players()
     assert_nothing_is_left(extension, room, windowed)

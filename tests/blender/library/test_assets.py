@@ -7,7 +7,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
-from undo import assert_one_step, press, state
+from undo import assert_one_step, press_operator, collect_state
 
 SAMPLE = Path(__file__).resolve().parents[3] / "sample_blend" / "library"
 
@@ -42,7 +42,7 @@ def test_shown_clips_become_assets_of_this_file(assets, library, tmp_path):
     assert sorted(action.name for action in bpy.data.actions) == ["jogging_2_9", "kick_low_top"]
     kick = bpy.data.actions["kick_low_top"]
     assert {"kick", "right", "low", "top"} <= {tag.name for tag in kick.asset_data.tags}
-    assert kick.asset_data.catalog_id == assets.catalog_id("Beyond Mocap/Kick")
+    assert kick.asset_data.catalog_id == assets.compute_catalog_id("Beyond Mocap/Kick")
     assert "4.8 s" in kick.asset_data.description
     drawn = pixels(kick)
     assert drawn.shape == (256, 256, 4) and 0.05 < np.mean(drawn[..., 3] > 0.5) < 0.7
@@ -54,10 +54,10 @@ def test_shown_clips_become_assets_of_this_file(assets, library, tmp_path):
 
 
 def test_as_a_file_of_their_own(assets, library, tmp_path):
-    before = state()
+    before = collect_state()
     target = tmp_path / "clips.blend"
     assert bpy.ops.beyond_mocap.make_assets(which="SHOWN", apart=True, filepath=str(target)) == {"FINISHED"}
-    assert state() == before and (tmp_path / assets.CATALOGS).is_file()
+    assert collect_state() == before and (tmp_path / assets.CATALOGS).is_file()
     with pytest.raises(RuntimeError, match="already exists"):
         bpy.ops.beyond_mocap.make_assets(which="SHOWN", apart=True, filepath=str(target))
     with bpy.data.libraries.load(str(target), assets_only=True) as (there, here):
@@ -72,7 +72,7 @@ def test_what_selected_armatures_play(assets, library):
     own = bpy.context.object.animation_data.action
     assert own.asset_data is None
     bpy.ops.ed.undo_push(message="before")
-    assert press(bpy.ops.beyond_mocap.make_assets, which="SELECTED") == {"FINISHED"}
+    assert press_operator(bpy.ops.beyond_mocap.make_assets, which="SELECTED") == {"FINISHED"}
     assert bpy.data.actions["kick_low_top"].asset_data is not None
     bpy.ops.ed.undo()
     assert bpy.data.actions["kick_low_top"].asset_data is None
@@ -89,11 +89,11 @@ def test_an_asset_of_the_users_stays_his_when_a_file_is_written(assets, library,
     bpy.ops.beyond_mocap.annotate_clip(path="kick_low_top.bvh")
     own = bpy.context.object.animation_data.action
     own.asset_mark()
-    own.asset_data.description, own.asset_data.catalog_id = "mine", assets.catalog_id("Mine")
+    own.asset_data.description, own.asset_data.catalog_id = "mine", assets.compute_catalog_id("Mine")
     own.asset_data.tags.new("precious")
-    before, target = state(), tmp_path / "walk.v2"
-    assert press(bpy.ops.beyond_mocap.make_assets, which="SELECTED", apart=True, filepath=str(target)) == {"FINISHED"}
-    assert state() == before and own.asset_data.description == "mine" and len(own.asset_data.tags) == 1
+    before, target = collect_state(), tmp_path / "walk.v2"
+    assert press_operator(bpy.ops.beyond_mocap.make_assets, which="SELECTED", apart=True, filepath=str(target)) == {"FINISHED"}
+    assert collect_state() == before and own.asset_data.description == "mine" and len(own.asset_data.tags) == 1
     with bpy.data.libraries.load(str(tmp_path / "walk.v2.blend"), assets_only=True) as (there, _):
         assert list(there.actions) == ["kick_low_top"]
     bpy.ops.beyond_mocap.remove_clip()
@@ -113,11 +113,11 @@ def test_catalogs_are_added_to_those_above(assets, tmp_path):
     ((), "Other"),
 ])
 def test_catalog_by_words(assets, words, catalog):
-    assert assets.catalog_of(words) == f"Beyond Mocap/{catalog}"
+    assert assets.choose_catalog(words) == f"Beyond Mocap/{catalog}"
 
 
 def test_bad_places_and_clips(library, tmp_path):
-    before = state()
+    before = collect_state()
     with pytest.raises(RuntimeError, match="no file given"):
         bpy.ops.beyond_mocap.make_assets(which="SHOWN", apart=True)
     with pytest.raises(RuntimeError, match="clips.blend"):
@@ -125,7 +125,7 @@ def test_bad_places_and_clips(library, tmp_path):
     (library / "kick_low_top.bvh").write_text("broken")
     with pytest.raises(RuntimeError, match="kick_low_top.bvh"):
         bpy.ops.beyond_mocap.make_assets(which="SHOWN")
-    assert state() == before
+    assert collect_state() == before
     bpy.context.window_manager.beyond_mocap_clips.find = "nothing like it"
     with pytest.raises(RuntimeError, match="no clip in the list"):
         bpy.ops.beyond_mocap.make_assets(which="CHOSEN")

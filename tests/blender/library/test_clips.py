@@ -7,7 +7,7 @@ import bpy
 import made
 import numpy as np
 import pytest
-from undo import assert_one_step, state
+from undo import assert_one_step, collect_state
 
 
 @pytest.fixture
@@ -21,8 +21,8 @@ def clip(core, tmp_path):
     """A clip file, and the motion that a reader finds in it."""
     bvh = core("files.bvh.bvh")
     path = tmp_path / "clip.bvh"
-    bvh.write(path, made.motion(core))
-    return path, bvh.read(path).motion
+    bvh.write_bvh(path, made.build_motion(core))
+    return path, bvh.read_bvh(path).motion
 
 
 @pytest.fixture
@@ -30,7 +30,7 @@ def folder(core, tmp_path):
     """A folder with two clips in it and one below it."""
     (tmp_path / "below").mkdir()
     for name in ("a", "b", "below/c"):
-        core("files.bvh.bvh").write(tmp_path / f"{name}.bvh", made.motion(core))
+        core("files.bvh.bvh").write_bvh(tmp_path / f"{name}.bvh", made.build_motion(core))
     return tmp_path
 
 
@@ -44,13 +44,13 @@ def test_operator_gives_what_the_functions_give(core, rooms, clip):
     bpy.ops.beyond_mocap.import_clips(filepath=str(path))
     body = bpy.context.object
     assert body.name == "clip" and body.animation_data.action.name == "clip"
-    read = rooms["core.action"].read(body, bpy.context.scene)
-    assert read.skeleton.same_bones(motion.skeleton, 0.0)
+    read = rooms["core.action"].read_motion(body, bpy.context.scene)
+    assert read.skeleton.has_same_bones(motion.skeleton, 0.0)
     np.testing.assert_allclose(read.root_positions, motion.root_positions, atol=1e-6)
     np.testing.assert_allclose(read.rotations, motion.rotations, atol=1e-6)
-    other = rooms["rigs.armature"].create(bpy.context, motion.skeleton, "by function")
-    rooms["core.action"].write(other, motion, bpy.context.scene)
-    again = rooms["core.action"].read(other, bpy.context.scene)
+    other = rooms["rigs.armature"].create_armature(bpy.context, motion.skeleton, "by function")
+    rooms["core.action"].write_motion(other, motion, bpy.context.scene)
+    again = rooms["core.action"].read_motion(other, bpy.context.scene)
     assert np.array_equal(again.rotations, read.rotations) and np.array_equal(again.root_positions, read.root_positions)
 
 
@@ -59,7 +59,7 @@ def test_export_writes_what_was_imported(core, rooms, clip, tmp_path):
     play_at_clip_rate()
     bpy.ops.beyond_mocap.import_clips(filepath=str(path))
     assert bpy.ops.beyond_mocap.export_bvh(filepath=str(tmp_path / "out.bvh")) == {"FINISHED"}
-    out = core("files.bvh.bvh").read(tmp_path / "out.bvh").motion
+    out = core("files.bvh.bvh").read_bvh(tmp_path / "out.bvh").motion
     kinematics = core("motion.motion").forward_kinematics
     np.testing.assert_allclose(kinematics(out)[0], kinematics(motion)[0], atol=1e-5)
 
@@ -84,13 +84,13 @@ def test_onto_the_selected_armature(core, clip, folder):
 def test_mirrored_twice_is_as_before(core, rooms, clip):
     play_at_clip_rate()
     bpy.ops.beyond_mocap.import_clips(filepath=str(clip[0]))
-    before = rooms["core.action"].read(bpy.context.object, bpy.context.scene)
+    before = rooms["core.action"].read_motion(bpy.context.object, bpy.context.scene)
     bpy.ops.beyond_mocap.mirror()
-    once = rooms["core.action"].read(bpy.context.object, bpy.context.scene)
+    once = rooms["core.action"].read_motion(bpy.context.object, bpy.context.scene)
     np.testing.assert_allclose(once.root_positions[0], before.root_positions[0], atol=1e-5)
     assert np.abs(once.rotations - before.rotations).max() > 0.1
     bpy.ops.beyond_mocap.mirror()
-    twice = rooms["core.action"].read(bpy.context.object, bpy.context.scene)
+    twice = rooms["core.action"].read_motion(bpy.context.object, bpy.context.scene)
     places = core("motion.motion").forward_kinematics
     np.testing.assert_allclose(places(twice)[0], places(before)[0], atol=1e-4)
 
@@ -112,25 +112,25 @@ def test_a_bad_file_changes_nothing(tmp_path, folder, content, found):
     path = tmp_path / "clip.bvh"
     if content is not None:
         path.write_bytes(content)
-    before = state()
+    before = collect_state()
     with pytest.raises(RuntimeError, match=found):
         bpy.ops.beyond_mocap.import_clips(directory=str(tmp_path), files=[{"name": "a.bvh"}, {"name": "clip.bvh"}])
-    assert state() == before
+    assert collect_state() == before
 
 
 def test_nothing_given_and_nothing_selected():
-    before = state()
+    before = collect_state()
     for operator, message in ((bpy.ops.beyond_mocap.import_clips, "no file given"),
                               (bpy.ops.beyond_mocap.mirror, "Select an armature"),
                               (bpy.ops.beyond_mocap.export_bvh, "Select an armature"),
                               (bpy.ops.beyond_mocap.remove_player, "No players in the list")):
         with pytest.raises(RuntimeError, match=message):
             operator()
-    assert state() == before
+    assert collect_state() == before
 
 
 def test_an_armature_without_motion(core, rooms, tmp_path):
-    bpy.context.view_layer.objects.active = rooms["rigs.armature"].create(bpy.context, made.skeleton(core), "Still")
+    bpy.context.view_layer.objects.active = rooms["rigs.armature"].create_armature(bpy.context, made.build_skeleton(core), "Still")
     with pytest.raises(RuntimeError, match="plays no action"):
         bpy.ops.beyond_mocap.mirror()
     with pytest.raises(RuntimeError, match="plays no action"):

@@ -6,7 +6,7 @@ import bpy
 import made
 import numpy as np
 import pytest
-from undo import assert_one_step, state
+from undo import assert_one_step, collect_state
 
 
 @pytest.fixture
@@ -27,14 +27,14 @@ EXPORTERS = {
 def exported(core, rooms, path, fps=30, lie=lambda rig: None):
     """A known motion on an armature with a body, written by Blender's exporter; the motion. The file is empty after.
     lie: how the armature object itself is moved, turned and scaled before it gets its motion."""
-    motion = made.motion(core, 61, float(fps))
+    motion = made.build_motion(core, 61, float(fps))
     scene = bpy.context.scene
     scene.render.fps = fps
     scene.frame_start, scene.frame_end = 1, 61
-    rig = rooms["rigs.armature"].create(bpy.context, motion.skeleton, "Somebody")
+    rig = rooms["rigs.armature"].create_armature(bpy.context, motion.skeleton, "Somebody")
     lie(rig)
-    rooms["core.action"].write(rig, motion, scene, 1.0)
-    rooms["stage.body"].create(rig, "Somebody", (1, 0, 0), scene.collection, scene, motion)
+    rooms["core.action"].write_motion(rig, motion, scene, 1.0)
+    rooms["stage.body"].create_character(rig, "Somebody", (1, 0, 0), scene.collection, scene, motion)
     EXPORTERS[path.suffix](str(path))
     bpy.ops.wm.read_homefile(use_empty=True)
     return motion
@@ -51,9 +51,9 @@ def test_a_known_motion_comes_back_within_a_millimetre(core, rooms, tmp_path, en
     path = tmp_path / f"clip{ending}"
     motion = exported(core, rooms, path, fps)
     bpy.context.scene.render.fps = 24
-    before = state()
-    takes = rooms["library.foreign"].read(path)
-    assert state() == before and bpy.context.scene.name == "Scene"
+    before = collect_state()
+    takes = rooms["library.foreign"].read_takes(path)
+    assert collect_state() == before and bpy.context.scene.name == "Scene"
     back = takes[0].motion
     assert back.fps == pytest.approx(fps) and len(takes) == 1
     assert set(back.skeleton.names) == set(motion.skeleton.names)
@@ -62,7 +62,7 @@ def test_a_known_motion_comes_back_within_a_millimetre(core, rooms, tmp_path, en
         places_of(core, back, motion.skeleton.names) - places_of(core, motion, motion.skeleton.names), axis=-1
     )
     assert apart.max() < 1e-3, apart.max()
-    clip = rooms["library.foreign"].as_clip(back)
+    clip = rooms["library.foreign"].to_bvh_clip(back)
     apart = np.linalg.norm(
         places_of(core, clip.motion, motion.skeleton.names) - places_of(core, motion, motion.skeleton.names), axis=-1
     )
@@ -76,7 +76,7 @@ def test_an_armature_that_is_turned_moved_and_scaled(core, rooms, tmp_path, endi
 
     path = tmp_path / f"clip{ending}"
     motion = exported(core, rooms, path, 30, lie)
-    back = rooms["library.foreign"].read(path)[0].motion
+    back = rooms["library.foreign"].read_takes(path)[0].motion
     apart = np.linalg.norm(places_of(core, back, motion.skeleton.names)[:, 0] - motion.root_positions, axis=-1)
     assert apart.max() < 1e-3
     grown = np.linalg.norm(back.skeleton.offsets[back.skeleton.index("LeftLeg")])
@@ -89,13 +89,13 @@ def test_several_animations_of_one_file(core, rooms, tmp_path):
     path = tmp_path / "two.glb"
     scene = bpy.context.scene
     scene.render.fps = 30
-    motion = made.motion(core, 61)
-    rig = rooms["rigs.armature"].create(bpy.context, motion.skeleton, "Somebody")
+    motion = made.build_motion(core, 61)
+    rig = rooms["rigs.armature"].create_armature(bpy.context, motion.skeleton, "Somebody")
     for name, count in (("short", 31), ("long", 61)):
-        rooms["core.action"].write(rig, motion.frames(0, count), scene, 1.0, name)
+        rooms["core.action"].write_motion(rig, motion.frames(0, count), scene, 1.0, name)
     bpy.ops.export_scene.gltf(filepath=str(path), export_format="GLB", export_animation_mode="ACTIONS")
     bpy.ops.wm.read_homefile(use_empty=True)
-    takes = rooms["library.foreign"].read(path)
+    takes = rooms["library.foreign"].read_takes(path)
     assert [len(take.motion) for take in takes] == [61, 31] and "long" in takes[0].name
     bpy.ops.beyond_mocap.import_clips(filepath=str(path))
     assert len([thing for thing in bpy.data.objects if thing.type == "ARMATURE"]) == 2
@@ -107,12 +107,12 @@ def test_files_without_a_motion_are_told(rooms, tmp_path):
     bpy.ops.mesh.primitive_cube_add()
     box = tmp_path / "box.glb"
     bpy.ops.export_scene.gltf(filepath=str(box), export_format="GLB")
-    before = state()
+    before = collect_state()
     for path, told in ((broken, "cannot be read"), (box, "no armature"), (tmp_path / "gone.glb", "no such file"),
                        (tmp_path / "x.abc", "no such file")):
         with pytest.raises(Exception, match=told):
-            rooms["library.foreign"].read(path)
-    assert state() == before
+            rooms["library.foreign"].read_takes(path)
+    assert collect_state() == before
 
 
 def test_the_operator_gives_what_the_functions_give(core, rooms, tmp_path):
@@ -122,7 +122,7 @@ def test_the_operator_gives_what_the_functions_give(core, rooms, tmp_path):
     assert_one_step(bpy.ops.beyond_mocap.import_clips, filepath=str(path))
     rig = bpy.context.object
     assert rig.name == "clip" and [o.type for o in bpy.data.objects] == ["ARMATURE"]
-    read = rooms["core.action"].read(rig, bpy.context.scene)
+    read = rooms["core.action"].read_motion(rig, bpy.context.scene)
     apart = np.linalg.norm(
         places_of(core, read, motion.skeleton.names) - places_of(core, motion, motion.skeleton.names), axis=-1
     )
@@ -134,7 +134,7 @@ def mixed(core, rooms, tmp_path):
     """A library of a BVH, an FBX and a GLB clip with words beside them, and a broken FBX."""
     folder = tmp_path / "library"
     (folder / "below").mkdir(parents=True)
-    core("files.bvh.bvh").write(folder / "walk.bvh", made.motion(core, 91))
+    core("files.bvh.bvh").write_bvh(folder / "walk.bvh", made.build_motion(core, 91))
     exported(core, rooms, folder / "below" / "jog.fbx")
     exported(core, rooms, folder / "low.glb")
     (folder / "broken.fbx").write_bytes(b"Kaydara FBX Binary  \0\x1a\0" + b"\1" * 300)
@@ -146,26 +146,26 @@ def mixed(core, rooms, tmp_path):
 
 
 def test_a_library_of_foreign_clips_is_built_and_a_broken_one_left_out(core, mixed):
-    before = state()
+    before = collect_state()
     assert bpy.ops.beyond_mocap.build_library() == {"FINISHED"}
     listing = bpy.context.window_manager.beyond_mocap_clips
     paths = {clip.path: clip.words for clip in listing.shown}
     assert set(paths) == {"walk.bvh", "below/jog.fbx", "low.glb"} and paths["below/jog.fbx"].startswith("jogging")
     assert (mixed / ".beyond_mocap/converted/below/jog.fbx.bvh").is_file()
-    after = state()
+    after = collect_state()
     assert {key for key in before if before[key] != after[key]} <= {"settings", "scenes"}
-    core("library.build").build(mixed)  # as the command line does, afterwards
+    core("library.build").build_library(mixed)  # as the command line does, afterwards
     bpy.ops.beyond_mocap.import_clip(path="below/jog.fbx", dressed=False)
     assert bpy.context.object.name == "jog"
 
 
 def test_a_clip_is_converted_once_and_again_when_it_changes(core, rooms, mixed):
     foreign = rooms["library.foreign"]
-    assert len(foreign.Queue(mixed, None).todo) == 3
+    assert len(foreign.ConversionQueue(mixed, None).remaining) == 3
     bpy.ops.beyond_mocap.build_library()
-    assert [path.name for path in foreign.Queue(mixed, None).todo] == ["broken.fbx"]
+    assert [path.name for path in foreign.ConversionQueue(mixed, None).remaining] == ["broken.fbx"]
     exported(core, rooms, mixed / "low.glb", 60)
-    assert sorted(path.name for path in foreign.Queue(mixed, None).todo) == ["broken.fbx", "low.glb"]
+    assert sorted(path.name for path in foreign.ConversionQueue(mixed, None).remaining) == ["broken.fbx", "low.glb"]
 
 
 def test_a_folder_of_broken_clips_alone(tmp_path):

@@ -6,7 +6,7 @@ import shutil
 import bpy
 import made
 import pytest
-from undo import assert_one_step, state
+from undo import assert_one_step, collect_state
 
 
 @pytest.fixture
@@ -21,7 +21,7 @@ def folder(core, tmp_path):
     top = tmp_path / "project" / "library"
     (top / "kicks").mkdir(parents=True)
     for name, frames in (("walk", 91), ("kicks/low", 61), ("other", 61)):
-        core("files.bvh.bvh").write(top / f"{name}.bvh", made.motion(core, frames))
+        core("files.bvh.bvh").write_bvh(top / f"{name}.bvh", made.build_motion(core, frames))
     (top / "walk.txt").write_text("0 3 walking front\n")
     (top / "kicks/low.txt").write_text("0 2 kick right low\n1.2 kick right low\n")
     return top
@@ -44,7 +44,7 @@ def test_a_folder_is_listed_without_being_built(listed):
     low, other, walk = listed.shown
     assert low.name == "low" and low.words.split()[0] == "kick" and set(low.words.split()) == {"kick", "right", "low"}
     assert "1 key moment" in low.figures and low.figures.startswith("2.0 s") and walk.seconds == pytest.approx(3.0)
-    assert other.words == "" and [clip.mark for clip in listed.shown] == [3, 3, 3]
+    assert other.words == "" and [clip.grade for clip in listed.shown] == [3, 3, 3]
 
 
 @pytest.mark.parametrize("asked, found", [
@@ -89,8 +89,8 @@ def test_a_clip_comes_in_as_it_was_recorded(listed, folder, core, rooms):
     rig = bpy.context.object
     assert rig.name == "low" and rig["beyond_mocap_clip"] == "kicks/low.bvh"
     assert [o.type for o in rig.children] == ["MESH"]
-    read = rooms["core.action"].read(rig, bpy.context.scene)
-    wanted = core("files.bvh.bvh").read(folder / "kicks/low.bvh").motion
+    read = rooms["core.action"].read_motion(rig, bpy.context.scene)
+    wanted = core("files.bvh.bvh").read_bvh(folder / "kicks/low.bvh").motion
     assert abs(read.root_positions - wanted.root_positions).max() < 1e-5
     assert_one_step(bpy.ops.beyond_mocap.import_clip, path="walk.bvh", dressed=False)
 
@@ -103,11 +103,11 @@ def test_the_chosen_clip_comes_in(listed):
 
 def test_clips_that_cannot_be_read_change_nothing(listed, folder):
     (folder / "other.bvh").write_text("nothing")
-    before = state()
+    before = collect_state()
     for path, told in (("gone.bvh", "no such file"), ("other.bvh", "other.bvh")):
         with pytest.raises(RuntimeError, match=told):
             bpy.ops.beyond_mocap.import_clip(path=path)
-    assert state() == before
+    assert collect_state() == before
 
 
 def test_without_a_folder_or_clips(tmp_path):
@@ -134,12 +134,12 @@ def test_the_list_is_not_saved_with_the_file(listed, tmp_path):
 
 
 def test_news_tell_what_is_new_changed_and_gone(folder, rooms, core):
-    look, news = rooms["library.clips"].list_files, rooms["library.clips"].tell_news
+    look, news = rooms["library.clips"].list_files, rooms["library.clips"].describe_changes
     before = look(str(folder))
     assert sorted(before) == ["kicks/low.bvh", "kicks/low.txt", "other.bvh", "walk.bvh", "walk.txt"]
     assert news(before, before) == ""
     for name in ("a", "b", "c"):
-        core("files.bvh.bvh").write(folder / f"{name}.bvh", made.motion(core, 20))
+        core("files.bvh.bvh").write_bvh(folder / f"{name}.bvh", made.build_motion(core, 20))
     (folder / "walk.txt").write_text("0 2.5 walking front\n")
     (folder / "kicks/low.bvh").unlink()
     assert news(before, look(str(folder))) == "3 new clips, 1 removed clip, 1 changed label file"
@@ -149,7 +149,7 @@ def test_news_tell_what_is_new_changed_and_gone(folder, rooms, core):
 def test_watching_says_it_and_builds_nothing(listed, folder, rooms, core):
     watch, settings = rooms["library.clips"], bpy.context.scene.beyond_mocap
     assert not settings.library_watch
-    core("files.bvh.bvh").write(folder / "new.bvh", made.motion(core, 20))
+    core("files.bvh.bvh").write_bvh(folder / "new.bvh", made.build_motion(core, 20))
     watch._look_again()
     assert listed.news == "" and not watch._looking
     settings.library_watch = True

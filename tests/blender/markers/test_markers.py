@@ -52,7 +52,7 @@ def test_it_plays_the_recording_at_any_frame_rate(cloud, trial, rate):
     scene = bpy.context.scene
     scene.render.fps, scene.render.fps_base = rate
     fps = rate[0] / rate[1]
-    thing = cloud.create(bpy.context, trial, start=11.0)
+    thing = cloud.create_cloud(bpy.context, trial, start=11.0)
     for frame in (3.0, 11.0, 11.0 + 0.1 * fps, 11.0 + 0.35 * fps, 11.0 + 0.4321 * fps, 11.0 + 2.0 * fps):
         row = min(max((frame - 11.0) / fps * 120.0, 0.0), 60.0)
         before, share = int(row), row - int(row)
@@ -65,7 +65,7 @@ def test_it_plays_the_recording_at_any_frame_rate(cloud, trial, rate):
 
 def test_what_is_not_seen_has_neither_sphere_nor_lines(cloud, lines, trial):
     bpy.context.scene.render.fps = 120
-    thing = cloud.create(bpy.context, trial, start=0.0)
+    thing = cloud.create_cloud(bpy.context, trial, start=0.0)
     for label in thing.beyond_mocap_cloud.labels:
         label.segment = "Hips"
     assert seen_at(thing, 10)[1:][1:] == (4, 6)
@@ -78,25 +78,25 @@ def test_what_is_not_seen_has_neither_sphere_nor_lines(cloud, lines, trial):
 @pytest.mark.parametrize("scale", [1.0, 0.01])
 def test_it_gives_the_recording_back(cloud, trial, scale):
     bpy.context.scene.unit_settings.scale_length = scale
-    thing = cloud.create(bpy.context, trial)
-    back = cloud.read(thing, bpy.context.scene)
+    thing = cloud.create_cloud(bpy.context, trial)
+    back = cloud.read_trial(thing, bpy.context.scene)
     assert back.labels == trial.labels and back.fps == trial.fps and back.start == trial.start
     assert [(event.label, event.side) for event in back.events] == [("Foot Strike", "left")]
     assert (back.seen == trial.seen).all() and back.subject == "Ann" and back.name == "walk"
     assert np.nanmax(np.abs(back.positions - trial.positions)) < 1e-6
     thing.beyond_mocap_cloud.labels[3].name = "LANK"
-    assert cloud.read(thing, bpy.context.scene).labels[3] == "LANK"
+    assert cloud.read_trial(thing, bpy.context.scene).labels[3] == "LANK"
 
 
 def test_markers_whose_vertices_are_deleted_are_left_out(cloud, trial):
-    thing = cloud.create(bpy.context, trial)
+    thing = cloud.create_cloud(bpy.context, trial)
     bpy.context.view_layer.objects.active = thing
     thing.select_set(True)
     thing.data.vertices.foreach_set("select", [False, True, False, False])
     bpy.ops.object.mode_set(mode="EDIT")
     bpy.ops.mesh.delete(type="VERT")
     bpy.ops.object.mode_set(mode="OBJECT")
-    back = cloud.read(thing, bpy.context.scene)
+    back = cloud.read_trial(thing, bpy.context.scene)
     assert back.labels == ("LASI", "LKNE", "*7")
     places, *_ = seen_at(thing, bpy.context.scene.frame_start)
     assert np.abs(places - trial.positions[0, [0, 2, 3]]).max() < 1e-5
@@ -104,12 +104,12 @@ def test_markers_whose_vertices_are_deleted_are_left_out(cloud, trial):
 
 def test_other_trajectories_take_the_place_of_the_first(cloud, trial):
     scene = bpy.context.scene
-    thing = cloud.create(bpy.context, trial)
+    thing = cloud.create_cloud(bpy.context, trial)
     label = thing.beyond_mocap_cloud.labels["LKNE"]
     label.segment, label.landmark, label.role = "LeftLeg", "left_knee_lateral", "OPTIONAL"
-    fewer = trial.only(("LKNE", "LASI")).with_positions(trial.positions[::-1][:, [2, 0]])
-    cloud.write(thing, fewer, scene)
-    back = cloud.read(thing, scene)
+    fewer = trial.select_markers(("LKNE", "LASI")).with_positions(trial.positions[::-1][:, [2, 0]])
+    cloud.write_trial(thing, fewer, scene)
+    back = cloud.read_trial(thing, scene)
     assert back.labels == ("LKNE", "LASI") and np.nanmax(np.abs(back.positions - fewer.positions)) < 1e-6
     label = thing.beyond_mocap_cloud.labels["LKNE"]
     assert (label.segment, label.landmark, label.role) == ("LeftLeg", "left_knee_lateral", "OPTIONAL")
@@ -117,30 +117,30 @@ def test_other_trajectories_take_the_place_of_the_first(cloud, trial):
 
 
 def test_a_saved_file_plays_and_reads(cloud, trial, tmp_path):
-    cloud.create(bpy.context, trial)
+    cloud.create_cloud(bpy.context, trial)
     path = str(tmp_path / "kept.blend")
     bpy.ops.wm.save_as_mainfile(filepath=path)
     bpy.ops.wm.open_mainfile(filepath=path)
     thing = bpy.data.objects["walk"]
     places, *_ = seen_at(thing, bpy.context.scene.frame_start)
     assert np.abs(places - trial.positions[0]).max() < 1e-5
-    assert np.nanmax(np.abs(cloud.read(thing, bpy.context.scene).positions - trial.positions)) < 1e-6
+    assert np.nanmax(np.abs(cloud.read_trial(thing, bpy.context.scene).positions - trial.positions)) < 1e-6
 
 
 def test_a_vertex_that_is_doubled_in_edit_mode_is_no_second_marker(cloud, trial):
-    thing = cloud.create(bpy.context, trial)
+    thing = cloud.create_cloud(bpy.context, trial)
     bpy.context.view_layer.objects.active = thing
     thing.data.vertices.foreach_set("select", [False, True, False, False])
     bpy.ops.object.mode_set(mode="EDIT")
     bpy.ops.mesh.duplicate()
     bpy.ops.object.mode_set(mode="OBJECT")
     assert len(thing.data.vertices) == 5
-    assert cloud.read(thing, bpy.context.scene).labels == trial.labels
+    assert cloud.read_trial(thing, bpy.context.scene).labels == trial.labels
 
 
 @pytest.mark.parametrize("by", ["delete", "clear"])
 def test_a_cloud_without_vertices_says_so(cloud, core, trial, by):
-    thing = cloud.create(bpy.context, trial)
+    thing = cloud.create_cloud(bpy.context, trial)
     if by == "clear":
         thing.data.clear_geometry()
     else:
@@ -151,29 +151,29 @@ def test_a_cloud_without_vertices_says_so(cloud, core, trial, by):
         bpy.ops.object.mode_set(mode="OBJECT")
     thing.beyond_mocap_cloud.labels[0].segment = "Hips"
     with pytest.raises(core("base.errors").InputError, match="no vertex of a marker"):
-        cloud.read(thing, bpy.context.scene)
+        cloud.read_trial(thing, bpy.context.scene)
 
 
 @pytest.mark.parametrize("lost", ["modifier", "empty", "mesh"])
 def test_a_cloud_whose_player_is_spoilt_says_so(cloud, core, trial, lost):
     nodes = importlib.import_module(f"{EXTENSION}.scene.markers.nodes")
-    thing = cloud.create(bpy.context, trial)
+    thing = cloud.create_cloud(bpy.context, trial)
     if lost == "modifier":
         thing.modifiers.clear()
         with pytest.raises(core("base.errors").InputError, match="import the recording again"):
-            cloud.played_rate(thing, bpy.context.scene)
+            cloud.compute_playback_rate(thing, bpy.context.scene)
     else:
         other = bpy.data.objects.new("other", bpy.data.meshes.new("other") if lost == "mesh" else None)
-        nodes.put(nodes.modifier_of(thing), "Trajectories", other)
+        nodes.set_input(nodes.find_modifier(thing), "Trajectories", other)
     assert cloud.places_at(thing, 1.0) == []
     with pytest.raises(core("base.errors").InputError, match="no trajectories"):
-        cloud.read(thing, bpy.context.scene)
+        cloud.read_trial(thing, bpy.context.scene)
 
 
 @pytest.fixture
 def walk(core):
     """A recording in a file: Plug-in Gait on a walking body."""
-    worlds.plant_markers()
+    worlds.write_synthetic_markers()
     return worlds.MARKERS / "walk.trc"
 
 
@@ -186,7 +186,7 @@ def test_importing_gives_what_the_reader_reads_and_is_one_step(cloud, core, walk
     assert_one_step(bpy.ops.beyond_mocap.import_markers, filepath=str(walk))
     read = core("markers.files.marker_files").read_markers(walk)
     thing = bpy.data.objects["walk"]
-    back = cloud.read(thing, bpy.context.scene)
+    back = cloud.read_trial(thing, bpy.context.scene)
     assert back.labels == read.labels and back.fps == read.fps
     assert np.allclose(back.positions, read.positions, atol=1e-6, equal_nan=True)
     assert thing.beyond_mocap_cloud.set_name == "plug_in_gait"
@@ -219,8 +219,8 @@ def test_a_marker_set_goes_to_a_file_and_comes_back(walk, tmp_path):
 def test_markers_that_only_the_static_trial_has_are_of_the_set(core):
     sets = importlib.import_module(f"{EXTENSION}.scene.markers.sets")
     thing = imported(worlds.SAMPLE.parent / "markers" / "throw.c3d")
-    known = {one.name: one for one in core("markers.files.marker_set_text").shipped_sets()}["driveline"]
-    made = sets.of_cloud(thing)
+    known = {one.name: one for one in core("markers.files.marker_set_text").read_shipped_sets()}["driveline"]
+    made = sets.build_marker_set(thing)
     assert {joint: set(labels) for joint, labels in made.segments.items()} == {
         joint: set(labels) for joint, labels in known.segments.items()
     }
@@ -231,12 +231,12 @@ def test_markers_that_only_the_static_trial_has_are_of_the_set(core):
 
 
 def test_markers_without_names_go_to_the_side_they_are_near_to(core, tmp_path):
-    known = core("synthetic.ground_truth.planted_markers").planted(
-        core("synthetic.gait").gait(1.4, 0.4, fps=100.0), "sprinter", seed=2, occlusion=0.0, swaps=0, jumps=0,
+    known = core("synthetic.ground_truth.planted_markers").build_trial(
+        core("synthetic.gait").build_gait(1.4, 0.4, fps=100.0), "sprinter", seed=2, occlusion=0.0, swaps=0, jumps=0,
         unlabeled=0
     )
     path = tmp_path / "run.trc"
-    lost = known.trial.renamed({"LHAND": "x53", "RHAND": "x52"})  # the set's own aliases have them the other way round
+    lost = known.trial.rename_labels({"LHAND": "x53", "RHAND": "x52"})  # the set's own aliases have them the other way round
     core("markers.files.trc").write_trc(lost, path)
     thing = imported(path)
     assert tuple(row.name for row in thing.beyond_mocap_cloud.labels) == known.trial.labels
@@ -266,14 +266,14 @@ def test_labels_are_written_where_markers_are_seen(walk):
     thing.location.x = 3.0
     bpy.context.scene.frame_set(5)
     bpy.context.view_layer.update()
-    found = {text: place for place, text, _ in labels.visible_labels(bpy.context)}
+    found = {text: place for place, text, _ in labels.list_visible_labels(bpy.context)}
     places, seen, *_ = seen_at(thing, 5)
     names = [row.name for row in thing.beyond_mocap_cloud.labels]
     assert set(found) == {name for name, there in zip(names, seen) if there}
     for name, place in found.items():
         assert np.allclose(np.array(place) - [3.0, 0.0, 0.0], places[names.index(name)], atol=1e-5)
     bpy.context.scene.beyond_mocap_markers.names = False
-    assert not labels.visible_labels(bpy.context)
+    assert not labels.list_visible_labels(bpy.context)
 
 
 def test_the_active_cloud_becomes_the_others_static_trial(walk):
@@ -329,7 +329,7 @@ def test_into_a_linked_collection_nothing_is_imported(walk, tmp_path):
 def session(extension):
     """What is kept of reconstructions, emptied afterwards."""
     yield importlib.import_module(f"{EXTENSION}.scene.markers.solve")
-    importlib.import_module(f"{EXTENSION}.scene.markers.solve").forget_reconstructions()
+    importlib.import_module(f"{EXTENSION}.scene.markers.solve").clear_reconstructions()
 
 
 def bone_at(body, bone, frame):
@@ -340,12 +340,12 @@ def bone_at(body, bone, frame):
 
 def test_cleaning_is_what_the_core_does_and_one_step(cloud, core, walk):
     thing = imported(walk)
-    trial = cloud.read(thing, bpy.context.scene)
+    trial = cloud.read_trial(thing, bpy.context.scene)
     sets = importlib.import_module(f"{EXTENSION}.scene.markers.sets")
-    wanted = core("markers.cleaning.clean").clean(trial, sets.of_cloud(thing).clusters(trial.labels))
+    wanted = core("markers.cleaning.clean").clean_trial(trial, sets.build_marker_set(thing).select_clusters(trial.labels))
     assert_one_step(bpy.ops.beyond_mocap.clean_markers)
     thing = bpy.data.objects["walk"]
-    back = cloud.read(thing, bpy.context.scene)
+    back = cloud.read_trial(thing, bpy.context.scene)
     assert back.labels == wanted.trial.labels
     assert np.allclose(back.positions, wanted.trial.positions, atol=1e-5, equal_nan=True)
     assert thing.beyond_mocap_cloud.cleaned.splitlines() == list(wanted.report.lines)
@@ -359,9 +359,9 @@ def test_reconstructing_gives_the_recipe_s_body_beside_the_cloud(cloud, core, wa
     assert_one_step(bpy.ops.beyond_mocap.reconstruct_markers)
     scene, thing = bpy.context.scene, bpy.data.objects["walk"]
     kept = thing.beyond_mocap_cloud
-    made, body = session.reconstruction_of(kept.made), kept.body
+    made, body = session.find_reconstruction(kept.made), kept.body
     assert made is not None and kept.figures and kept.model is not None
-    motion = importlib.import_module(f"{EXTENSION}.scene.core.action").read(body, scene)
+    motion = importlib.import_module(f"{EXTENSION}.scene.core.action").read_motion(body, scene)
     assert motion.skeleton.names == made.motion.skeleton.names
     places = core("motion.motion").forward_kinematics(made.motion)[0]
     for frame in (1, 8):
@@ -384,7 +384,7 @@ def test_a_model_is_saved_loaded_and_used(walk, session, tmp_path):
     bpy.ops.beyond_mocap.reconstruct_markers()
     path = str(tmp_path / "model.json")
     bpy.ops.beyond_mocap.save_marker_model(filepath=path)
-    made = session.reconstruction_of(thing.beyond_mocap_cloud.made)
+    made = session.find_reconstruction(thing.beyond_mocap_cloud.made)
     thing.beyond_mocap_cloud.model = None
     with pytest.raises(RuntimeError, match="no model"):
         bpy.ops.beyond_mocap.save_marker_model(filepath=path)
@@ -392,7 +392,7 @@ def test_a_model_is_saved_loaded_and_used(walk, session, tmp_path):
     kept = bpy.data.objects["walk"].beyond_mocap_cloud
     assert kept.use_model
     bpy.ops.beyond_mocap.reconstruct_markers()
-    again = session.reconstruction_of(kept.made)
+    again = session.find_reconstruction(kept.made)
     assert np.array_equal(again.model.places, made.model.places)
     assert np.allclose(again.motion.root_positions, made.motion.root_positions, atol=1e-4)
 
@@ -412,16 +412,16 @@ def test_a_slowed_cloud_has_a_slowed_body(cloud, walk, session):
     scene = bpy.context.scene
     thing = imported(walk)
     nodes = importlib.import_module(f"{EXTENSION}.scene.markers.nodes")
-    modifier = nodes.modifier_of(thing)
-    nodes.put(modifier, "Step", nodes.get(modifier, "Step") / 2.0)
-    assert cloud.played_rate(thing, scene) == pytest.approx(50.0)
+    modifier = nodes.find_modifier(thing)
+    nodes.set_input(modifier, "Step", nodes.get_input(modifier, "Step") / 2.0)
+    assert cloud.compute_playback_rate(thing, scene) == pytest.approx(50.0)
     bpy.ops.beyond_mocap.reconstruct_markers()
     body = thing.beyond_mocap_cloud.body
     first, last = body.animation_data.action.frame_range
     assert last - first == pytest.approx(0.6 * 2 * 24, abs=1.0)
-    cloud.write(thing, cloud.read(thing, scene), scene)  # as Clean Up does
-    assert cloud.played_rate(thing, scene) == pytest.approx(50.0)
-    nodes.put(modifier, "Step", 0.0)
+    cloud.write_trial(thing, cloud.read_trial(thing, scene), scene)  # as Clean Up does
+    assert cloud.compute_playback_rate(thing, scene) == pytest.approx(50.0)
+    nodes.set_input(modifier, "Step", 0.0)
     for verb in (bpy.ops.beyond_mocap.reconstruct_markers, bpy.ops.beyond_mocap.find_release):
         with pytest.raises(RuntimeError, match="a Step of 0"):
             verb()

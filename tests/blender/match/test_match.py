@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 import pytest
 from conftest import EXTENSION
-from undo import assert_one_step, press
+from undo import assert_one_step, press_operator
 
 SAMPLE = pathlib.Path(__file__).resolve().parents[3] / "sample_blend"
 TRACKING = SAMPLE / "match" / "small" / "small.dat"
@@ -32,8 +32,8 @@ def made(place, extension):
     for player in match.players:
         player.use = player.feed_id in ("home_7", "home_4")
     match.start, match.end = 2.0, 8.0
-    assert press(bpy.ops.beyond_mocap.make_match) == {"FINISHED"}
-    shown = {thing.name for thing in room("ours").bodies(bpy.context.scene)}
+    assert press_operator(bpy.ops.beyond_mocap.synthesize_match) == {"FINISHED"}
+    shown = {thing.name for thing in room("ours").find_armatures(bpy.context.scene)}
     assert shown == {"Home 4 Ben Back", "Home 7 Cora Wing"}
     return folder
 
@@ -47,7 +47,7 @@ def a_match(place, folder):
     scene = bpy.context.scene
     scene.render.fps = 30
     scene.beyond_mocap.library_folder = str(place / "library")
-    assert press(bpy.ops.beyond_mocap.read_match, filepath=str(TRACKING)) == {"FINISHED"}
+    assert press_operator(bpy.ops.beyond_mocap.read_match, filepath=str(TRACKING)) == {"FINISHED"}
     match = scene.beyond_mocap_match
     match.folder, match.workers = str(folder), 1
     return match
@@ -56,7 +56,7 @@ def a_match(place, folder):
 def shown_again(place, made, start=2.0, end=8.0):
     match = a_match(place, made)
     match.start, match.end = start, end
-    assert press(bpy.ops.beyond_mocap.show_match) == {"FINISHED"}
+    assert press_operator(bpy.ops.beyond_mocap.show_match) == {"FINISHED"}
     return match
 
 
@@ -72,7 +72,7 @@ def test_a_match_is_read_into_the_list(place):
 def test_read_again_the_ticks_and_colours_stay(place):
     match = a_match(place, place / "nowhere")
     match.players[2].use, match.home_colour, match.end = False, (0.1, 0.2, 0.3), 5.0
-    assert press(bpy.ops.beyond_mocap.read_match) == {"FINISHED"}
+    assert press_operator(bpy.ops.beyond_mocap.read_match) == {"FINISHED"}
     assert [player.use for player in match.players].count(False) == 1 and not match.players[2].use
     assert np.allclose(match.home_colour, (0.1, 0.2, 0.3)) and match.end == 5.0
 
@@ -93,7 +93,7 @@ def test_the_command_that_makes_it(place):
     match = a_match(place, place / "out")
     match.start, match.end, match.workers, match.solve_touches = 3.0, 9.5, 3, False
     match.players[0].use = False
-    arguments = room("order").command(bpy.context.scene)
+    arguments = room("order").build_command(bpy.context.scene)
     text = " ".join(arguments)
     assert text.startswith(f"match --tracking {TRACKING} --library {place / 'library'}")
     assert f"--out {place / 'out'}" in text
@@ -101,15 +101,15 @@ def test_the_command_that_makes_it(place):
     players = arguments[arguments.index("--players") + 1 :][:8]
     assert "home_1" not in players and set(players) == {player.feed_id for player in match.players if player.use}
     match.scheduler = "tcp://here:8786"
-    assert "--workers" not in room("order").command(bpy.context.scene)
+    assert "--workers" not in room("order").build_command(bpy.context.scene)
 
 
 def test_what_goes_with_the_events_is_asked_for_where_there_are_events(place):
     match = a_match(place, "")
     match.events_metadata_file, match.events_provider = str(place / "f7.xml"), "opta"
-    assert "--events-meta" not in room("order").command(bpy.context.scene)
+    assert "--events-meta" not in room("order").build_command(bpy.context.scene)
     match.events_file = str(place / "f24.xml")
-    text = " ".join(room("order").command(bpy.context.scene))
+    text = " ".join(room("order").build_command(bpy.context.scene))
     assert f"--events-meta {place / 'f7.xml'} --events-provider opta" in text
 
 
@@ -118,21 +118,21 @@ def test_no_digit_of_a_late_time_is_lost(place, core):
     match.start, match.end = 1234.567, 2700.04
     bpy.context.scene.beyond_mocap.rate = 30000 / 1001
     order = room("order")
-    text = " ".join(order.command(bpy.context.scene))
+    text = " ".join(order.build_command(bpy.context.scene))
     assert "--from 1234.567 --to 2700.04" in text and "--fps 29.97003" in text
-    assert " 1234.567-2700.04 s " in order.folder_to_make(bpy.context.scene)
-    wanted = order.wanted(bpy.context.scene, "folder")
+    assert " 1234.567-2700.04 s " in order.choose_output_folder(bpy.context.scene)
+    wanted = order.build_display_request(bpy.context.scene, "folder")
     assert (wanted.start, wanted.end) == (1234.567, 2700.04)
     match.start, match.end = 2700.04, 1234.567
     with pytest.raises(core("base.errors").InputError, match=r"To \(1234.567 s\) is not after From \(2700.04 s\)"):
-        order.command(bpy.context.scene)
+        order.build_command(bpy.context.scene)
 
 
 def test_what_is_made_is_shown_where_the_ball_is(place, made):
     """Ball and players of the made match are where the planted truth has them: at every touch of the two players."""
     match = shown_again(place, made)
     scene = bpy.context.scene
-    ball, bodies = room("show").ball_shown(scene), room("ours").bodies(scene)
+    ball, bodies = room("show").find_ball(scene), room("ours").find_armatures(scene)
     touches = [line.split(",") for line in (TRACKING.with_name("small_touches.csv")).read_text().splitlines()[1:]]
     looked = 0
     for time, who, *_, x, y, z in touches:
@@ -141,7 +141,7 @@ def test_what_is_made_is_shown_where_the_ball_is(place, made):
             scene.frame_set(int(frame), subframe=frame % 1.0)
             away = (ball.matrix_world.translation - _vector(x, y, z)).length
             assert away < 0.5, time  # it is led to where his foot is
-            body = next(thing for thing in bodies if thing[room("ours").PLAYER] == who)
+            body = next(thing for thing in bodies if thing[room("ours").PLAYER_PROPERTY] == who)
             hips = body.matrix_world @ body.pose.bones[0].head
             assert (hips.xy - _vector(x, y, z).xy).length < 1.0, time
             looked += 1
@@ -164,7 +164,7 @@ def test_shown_it_is_one_step_of_undo(place, made):
 
 def test_without_a_folder_each_choice_has_its_own(place):
     match = a_match(place, "")
-    folder = room("order").folder_to_make
+    folder = room("order").choose_output_folder
     scene, seen = bpy.context.scene, set()
     for change in ({}, {"end": 12.0}, {"solve_touches": False}, {"workers": 7}):
         for name, value in change.items():
@@ -173,7 +173,7 @@ def test_without_a_folder_each_choice_has_its_own(place):
     assert len(seen) == 3  # the number of processes changes nothing
     assert all(pathlib.Path(one).parent == TRACKING.parent and "small 0-" in one for one in seen)
     match.folder = str(place)
-    assert folder(scene) == room("order").folder_to_show(scene) == str(place)
+    assert folder(scene) == room("order").choose_display_folder(scene) == str(place)
 
 
 def test_a_match_made_while_another_scene_is_shown_is_not_lost(place, made):
@@ -181,25 +181,25 @@ def test_a_match_made_while_another_scene_is_shown_is_not_lost(place, made):
     match = a_match(place, "")
     match.start, match.end = 2.0, 8.0
     scene, other = bpy.context.scene, bpy.data.scenes.new("Other")
-    wanted = room("order").wanted(scene, str(made))
-    seen = room("load").scenery(wanted, None, lambda done, text: None, lambda: False)
+    wanted = room("order").build_display_request(scene, str(made))
+    seen = room("load").load_section(wanted, None, lambda done, text: None, lambda: False)
     verb = importlib.import_module(f"{EXTENSION}.operators.match").MatchVerb
     bpy.context.window.scene = other
     with pytest.raises(Exception, match="press Show Match"):
         verb.apply(None, scene, (wanted, seen, ()))
     assert not other.objects and not scene.objects
     bpy.context.window.scene = scene
-    assert bpy.ops.beyond_mocap.show_match() == {"FINISHED"} and room("ours").bodies(scene)
+    assert bpy.ops.beyond_mocap.show_match() == {"FINISHED"} and room("ours").find_armatures(scene)
 
 
 def test_an_end_before_the_start_is_told_before_anything_is_made(place, tmp_path):
     match = a_match(place, tmp_path / "out")
     match.start, match.end = 6.0, 3.0
     with pytest.raises(RuntimeError, match="To .3 s. is not after From .6 s."):
-        bpy.ops.beyond_mocap.make_match()
+        bpy.ops.beyond_mocap.synthesize_match()
     assert not (tmp_path / "out").exists()
     match.end = 0.0
-    assert "--to" not in room("order").command(bpy.context.scene)
+    assert "--to" not in room("order").build_command(bpy.context.scene)
 
 
 def test_what_was_chosen_before_the_first_reading_stays(place):
@@ -218,7 +218,7 @@ def test_ticks_of_another_file_are_not_asked_for(place):
     match = a_match(place, place / "nowhere")
     match.players[0].use, match.tracking_file = False, str(TRACKING.with_name("small_Home.csv"))
     with pytest.raises(RuntimeError, match="the list belongs to small.dat.*press Read Match"):
-        bpy.ops.beyond_mocap.make_match()
+        bpy.ops.beyond_mocap.synthesize_match()
 
 
 def test_of_files_dropped_together_the_tracking_is_read():
@@ -231,7 +231,7 @@ def test_one_whose_file_is_gone_leaves_the_others(place, made, tmp_path):
     shutil.copytree(made, tmp_path / "copy")
     (tmp_path / "copy" / "home_4.take.npz").unlink()
     match = shown_again(place, tmp_path / "copy")
-    assert {thing[room("ours").PLAYER] for thing in room("ours").bodies(bpy.context.scene)} == {"home_7"}
+    assert {thing[room("ours").PLAYER_PROPERTY] for thing in room("ours").find_armatures(bpy.context.scene)} == {"home_7"}
     assert "home_4 cannot be shown" in match.told and "no such file" in match.told
     (tmp_path / "copy" / "home_7.take.npz").write_bytes(b"no take")
     with pytest.raises(RuntimeError, match="take.npz"):
@@ -254,14 +254,14 @@ def test_a_damaged_state_is_told(place, made, tmp_path, missing):
 def test_cameras_by_their_buttons(place, made):
     shown_again(place, made)
     scene = bpy.context.scene
-    assert press(bpy.ops.beyond_mocap.match_camera, which="EYES", player="home_7") == {"FINISHED"}
+    assert press_operator(bpy.ops.beyond_mocap.match_camera, which="EYES", player="home_7") == {"FINISHED"}
     eyes = scene.camera
     scene.frame_set(60)
-    seven = next(thing for thing in room("ours").bodies(scene) if thing[room("ours").PLAYER] == "home_7")
+    seven = next(thing for thing in room("ours").find_armatures(scene) if thing[room("ours").PLAYER_PROPERTY] == "home_7")
     head = next(bone for bone in seven.pose.bones if bone.name.lower() == "head")
     assert (eyes.matrix_world.translation - seven.matrix_world @ head.head).length < 0.25
-    assert press(bpy.ops.beyond_mocap.match_camera, which="STAND") == {"FINISHED"}
-    assert scene.camera == room("cameras").stand_of(scene) != eyes
+    assert press_operator(bpy.ops.beyond_mocap.match_camera, which="STAND") == {"FINISHED"}
+    assert scene.camera == room("cameras").find_broadcast_camera(scene) != eyes
     with pytest.raises(RuntimeError, match="away_1 is not shown"):
         bpy.ops.beyond_mocap.match_camera(which="EYES", player="away_1")
 
@@ -274,7 +274,7 @@ def test_a_new_colour_is_worn_at_once(place, made):
     assert np.allclose(shader.inputs["Base Color"].default_value[:3], (0.0, 0.5, 0.1), atol=0.01)
     shirt.node_tree.nodes.clear()  # made another material by the user: nothing to paint, and no trouble
     match.home_colour = (0.9, 0.0, 0.1)
-    assert press(bpy.ops.beyond_mocap.show_match) == {"FINISHED"}
+    assert press_operator(bpy.ops.beyond_mocap.show_match) == {"FINISHED"}
     assert not len(shirt.node_tree.nodes)
 
 
@@ -283,8 +283,8 @@ def test_a_saved_file_shows_it_without_its_folder(place, made, tmp_path):
     shown_again(place, made)
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "match.blend"))
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "match.blend"))
-    assert len(room("ours").bodies(bpy.context.scene)) == 2
-    assert press(bpy.ops.beyond_mocap.match_camera, which="EYES", player="home_4") == {"FINISHED"}
+    assert len(room("ours").find_armatures(bpy.context.scene)) == 2
+    assert press_operator(bpy.ops.beyond_mocap.match_camera, which="EYES", player="home_4") == {"FINISHED"}
 
 
 @pytest.mark.parametrize("trouble, told", [
@@ -298,14 +298,14 @@ def test_trouble_is_one_line_and_nothing_changes(place, made, tmp_path, trouble,
         verb, arguments = bpy.ops.beyond_mocap.read_match, {"filepath": str(SAMPLE / "match" / "player1.csv")}
     elif trouble == "nobody":
         bpy.ops.beyond_mocap.tick_match(whom="NONE")
-        verb = bpy.ops.beyond_mocap.make_match
+        verb = bpy.ops.beyond_mocap.synthesize_match
     elif trouble == "time":
         match.start, match.end = 12.0, 20.0
     elif trouble == "folder":
         match.folder = str(tmp_path)
     elif trouble == "gone":
         match.tracking_file, match.folder = str(tmp_path / "gone.dat"), str(tmp_path / "out")
-        verb = bpy.ops.beyond_mocap.make_match
+        verb = bpy.ops.beyond_mocap.synthesize_match
     objects = len(bpy.data.objects)
     with pytest.raises(RuntimeError, match=told) as caught:
         verb(**arguments)

@@ -24,7 +24,7 @@ def errors(core):
 
 def run(child, *arguments, cancelled=lambda: False):
     told = []
-    notes = child.run(list(map(str, arguments)), lambda done, text: told.append((done, text)), cancelled)
+    notes = child.run_command(list(map(str, arguments)), lambda done, text: told.append((done, text)), cancelled)
     return notes, told
 
 
@@ -43,7 +43,7 @@ def test_what_is_wrong_is_told_in_the_commands_words(child, errors, tmp_path):
 
 def test_cancelled_it_ends_soon(child, errors, tmp_path):
     start = time.monotonic()
-    with pytest.raises(errors.Cancelled):
+    with pytest.raises(errors.UserCancelledError):
         run(child, "library", SAMPLE, "--cache", tmp_path, cancelled=lambda: time.monotonic() - start > 0.5)
     assert time.monotonic() - start < 30.0 and not child._running
 
@@ -68,7 +68,7 @@ signal.pause()
 
 
 def test_a_worker_that_lives_on_is_not_waited_for(child, monkeypatch):
-    monkeypatch.setattr(child, "SILENCE", 0.3)
+    monkeypatch.setattr(child, "FINAL_WAIT", 0.3)
     script = "import subprocess, sys; subprocess.Popen([sys.executable, '-c', 'import time; time.sleep(8)'])"
     start = time.monotonic()
     assert heard(child, script)[-1] == 0

@@ -20,7 +20,7 @@ def places_of(scene, bone):
     found = {}
     frames = range(scene.frame_start, scene.frame_start + round(LAST * FPS) + 1)
     for thing in [one for one in scene.objects if one.type == "ARMATURE"]:
-        found[plain(thing)] = rigs.heads(thing, [bone], frames)[:, 0]
+        found[plain(thing)] = rigs.read_heads(thing, [bone], frames)[:, 0]
     ball = next(one for one in scene.objects if one.type != "CURVE" and plain(one).startswith("Match ball"))
     found["ball"] = np.array([_at(scene, ball, frame) for frame in frames])
     return found
@@ -39,7 +39,7 @@ def _at(scene, thing, frame):
 @pytest.mark.parametrize("format", FORMATS)
 def test_everybody_goes_out_and_comes_back(room, scenery, tmp_path, format):  # noqa: F811
     scene = shown(room, scenery, first=1)
-    bone = scenery.people[0].motions[0][1].skeleton.names[3]
+    bone = scenery.characters[0].motions[0][1].skeleton.names[3]
     before = places_of(scene, bone)
     names = {thing.name for thing in scene.objects}
     path = tmp_path / f"match{FORMATS[format]}"
@@ -84,7 +84,7 @@ def test_who_is_excluded_is_left_out_and_that_is_told(room, scenery, tmp_path): 
     next(layer for layer in layers if layer.name == "Match Home").exclude = True
     path = tmp_path / "match.fbx"
     bpy.ops.beyond_mocap.match_export(filepath=str(path), format="FBX", pitch=False)
-    assert len(room("ours").bodies(scene)) == 4
+    assert len(room("ours").find_armatures(scene)) == 4
     bpy.ops.wm.read_homefile(use_empty=True)
     READERS[".fbx"](str(path))
     assert len([thing for thing in bpy.context.scene.objects if thing.type == "ARMATURE"]) == 2

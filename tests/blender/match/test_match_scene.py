@@ -20,11 +20,11 @@ def walk(core):
     """Four seconds of walking from a place, facing an angle."""
     from dataclasses import replace
 
-    gait, quaternion = core("synthetic.gait").gait, core("motion.quaternion")
+    gait, quaternion = core("synthetic.gait").build_gait, core("motion.quaternion")
     motion = gait(1.4, 4.0, FPS)
 
     def placed(x, y, angle=0.0):
-        turn = quaternion.about_up(np.array(angle))
+        turn = quaternion.from_up_angle(np.array(angle))
         rotations = np.array(motion.rotations)
         rotations[:, 0] = quaternion.multiply(turn, rotations[:, 0])
         root = quaternion.rotate(turn, motion.root_positions) + [x, y, 0.0]
@@ -36,7 +36,7 @@ def walk(core):
 @pytest.fixture
 def scenery(room, core, walk):
     """Three players, of whom one comes a second and a half late, a referee, and a ball."""
-    person = room("load").Person
+    person = room("load").Character
     people = (
         person("h1", "Ada", 1, "home", True, ((START, walk(-40.0, 0.0)),)),
         person("h10", "Dan", 10, "home", False, ((START, walk(0.0, -3.0)),)),
@@ -47,13 +47,13 @@ def scenery(room, core, walk):
     places = np.column_stack([10.0 * (times - START), np.zeros(len(times)), np.full(len(times), 0.11)])
     ball = core("synthesis.take").BallPath(times, places, np.ones(len(times), bool))
     colours = {"home": "#FFFFFF", "away": "#0000FF"}
-    return room("load").Scenery(START, START + 6.0, 100.0, 64.0, colours, people, ball)
+    return room("load").MatchSection(START, START + 6.0, 100.0, 64.0, colours, people, ball)
 
 
 def shown(room, scenery, first=11, fps=(FPS, 1.0)):
     scene = bpy.context.scene
     scene.render.fps, scene.render.fps_base = fps
-    room("show").show(bpy.context, scenery, first)
+    room("show_match").show_match(bpy.context, scenery, first)
     return scene
 
 
@@ -68,17 +68,17 @@ def test_everybody_is_where_he_is_in_the_match(room, scenery, fps, scale):
     bpy.context.scene.unit_settings.scale_length = scale
     scene = shown(room, scenery, fps=fps)
     rate = fps[0] / fps[1]
-    bodies = {thing[room("ours").PLAYER]: thing for thing in room("ours").bodies(scene)}
+    bodies = {thing[room("ours").PLAYER_PROPERTY]: thing for thing in room("ours").find_armatures(scene)}
     assert set(bodies) == {"h1", "h10", "a7", "r"}
     assert bodies["h10"].name == "Home 10 Dan"
-    for person in scenery.people:
+    for person in scenery.characters:
         begins, motion = person.motions[0]
         frame = round(11 + (begins - START + 2.0) * rate)
         played = (frame - 11) / rate - (begins - START)  # seconds
         place = [np.interp(played * FPS, np.arange(len(motion)), axis) for axis in motion.root_positions.T]
         hips = at(bodies[person.id], frame).pose.bones[0]
         assert np.allclose(np.array(hips.matrix.translation) * scale, place, atol=2e-3)
-    ball = room("show").ball_shown(scene)
+    ball = room("show").find_ball(scene)
     there = np.array(at(ball, 35).matrix_world.translation) * scale
     assert np.allclose(there, (10.0 * 24 / rate, 0.0, 0.11), atol=1e-3)
     assert scene.frame_end >= int(11 + 5.5 * rate)
@@ -86,7 +86,7 @@ def test_everybody_is_where_he_is_in_the_match(room, scenery, fps, scale):
 
 def test_who_is_away_is_hidden(room, scenery):
     scene = shown(room, scenery)
-    late = next(thing for thing in room("ours").bodies(scene) if thing[room("ours").PLAYER] == "a7")
+    late = next(thing for thing in room("ours").find_armatures(scene) if thing[room("ours").PLAYER_PROPERTY] == "a7")
     hidden = {}
     for frame in (11, 11 + 44, 11 + 45, 11 + 45 + 120, 11 + 45 + 121):
         scene.frame_set(frame)
@@ -98,7 +98,7 @@ def test_who_is_away_is_hidden(room, scenery):
 
 def test_meshes_are_shared_and_wear_the_kit(room, scenery):
     scene = shown(room, scenery)
-    bodies = {thing[room("ours").PLAYER]: thing for thing in room("ours").bodies(scene)}
+    bodies = {thing[room("ours").PLAYER_PROPERTY]: thing for thing in room("ours").find_armatures(scene)}
     assert len({thing.data for thing in bodies.values()}) == 1
     worn = {who: next(one for one in thing.children if one.name.endswith("body")) for who, thing in bodies.items()}
     meshes = {who: thing.data for who, thing in worn.items()}
@@ -118,7 +118,7 @@ def test_meshes_are_shared_and_wear_the_kit(room, scenery):
 def test_numbers_ride_the_back(room, scenery):
     """In a walk every corner of the number stays within a centimetre of the shirt, and before it."""
     scene = shown(room, scenery)
-    ten = next(thing for thing in room("ours").bodies(scene) if thing[room("ours").PLAYER] == "h10")
+    ten = next(thing for thing in room("ours").find_armatures(scene) if thing[room("ours").PLAYER_PROPERTY] == "h10")
     number, body = (next(one for one in ten.children if one.name.endswith(part)) for part in ("number", "body"))
     from mathutils.bvhtree import BVHTree
 
@@ -135,12 +135,12 @@ def test_numbers_ride_the_back(room, scenery):
 def test_numbers_read_from_behind_and_before(core):
     """A drawing's right is the reader's right on either side, and its top is up."""
     shirts = core("appearance.shirt_number")
-    skeleton = core("motion.retargeting.adult").adult_skeleton()
-    neutral = core("motion.retargeting.neutral").neutral_stance(skeleton)
-    body = core("appearance.body").low_poly_body(skeleton)
+    skeleton = core("motion.retargeting.adult").build_adult_skeleton()
+    neutral = core("motion.retargeting.neutral").build_neutral_stance(skeleton)
+    body = core("appearance.body").build_body(skeleton)
     drawing = np.array([[0.05, 0.0], [-0.05, 0.0], [0.0, 0.06]])
     for side, right in (("back", -1.0), ("chest", 1.0)):
-        laid = shirts.on_shirt(body, skeleton, drawing, side)
+        laid = shirts.place_on_shirt(body, skeleton, drawing, side)
         assert np.allclose(laid.weights.sum(axis=1), 1.0)
         turned = np.einsum("nk,nkc->nc", laid.weights, _posed(core, laid, neutral, skeleton))
         assert np.isclose(turned[0, 1] - turned[1, 1], 0.1 * right, atol=0.005)
@@ -149,7 +149,7 @@ def test_numbers_read_from_behind_and_before(core):
 
 
 def _posed(core, laid, neutral, skeleton):
-    quaternion, kinematics = core("motion.quaternion"), core("motion.motion").pose_kinematics
+    quaternion, kinematics = core("motion.quaternion"), core("motion.motion").compute_pose
     rest = kinematics(skeleton, np.zeros((1, 3)), quaternion.identity(1, len(skeleton)))[0][0]
     moved = laid.vertices[:, None] - rest[laid.joints]
     return quaternion.rotate(neutral.rotations[laid.joints], moved) + neutral.positions[laid.joints]
@@ -158,50 +158,50 @@ def _posed(core, laid, neutral, skeleton):
 def test_shown_again_it_takes_its_own_place_and_leaves_the_users_things(room, scenery):
     scene = shown(room, scenery)
     own = bpy.data.objects.new("Mine", None)
-    room("ours").part(scene, "home").objects.link(own)
+    room("ours").create_collection(scene, "home").objects.link(own)
     kinds = ("objects", "meshes", "actions", "armatures", "collections", "cameras", "lights", "curves")
     before = {kind: len(getattr(bpy.data, kind)) for kind in kinds}
     shown(room, scenery)
     assert before == {kind: len(getattr(bpy.data, kind)) for kind in before}
     assert own.name in scene.objects
-    room("ours").clear(scene)
-    assert own.name in scene.objects and not room("ours").bodies(scene)
+    room("ours").clear_match(scene)
+    assert own.name in scene.objects and not room("ours").find_armatures(scene)
     assert len(bpy.data.armatures) == 0 and len(bpy.data.actions) == 0
 
 
 def test_shown_again_where_its_collections_were_excluded(room, scenery):
     scene = shown(room, scenery)
-    room("ours").part(scene, "home").objects.link(bpy.data.objects.new("Mine", None))
+    room("ours").create_collection(scene, "home").objects.link(bpy.data.objects.new("Mine", None))
     layers = bpy.context.view_layer.layer_collection.children
     layers["Match"].exclude = True
     shown(room, scenery)
-    body = room("ours").bodies(scene)[0]
+    body = room("ours").find_armatures(scene)[0]
     assert body.visible_get() and body.animation_data.action_slot is not None
 
 
 def test_it_takes_its_own_place_below_another_collection(room, scenery):
     scene = shown(room, scenery)
-    room("ours").part(scene, "home").objects.link(bpy.data.objects.new("Mine", None))  # so that it stays
-    above, whole = bpy.data.collections.new("Above"), room("ours").root(scene)
+    room("ours").create_collection(scene, "home").objects.link(bpy.data.objects.new("Mine", None))  # so that it stays
+    above, whole = bpy.data.collections.new("Above"), room("ours").find_root(scene)
     scene.collection.children.link(above)
     scene.collection.children.unlink(whole)
     above.children.link(whole)
     bpy.context.view_layer.layer_collection.children["Above"].exclude = True
     shown(room, scenery)
     assert len([thing for thing in scene.objects if thing.type == "ARMATURE"]) == 4
-    assert room("ours").root(scene) in above.children[:] and room("ours").bodies(scene)[0].visible_get()
+    assert room("ours").find_root(scene) in above.children[:] and room("ours").find_armatures(scene)[0].visible_get()
 
 
 def test_actions_that_somebody_keeps_stay(room, scenery):
     """His own, which gets a shield, and one of ours that he has given a shield; others go."""
     scene = shown(room, scenery)
-    first, second, *_ = room("ours").bodies(scene)
+    first, second, *_ = room("ours").find_armatures(scene)
     own = bpy.data.actions.new("Mine")
     own.slots.new(id_type="OBJECT", name="Mine")
     first.animation_data.action, first.animation_data.action_slot = own, own.slots[0]
     second.animation_data.action.name, second.animation_data.action.use_fake_user = "Kept", True
     shown(room, scenery)
-    room("ours").clear(scene)
+    room("ours").clear_match(scene)
     kept = {action.name for action in bpy.data.actions if action.use_fake_user}
     assert kept == {"Mine", "Kept"}
 
@@ -216,13 +216,13 @@ def second_scene(name="Second"):
 def shirt_colours(room, scene):
     """Team -> rounded colour of what its first player wears, number and shirt."""
     out = {}
-    for body in room("ours").bodies(scene):
+    for body in room("ours").find_armatures(scene):
         for mesh in (thing.data for thing in body.children):
             for material in mesh.materials:
                 if "shirt" in material.name or "number" in material.name:
                     shader = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
                     rgb = tuple(round(share, 2) for share in shader.inputs["Base Color"].default_value[:3])
-                    out[body[room("ours").PLAYER], material.name.split(".")[0].split()[-1]] = rgb
+                    out[body[room("ours").PLAYER_PROPERTY], material.name.split(".")[0].split()[-1]] = rgb
     return out
 
 
@@ -236,7 +236,7 @@ def test_two_matches_in_one_file_wear_their_own_colours(room, scenery):
     assert shirt_colours(room, first) == before
     after = shirt_colours(room, second)
     assert after["h10", "shirt"] != before["h10", "shirt"] and after["h10", "number"] != before["h10", "number"]
-    room("kits").repaint(second, {"home": "#00FF00", "away": "#FFFFFF"})
+    room("kits").update_materials(second, {"home": "#00FF00", "away": "#FFFFFF"})
     assert shirt_colours(room, first) == before and shirt_colours(room, second)["h10", "shirt"] == (0.0, 1.0, 0.0)
     count = len(bpy.data.materials)
     shown(room, scenery)
@@ -249,28 +249,28 @@ def test_what_another_scene_shows_too_stays_there(room, scenery, linked):
     ours, second = room("ours"), bpy.data.scenes.new("Second")
     home = next(one for one in ours.root(first).children if one[ours.MARK] == "home")
     if linked == "player":
-        second.collection.objects.link(ours.bodies(first)[0])
+        second.collection.objects.link(ours.find_armatures(first)[0])
     else:
         second.collection.children.link(ours.root(first) if linked == "whole" else home)
     there = {thing.name for thing in second.objects}
     shown(room, scenery)
     assert {thing.name for thing in second.objects} == there
-    assert len(ours.bodies(first)) == 4 and not there & {thing.name for thing in first.objects}
-    ours.clear(first)
-    assert {thing.name for thing in second.objects} == there and not ours.bodies(first)
+    assert len(ours.find_armatures(first)) == 4 and not there & {thing.name for thing in first.objects}
+    ours.clear_match(first)
+    assert {thing.name for thing in second.objects} == there and not ours.find_armatures(first)
 
 
 def test_a_collection_of_the_users_that_two_scenes_have_is_told(room, core, scenery):
     first = shown(room, scenery)
     ours, second = room("ours"), bpy.data.scenes.new("Second")
     above, whole = bpy.data.collections.new("Above"), ours.root(first)
-    first.collection.children.unlink(whole)
+    first.find_or_create_collection.children.unlink(whole)
     above.children.link(whole)
     for scene in (first, second):
         scene.collection.children.link(above)
     with pytest.raises(core("base.errors").InputError, match="'Above': holds the match 'Match' in two scenes"):
-        ours.clear(first)
-    assert len(ours.bodies(first)) == 4
+        ours.clear_match(first)
+    assert len(ours.find_armatures(first)) == 4
 
 
 def test_a_match_linked_from_another_file_is_left_alone(room, scenery, tmp_path):
@@ -281,25 +281,25 @@ def test_a_match_linked_from_another_file_is_left_alone(room, scenery, tmp_path)
         linked.collections = ["Match"]
     scene = bpy.context.scene
     scene.collection.children.link(linked.collections[0])
-    assert not room("ours").bodies(scene)
+    assert not room("ours").find_armatures(scene)
     shown(room, scenery)
-    assert len(room("ours").bodies(scene)) == 4 and all(not thing.library for thing in room("ours").bodies(scene))
+    assert len(room("ours").find_armatures(scene)) == 4 and all(not thing.library for thing in room("ours").find_armatures(scene))
     assert linked.collections[0] in scene.collection.children[:] and len(linked.collections[0].all_objects) > 10
-    worn = room("ours").bodies(scene)[0].children[0].data.materials
+    worn = room("ours").find_armatures(scene)[0].children[0].data.materials
     assert all(cloth.library is None for cloth in worn)  # a linked one would not take a new colour
 
 
 def test_the_stage_stands_aside_and_the_users_things_on_it_stay(room, scenery):
     stage = importlib.import_module(f"{EXTENSION}.scene.stage.stage")
     scene = bpy.context.scene
-    stage.create(bpy.context)
+    stage.create_stage(bpy.context)
     own = bpy.data.objects.new("Mine", None)
     scene.collection.children["Stage"].objects.link(own)
     shown(room, scenery)
-    assert scene.camera == room("cameras").stand_of(scene) is not None
+    assert scene.camera == room("cameras").find_broadcast_camera(scene) is not None
     assert scene.collection.children["Stage"].objects[:] == [own]
     bpy.data.objects.remove(own)
-    stage.remove(scene)
+    stage.remove_stage(scene)
     assert "Stage" not in scene.collection.children
 
 
@@ -316,7 +316,7 @@ def test_the_stands_camera_keeps_the_ball_in_its_picture(room, scenery):
     from bpy_extras.object_utils import world_to_camera_view
 
     scene = shown(room, scenery)
-    camera, ball = room("cameras").stand_of(scene), room("show").ball_shown(scene)
+    camera, ball = room("cameras").find_broadcast_camera(scene), room("show").find_ball(scene)
     assert scene.camera == camera
     places = []
     for frame in range(11, 11 + 121, 10):
@@ -329,8 +329,8 @@ def test_the_stands_camera_keeps_the_ball_in_its_picture(room, scenery):
 
 def test_eyes_see_what_the_player_sees_but_not_his_own_head(room, scenery):
     scene = shown(room, scenery)
-    ten = next(thing for thing in room("ours").bodies(scene) if thing[room("ours").PLAYER] == "h10")
-    camera = room("cameras").eyes(scene, ten, None)
+    ten = next(thing for thing in room("ours").find_armatures(scene) if thing[room("ours").PLAYER_PROPERTY] == "h10")
+    camera = room("cameras").create_eyes_camera(scene, ten, None)
     for frame in (20, 60, 120):
         scene.frame_set(frame)
         depsgraph = bpy.context.evaluated_depsgraph_get()
@@ -341,7 +341,7 @@ def test_eyes_see_what_the_player_sees_but_not_his_own_head(room, scenery):
         up = camera.matrix_world.to_quaternion() @ _ahead((0.0, 1.0, 0.0))
         assert up.z > 0.9
     actions = len(bpy.data.actions)
-    assert room("cameras").eyes(scene, ten, room("show").ball_shown(scene)) == camera
+    assert room("cameras").create_eyes_camera(scene, ten, room("show").find_ball(scene)) == camera
     assert len(bpy.data.actions) == actions
 
 
@@ -360,15 +360,15 @@ def _hit(body, eye, ahead, near):
 def test_a_gaze_turns_to_the_ball_as_far_as_eyes_turn(room, walk):
     motion = walk(0.0, 0.0)
     middle = len(motion) // 2
-    place, plain = room("cameras").view_of(motion, None)
+    place, plain = room("cameras").compute_eye_view(motion, None)
     ball = place + [3.0, 1.0, -1.5]
-    _, turned = room("cameras").view_of(motion, ball)
+    _, turned = room("cameras").compute_eye_view(motion, ball)
     quaternion = importlib.import_module(f"{EXTENSION}.beyond_mocap.motion.quaternion")
     gaze = quaternion.rotate(turned, np.array([0.0, 0.0, -1.0]))[middle]
     wanted = (ball - place)[middle] / np.linalg.norm((ball - place)[middle])
     assert gaze @ wanted > np.cos(np.radians(4.0))
     behind = place + [-5.0, 0.0, 0.0]
-    _, same = room("cameras").view_of(motion, behind)
+    _, same = room("cameras").compute_eye_view(motion, behind)
     assert quaternion.rotate(same, np.array([0.0, 0.0, -1.0]))[middle, 0] > 0.9
 
 
@@ -376,10 +376,10 @@ def test_a_gaze_turns_to_the_ball_as_far_as_eyes_turn(room, walk):
 def test_lines_and_goals_fit_the_pitch(size):
     pitch = importlib.import_module(f"{EXTENSION}.scene.stage.stage")
     home = bpy.context.scene.collection
-    lines = pitch.lay_lines(home, 1.0, size)
+    lines = pitch.create_lines(home, 1.0, size)
     far = np.array([vertex.co for vertex in lines.data.vertices])
     assert np.allclose(np.abs(far[:, :2]).max(axis=0), np.array(size) / 2.0 + 0.06, atol=0.011)
-    made = pitch.set_goals(home, 1.0, size[0])
+    made = pitch.create_goals(home, 1.0, size[0])
     bpy.context.view_layer.update()
     for goal in made:
         corners = np.array([goal.matrix_world @ vertex.co for vertex in goal.data.vertices])
@@ -389,15 +389,15 @@ def test_lines_and_goals_fit_the_pitch(size):
 
 
 def test_kits_tell_teams_and_keepers_apart(room):
-    kits, person = room("kits"), room("load").Person
+    kits, person = room("kits"), room("load").Character
     for colours in ({}, {"home": "#F2C200", "away": "#1FA34A"}, {"home": "#FFFFFF", "away": "#101010"}):
-        worn = [kits.kit_of(person("", "", 1, team, keeper, ()), colours).shirt
+        worn = [kits.choose_kit(person("", "", 1, team, keeper, ()), colours).shirt
                 for team in ("home", "away") for keeper in (False, True)]
         for i, one in enumerate(worn):
             for other in worn[:i]:
                 assert np.linalg.norm(np.sqrt(one) - np.sqrt(other)) > 0.2, colours
         for team in ("home", "away"):
-            kit = kits.kit_of(person("", "", 9, team, False, ()), colours)
-            assert abs(kits.luminance(kit.ink) - kits.luminance(kit.shirt)) > 0.2, (colours, team)
+            kit = kits.choose_kit(person("", "", 9, team, False, ()), colours)
+            assert abs(kits.compute_luminance(kit.ink) - kits.compute_luminance(kit.shirt)) > 0.2, (colours, team)
     for text in ("#C8102E", "#000000", "#FFFFFF", "#1D4ED8"):
         assert kits.written(kits.linear(text)) == text

@@ -16,9 +16,9 @@ def shown():
     match = scene.beyond_mocap_match
     match.shown, match.shown_start, match.shown_first = "//match", 60.0, 11
     for name in ("home_7", "away_9"):
-        body = ours.mark(bpy.data.objects.new(name, bpy.data.armatures.new(name)))
-        body[ours.PLAYER] = name
-        ours.part(scene, name[:4]).objects.link(body)
+        body = ours.mark_object(bpy.data.objects.new(name, bpy.data.armatures.new(name)))
+        body[ours.PLAYER_PROPERTY] = name
+        ours.create_collection(scene, name[:4]).objects.link(body)
     bpy.context.view_layer.update()
 
 

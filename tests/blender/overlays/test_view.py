@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 import pytest
 from mathutils import Vector
-from undo import assert_one_step, state
+from undo import assert_one_step, collect_state
 
 SAMPLE = pathlib.Path(__file__).resolve().parents[3] / "sample_blend"
 CLIPS = ("standing_1", "walking_1_2", "walk_jog_walk", "jogging_2_9", "jogging_turn_left", "running_4_2",
@@ -29,8 +29,8 @@ def room(extension):
     """room("core.session") -> that module of the scene room; what was made is forgotten afterwards."""
     names = extension.__name__
     yield lambda name: importlib.import_module(f"{names}.scene.{name}")
-    importlib.import_module(f"{names}.scene.overlays.store").clear()
-    importlib.import_module(f"{names}.scene.core.session").clear()
+    importlib.import_module(f"{names}.scene.overlays.store").clear_store()
+    importlib.import_module(f"{names}.scene.core.session").clear_session()
 
 
 @pytest.fixture
@@ -57,11 +57,11 @@ def prepare_now(store):
 @pytest.fixture
 def prepared(shown, room):
     prepare_now(room("overlays.store"))
-    return room("overlays.store").prepared(shown.players[0].take)
+    return room("overlays.store").find_prepared(shown.players[0].take)
 
 
 def test_every_overlay_has_what_it_draws(prepared, shown, room):
-    take = room("core.session").made(shown.players[0].take).take
+    take = room("core.session").find_take(shown.players[0].take).take
     assert set(prepared.meshes) == {"track", "footprints", "seams", "moments", "speed"}
     for meshes in prepared.meshes.values():
         for mesh in meshes:
@@ -75,14 +75,14 @@ def test_every_overlay_has_what_it_draws(prepared, shown, room):
 
 def test_soles_stand_where_feet_stand(prepared):
     soles = prepared.meshes["footprints"][0].points.reshape(-1, 17 * 3, 3)[:, :, :2].mean(axis=1)
-    standing = prepared.toes[prepared.stands][:, :2]
+    standing = prepared.toes[prepared.contacts][:, :2]
     assert np.linalg.norm(soles[:, None] - standing, axis=-1).min(axis=1).max() < 0.2
 
 
 def test_left_and_right_soles_are_mirrored(room):
     shapes = room("overlays.shapes")
     heel, toe = np.zeros((2, 2)), np.tile([0.15, 0.0], (2, 1))
-    fill, edge = shapes.soles(heel, toe, np.zeros(2), np.array([0, 1]), 0.02)
+    fill, edge = shapes.build_soles(heel, toe, np.zeros(2), np.array([0, 1]), 0.02)
     left, right = edge.reshape(2, -1, 3)
     assert np.allclose(left * [1, -1, 1], right) and np.allclose(edge[:, 2], 0.02)
     assert 0.2 < np.ptp(left[:, 0]) < 0.33 and left[:, 1].max() > -left[:, 1].min()
@@ -90,16 +90,16 @@ def test_left_and_right_soles_are_mirrored(room):
 
 def test_rails_run_beside_the_track(room):
     path = np.stack([np.linspace(0, 5, 40), np.zeros(40)], axis=1)
-    points, owner = room("overlays.shapes").rails(path, 0.1, 0.2, 0.0)
+    points, owner = room("overlays.shapes").build_rails(path, 0.1, 0.2, 0.0)
     assert len(points) == len(owner) and np.allclose(points[:, 0], path[owner][:, 0])
     assert np.allclose(np.unique(np.round(np.abs(points[:, 1]), 4)), [0.1, 0.2])
     still = np.zeros((5, 2))
-    assert np.isfinite(room("overlays.shapes").rails(still, 0.1, 0.2, 0.0)[0]).all()
+    assert np.isfinite(room("overlays.shapes").build_rails(still, 0.1, 0.2, 0.0)[0]).all()
 
 
 def test_colours_grow_from_good_to_bad(room):
     colours = room("overlays.colours")
-    found = colours.scaled(np.array([0.0, 0.015, 9.0, np.nan]), colours.ROOT_STOPS)
+    found = colours.map_to_colours(np.array([0.0, 0.015, 9.0, np.nan]), colours.ROOT_STOPS)
     assert np.allclose(found[:3, :3], [colours.BLUE, colours.YELLOW, colours.VERMILION], atol=1e-6)
     assert np.allclose(found[3, :3], colours.GREY)
 
@@ -108,12 +108,12 @@ def test_why_is_told_for_the_piece_at_the_playhead(prepared, shown, room):
     store, scene = room("overlays.store"), bpy.context.scene
     for piece in prepared.pieces[:3]:
         scene.frame_set(int(np.ceil(1 + piece.start * scene.render.fps)) + 1)
-        store.tell_why(scene)
-        assert bpy.context.window_manager.beyond_mocap_playhead.why.splitlines()[0] == piece.name
+        store.update_reasons(scene)
+        assert bpy.context.window_manager.beyond_mocap_playhead.draw_reasons.splitlines()[0] == piece.name
     assert any(line.startswith("cost ") for line in prepared.pieces[0].lines)
     scene.frame_set(-500)
-    store.tell_why(scene)
-    assert bpy.context.window_manager.beyond_mocap_playhead.why == ""
+    store.update_reasons(scene)
+    assert bpy.context.window_manager.beyond_mocap_playhead.draw_reasons == ""
 
 
 @pytest.mark.parametrize("method", ["distance", "blocks"])
@@ -121,7 +121,7 @@ def test_takes_of_the_other_methods_are_told_too(shown, room, method):
     shown.method = method
     assert bpy.ops.beyond_mocap.synthesize() == {"FINISHED"}
     prepare_now(room("overlays.store"))
-    found = room("overlays.store").prepared(bpy.context.scene.beyond_mocap.players[0].take)
+    found = room("overlays.store").find_prepared(bpy.context.scene.beyond_mocap.players[0].take)
     assert found.pieces and all(len(piece.lines) >= 3 for piece in found.pieces)
     assert "track" in found.meshes and "footprints" in found.meshes
 
@@ -129,11 +129,11 @@ def test_takes_of_the_other_methods_are_told_too(shown, room, method):
 def test_what_no_player_shows_is_forgotten(prepared, shown, room):
     store = room("overlays.store")
     take = shown.players[0].take
-    store.sync(bpy.context.scene)
-    assert store.prepared(take) is prepared
+    store.update_store(bpy.context.scene)
+    assert store.find_prepared(take) is prepared
     bpy.ops.beyond_mocap.discard()
-    store.sync(bpy.context.scene)
-    assert store.prepared(take) is None
+    store.update_store(bpy.context.scene)
+    assert store.find_prepared(take) is None
 
 
 @pytest.mark.parametrize("scale", [1.0, 0.01])
@@ -143,7 +143,7 @@ def test_what_is_drawn_follows_the_body(shown, room, scale):
     bpy.ops.beyond_mocap.discard()
     bpy.ops.beyond_mocap.synthesize()
     body = scene.beyond_mocap.players[0].body
-    take = room("core.session").made(scene.beyond_mocap.players[0].take).take
+    take = room("core.session").find_take(scene.beyond_mocap.players[0].take).take
     body.location, body.rotation_euler, body.scale = (3.0 / scale, -2.0, 0.0), (0.0, 0.0, 1.1), (1.5, 1.5, 1.5)
     scene.frame_set(31)
     world = room("overlays.store").take_to_world(scene, body)
@@ -180,7 +180,7 @@ def test_lines_of_the_report_keep_their_seconds(shown):
 
 def test_words_met_is_at_least_what_is_wanted(room):
     report = {"fps": 30.0, "annotation_similarity": {"all": -0.95}, "warp_rate": {"min": 0.8, "max": 1.0}}
-    lines = room("result.quality").quality_lines(report).splitlines()
+    lines = room("result.quality").describe_quality(report).splitlines()
     assert lines == ["Labels matched: 97.5 %\t≥ 95.0\tmet", "Lowest playback rate: 0.80 x\t≥ 0.85\tmissed",
                      "Highest playback rate: 1.00 x\t≤ 1.15\tmet"]
 
@@ -216,23 +216,23 @@ def test_jump_at_another_frame_rate(shown):
 def test_error_curves_are_one_step_and_say_what_the_report_says(shown, room):
     assert_one_step(bpy.ops.beyond_mocap.error_curves)
     player = bpy.context.scene.beyond_mocap.players[0]
-    data, report = player.body.data, room("core.session").made(player.take).report
+    data, report = player.body.data, room("core.session").find_take(player.take).report
     action = data.animation_data.action
-    curves = room("core.channels").curves(action, data.animation_data.action_slot)
+    curves = room("core.channels").collect_curves(action, data.animation_data.action_slot)
     values = np.array([curves['["Root Error (cm)"]', 0].evaluate(f) for f in range(1, 241)])
     assert values.mean() == pytest.approx(100 * report["root_error_m"]["mean"], rel=0.05)
     pieces = np.array([curves['["Piece (0 or 1)"]', 0].evaluate(f) for f in range(1, 301)])
-    assert np.sum(np.diff(pieces) != 0.0) == len(room("core.session").made(player.take).take.seams)
+    assert np.sum(np.diff(pieces) != 0.0) == len(room("core.session").find_take(player.take).take.seams)
     bpy.context.scene.frame_set(120)
     assert data["Root Error (cm)"] == pytest.approx(values[119], abs=1e-4)
 
 
 def test_error_curves_go_again_and_leave_nothing(shown):
-    before = state()
+    before = collect_state()
     bpy.ops.beyond_mocap.error_curves()
-    assert state() != before
+    assert collect_state() != before
     bpy.ops.beyond_mocap.error_curves(remove=True)
-    assert state() == before
+    assert collect_state() == before
     data = bpy.context.scene.beyond_mocap.players[0].body.data
     assert not any(name for name in data.keys() if name.startswith(("Root", "Slide", "Piece")))
 

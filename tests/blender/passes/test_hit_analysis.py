@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 import pytest
 from conftest import EXTENSION
-from undo import assert_one_step, press
+from undo import assert_one_step, press_operator
 
 CLIP = pathlib.Path(__file__).resolve().parents[3] / "sample_blend" / "library" / "kick_low_top.bvh"
 
@@ -32,13 +32,13 @@ def markers(body):
 
 
 def test_it_says_what_the_function_says(body, room, core):
-    assert press(bpy.ops.beyond_mocap.hit_analysis) == {"FINISHED"}
-    found = core("passes.hits").analyse(room("core.action").read(body, bpy.context.scene), "foot", "right")
+    assert press_operator(bpy.ops.beyond_mocap.hit_analysis) == {"FINISHED"}
+    found = core("passes.hits").detect_hits(room("core.action").read_motion(body, bpy.context.scene), "foot", "right")
     assert len(found.motions) == 1
     kept = json.loads(body.beyond_mocap_hits.found)
     assert kept["keys"] == [found.motions[0].key] and kept["first"] == 11 and kept["count"] == len(found.height)
     assert kept["stretches"] == [list(found.ball_stretches[0])]
-    frame, text = room("passes.settings").told_lines(body.beyond_mocap_hits.lines)[0]
+    frame, text = room("passes.settings").parse_lines(body.beyond_mocap_hits.lines)[0]
     assert frame == 11 + found.motions[0].key and f"{found.motions[0].max_speed:.1f} m/s" in text
     low, high = found.motions[0].ball_stretch
     assert markers(body) == sorted([(11 + low, "hit from"), (11 + high, "hit to"), (frame, "hit right foot")])
@@ -48,9 +48,9 @@ def test_again_replaces_its_own_markers_and_no_others(body):
     body.animation_data.action.pose_markers.new("mine").frame = 20
     body.animation_data.action.pose_markers.new("hit the wall").frame = 21
     for _ in range(2):
-        press(bpy.ops.beyond_mocap.hit_analysis)
+        press_operator(bpy.ops.beyond_mocap.hit_analysis)
     assert len(markers(body)) == 5
-    press(bpy.ops.beyond_mocap.clear_hits)
+    press_operator(bpy.ops.beyond_mocap.clear_hits)
     assert markers(body) == [(20, "mine"), (21, "hit the wall")] and not body.beyond_mocap_hits.found
 
 
@@ -64,12 +64,12 @@ def test_each_is_one_step_of_undo(body):
 @pytest.mark.parametrize("arguments, said", [({"bone": "Tail"}, "Tail"), ({"part": "tool", "bone": "Nose"}, "Nose")])
 def test_a_bone_that_is_not_there_is_told(body, arguments, said):
     with pytest.raises(RuntimeError, match=said):
-        press(bpy.ops.beyond_mocap.hit_analysis, **arguments)
+        press_operator(bpy.ops.beyond_mocap.hit_analysis, **arguments)
     assert not body.beyond_mocap_hits.found and not markers(body)
 
 
 def test_the_picture_shows_curves_and_stretches(body, room):
-    press(bpy.ops.beyond_mocap.hit_analysis)
+    press_operator(bpy.ops.beyond_mocap.hit_analysis)
     graph, found = room("passes.hits_shown"), json.loads(body.beyond_mocap_hits.found)
     pixels = graph.picture(found)
     assert pixels.shape == (graph.SIZE, graph.SIZE, 4) and np.isfinite(pixels).all()

@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 import pytest
 from conftest import EXTENSION
-from undo import press, state
+from undo import press_operator, collect_state
 
 LIBRARY = pathlib.Path(__file__).resolve().parents[3] / "sample_blend" / "passes" / "library"
 USED = ("volley_pass", "volley_toss", "volley_attack", "volley_receive", "ready", "walking_1_2", "standing_turn",
@@ -35,7 +35,7 @@ def actor(clips):
     """Three players, at a film's rate; the first pass is to be like what an armature does from frame 11 on: a toss."""
     scene = bpy.context.scene
     scene.render.fps, scene.render.fps_base, scene.frame_start = 24, 1.001, 11
-    press(bpy.ops.beyond_mocap.passes_sample, sample="three")
+    press_operator(bpy.ops.beyond_mocap.passes_sample, sample="three")
     settings().library_folder = str(clips)
     bpy.ops.beyond_mocap.import_clips(filepath=str(clips / "volley_toss.bvh"))
     first().actor = bpy.context.object
@@ -52,13 +52,13 @@ def first():
 
 def asked(room):
     bpy.context.view_layer.update()
-    return room("passes.order").scene_of(bpy.context.scene)
+    return room("passes.order").build_scene(bpy.context.scene)
 
 
 def test_its_strongest_strike_is_the_example(actor, room, core):
     hit = asked(room).passes[0].example.hit
-    motion = room("core.action").read(actor, bpy.context.scene)
-    found = max((core("passes.hits").analyse(motion, "foot", side).strongest for side in ("left", "right")),
+    motion = room("core.action").read_motion(actor, bpy.context.scene)
+    found = max((core("passes.hits").detect_hits(motion, "foot", side).strongest for side in ("left", "right")),
                 key=lambda one: one.max_speed if one else 0.0)
     assert (hit.key, hit.side, hit.max_speed) == (found.key, found.side, found.max_speed)
     assert np.array_equal(hit.vectors, found.vectors) and np.array_equal(hit.times, found.times)
@@ -79,20 +79,20 @@ def test_a_stretch_of_it_is_in_scene_frames(actor, room):
 
 def test_an_edited_action_is_another_example(actor, room):
     before, live = asked(room).passes[0].example.hit, room("passes.live")
-    settings().made_of = room("passes.make").order_of(bpy.context.scene).digest
-    assert not live.edited(bpy.context.scene)
+    settings().made_of = room("passes.make").build_order(bpy.context.scene).digest
+    assert not live.find_edit(bpy.context.scene)
     bpy.ops.beyond_mocap.import_clips(filepath=str(LIBRARY / "volley_attack.bvh"))
     other = bpy.context.object
     actor.animation_data.action = other.animation_data.action
     actor.animation_data.action_slot = other.animation_data.action_slot
     assert asked(room).passes[0].example.hit.max_speed > 1.2 * before.max_speed
-    assert live.edited(bpy.context.scene)
+    assert live.find_edit(bpy.context.scene)
 
 
 def test_what_is_like_it_is_played(actor, room, core, clips):
     """As with the same recording named as a clip, whatever the kind."""
-    library = room("core.session").library(str(clips), None) or core("library.build").build(str(clips))
-    planned = core("passes.passes").planned
+    library = room("core.session").find_library(str(clips), None) or core("library.build").build_library(str(clips))
+    planned = core("passes.passes").plan_scene
     first().kind = "attack"
     shown = planned(library, asked(room)).strikes[0]
     first().actor, first().clip = None, "volley_toss.bvh"
@@ -107,8 +107,8 @@ def test_a_scene_is_made_with_it(actor, room):
     settings().repeat = 1
     while len(settings().passes) > 1:
         settings().passes.remove(1)
-    assert press(bpy.ops.beyond_mocap.passes_make) == {"FINISHED"}
-    assert not room("passes.live").edited(bpy.context.scene)
+    assert press_operator(bpy.ops.beyond_mocap.passes_make) == {"FINISHED"}
+    assert not room("passes.live").find_edit(bpy.context.scene)
 
 
 def still():
@@ -149,10 +149,10 @@ def unlinked():
 def test_what_cannot_be_is_told_and_changes_nothing(actor, wrong, said):
     wrong()
     bpy.context.view_layer.update()
-    before = state()
+    before = collect_state()
     with pytest.raises(RuntimeError, match=f"pass 1: Like Armature: .*{said}"):
-        press(bpy.ops.beyond_mocap.passes_make)
-    assert state() == before
+        press_operator(bpy.ops.beyond_mocap.passes_make)
+    assert collect_state() == before
 
 
 def test_without_the_one_that_is_gone(actor, room):
@@ -165,7 +165,7 @@ def test_without_the_one_that_is_gone(actor, room):
 
 def test_a_file_says_that_it_is_left_out(actor, room, core, tmp_path):
     settings().passes[1].clip = "volley_pass.bvh"
-    press(bpy.ops.beyond_mocap.passes_to_json, filepath=str(tmp_path / "out.json"))
+    press_operator(bpy.ops.beyond_mocap.passes_to_json, filepath=str(tmp_path / "out.json"))
     read = core("passes.scene_json").read_scene(tmp_path / "out.json")
     assert read.passes[0].example is None and read.passes[1].example.clip == "volley_pass.bvh"
     assert "pass 1" in room("passes.order").list_lost_examples(settings())

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import worlds
 from conftest import EXTENSION
-from undo import assert_one_step, press
+from undo import assert_one_step, press_operator
 
 FPS = 30
 
@@ -23,9 +23,9 @@ def body(core, room):
     """An armature that waves about, thrice as large as its motion, turned and put aside."""
     scene = bpy.context.scene
     scene.render.fps = FPS
-    motion = made.motion(core, 91, 30.0)
-    body = room("rigs.armature").create(bpy.context, motion.skeleton, "Waver")
-    room("core.action").write(body, motion, scene, 1.0)
+    motion = made.build_motion(core, 91, 30.0)
+    body = room("rigs.armature").create_armature(bpy.context, motion.skeleton, "Waver")
+    room("core.action").write_motion(body, motion, scene, 1.0)
     body.scale, body.location, body.rotation_euler.z = (0.7, 0.7, 0.7), (1.0, 2.0, 0.5), 0.4
     bpy.context.view_layer.update()
     return body
@@ -125,12 +125,12 @@ def test_what_is_freed_plays_its_own_action_again(ball, body):
 def test_what_is_gone_of_who_carries_it_does_not_stop_the_others(ball, body, room):
     choose(ball, body)
     for first in (10, 40):
-        press(bpy.ops.beyond_mocap.take_ball, bone=body.data.bones[-1].name, first=first, last=first + 10)
+        press_operator(bpy.ops.beyond_mocap.take_ball, bone=body.data.bones[-1].name, first=first, last=first + 10)
     own = ball.beyond_mocap_ball.before.action
     ball.constraints.remove(ball.constraints[0])
-    press(bpy.ops.beyond_mocap.take_ball, bone=body.data.bones[-1].name, first=60, last=70)
+    press_operator(bpy.ops.beyond_mocap.take_ball, bone=body.data.bones[-1].name, first=60, last=70)
     ball.constraints.remove(ball.constraints[0])
-    press(bpy.ops.beyond_mocap.free_ball, number=2)
+    press_operator(bpy.ops.beyond_mocap.free_ball, number=2)
     assert ball.animation_data.action == own
 
 
@@ -138,7 +138,7 @@ def test_an_aimed_ball_is_not_carried(ball, body):
     ball.beyond_mocap_aim.on = True
     choose(ball, body)
     with pytest.raises(RuntimeError, match="it is aimed"):
-        press(bpy.ops.beyond_mocap.take_ball, bone=body.data.bones[-1].name, first=10, last=20)
+        press_operator(bpy.ops.beyond_mocap.take_ball, bone=body.data.bones[-1].name, first=10, last=20)
     assert not len(ball.constraints)
 
 
@@ -158,13 +158,13 @@ def test_what_makes_no_sense_is_told_and_changes_nothing(ball, body, arguments, 
     choose(ball, body)
     bpy.ops.beyond_mocap.take_ball(bone="RightForeArm", first=30, last=40)
     with pytest.raises(RuntimeError, match=said):
-        press(bpy.ops.beyond_mocap.take_ball, **{"bone": "RightForeArm", "first": 50, "last": 60, **arguments})
+        press_operator(bpy.ops.beyond_mocap.take_ball, **{"bone": "RightForeArm", "first": 50, "last": 60, **arguments})
     assert len(ball.constraints) == 1 == len(ball.beyond_mocap_ball.holds)
 
 
 def test_the_ball_of_takes_is_carried_on_its_new_way_and_comes_back(tmp_path):
     places = worlds.make_places(tmp_path)
-    for go_on in (worlds.imported, worlds.synthesized):
+    for go_on in (worlds.import_tracking, worlds.synthesize_players):
         go_on(places)
     bpy.ops.beyond_mocap.accept()
     ball, player = bpy.data.objects["Ball"], bpy.context.scene.beyond_mocap.players[0]

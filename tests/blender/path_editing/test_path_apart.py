@@ -56,7 +56,7 @@ def said(extension, monkeypatch):
     """What the operator reports."""
     lines = []
     kind = importlib.import_module(f"{extension.__name__}.operators.path_editing").BEYOND_MOCAP_OT_path_apart
-    monkeypatch.setattr(kind, "tell", lambda self, kept, tell=kind.tell: (lines.append(kept), tell(self, kept)))
+    monkeypatch.setattr(kind, "report_result", lambda self, kept, tell=kind.report_result: (lines.append(kept), tell(self, kept)))
     return lines
 
 
@@ -224,7 +224,7 @@ def test_who_is_hidden_or_shows_a_rider_is_not_counted(scene, said):  # noqa: F8
 def test_who_cannot_be_looked_at_in_time_is_told(scene, said, part, monkeypatch):  # noqa: F811
     first, _ = crossing(as_strip)
     module = part("path_editing.keep_apart")
-    monkeypatch.setattr(module.bystanders, "__defaults__", (0.0,))
+    monkeypatch.setattr(module.compute_bystanders, "__defaults__", (0.0,))
     bpy.ops.beyond_mocap.path_apart()
     [line] = said[0].left
     assert line.startswith(f"{first.name} is left out") and "too long" in line
@@ -249,7 +249,7 @@ def test_a_statue_is_gone_round(scene, said):  # noqa: F811
 def test_a_rider_that_is_changed_afterwards_says_so_until_it_is_pressed_again(scene, part):  # noqa: F811
     first, second = two()
     bpy.ops.beyond_mocap.path_apart()
-    follow = part("path_editing.live").follow
+    follow = part("path_editing.live").update_all
     told = [first.beyond_mocap_ride, second.beyond_mocap_ride]
     follow(scene)
     assert not any("Avoid Collisions" in ride.told for ride in told)

@@ -20,7 +20,7 @@ def route(cameras, places, frames=None):
     """A body that goes along places (T, 3) m, a frame each."""
     step = np.diff(places, axis=0, append=places[-1:] + (places[-1:] - places[-2:-1]))
     frames = np.arange(1.0, len(places) + 1.0) if frames is None else frames
-    return cameras.Route(places, frames, places, np.unwrap(np.arctan2(step[:, 1], step[:, 0])))
+    return cameras.CameraTargets(places, frames, places, np.unwrap(np.arctan2(step[:, 1], step[:, 0])))
 
 
 def circle(count=240, radius=4.0, centre=(10.0, -3.0, 0.0)):
@@ -46,7 +46,7 @@ def test_all_of_the_path_is_in_the_frame_and_fills_it(cameras, way, scale, size)
     scene, places = bpy.context.scene, way()
     scene.unit_settings.scale_length = scale
     scene.render.resolution_x, scene.render.resolution_y = size
-    cameras.set_up(scene, route(cameras, places))
+    cameras.place_cameras(scene, route(cameras, places))
     for kind in cameras.KINDS[:3]:
         camera = cameras.found(scene, kind)
         picture = seen(camera, np.concatenate([places, places + [0.0, 0.0, 1.9]]) / scale)
@@ -58,7 +58,7 @@ def test_all_of_the_path_is_in_the_frame_and_fills_it(cameras, way, scale, size)
 def test_above_is_a_map_and_the_side_shows_the_length(cameras):
     scene = bpy.context.scene
     line = np.stack([np.zeros(50), np.linspace(0.0, 10.0, 50), np.zeros(50)], axis=1)
-    cameras.set_up(scene, route(cameras, line))
+    cameras.place_cameras(scene, route(cameras, line))
     above, side = (seen(cameras.found(scene, kind), line) for kind in ("ABOVE", "SIDE"))
     assert np.ptp(above[:, 0]) < 1e-4 and above[-1, 1] > above[0, 1]
     assert side[-1, 0] - side[0, 0] > 0.7 and np.ptp(side[:, 1]) < 0.02
@@ -66,7 +66,7 @@ def test_above_is_a_map_and_the_side_shows_the_length(cameras):
 
 def test_the_last_one_follows_and_looks_along_the_way(cameras):
     scene, places = bpy.context.scene, circle()
-    cameras.set_up(scene, route(cameras, places))
+    cameras.place_cameras(scene, route(cameras, places))
     camera = cameras.found(scene, "BEHIND")
     for frame in (60, 120, 180):
         scene.frame_set(frame)
@@ -90,13 +90,13 @@ def test_the_focus_is_smooth_but_goes_along_where_a_motion_starts_again(cameras)
 
 def test_again_only_those_are_laid_that_nobody_has_touched(cameras):
     scene = bpy.context.scene
-    cameras.set_up(scene, route(cameras, circle()))
+    cameras.place_cameras(scene, route(cameras, circle()))
     names = {kind: cameras.found(scene, kind).name for kind in cameras.KINDS}
     cameras.found(scene, "SIDE").location.x += 0.5
     cameras.found(scene, "BEHIND").data.lens = 80.0
     bpy.data.objects.remove(cameras.found(scene, "QUARTER"))
     before = {kind: cameras.found(scene, kind).matrix_basis.copy() for kind in ("ABOVE", "SIDE", "BEHIND")}
-    kept = cameras.set_up(scene, route(cameras, circle(centre=(-20.0, 0.0, 0.0))))
+    kept = cameras.place_cameras(scene, route(cameras, circle(centre=(-20.0, 0.0, 0.0))))
     assert kept == [names["SIDE"], names["BEHIND"]]
     assert {kind: cameras.found(scene, kind).matrix_basis == before[kind] for kind in before} == {
         "ABOVE": False, "SIDE": True, "BEHIND": True}
@@ -111,25 +111,25 @@ def test_again_only_those_are_laid_that_nobody_has_touched(cameras):
 
 def test_keys_of_somebody_else_on_the_focus_stay(cameras):
     scene = bpy.context.scene
-    cameras.set_up(scene, route(cameras, circle()))
+    cameras.place_cameras(scene, route(cameras, circle()))
     focus = cameras.found(scene, "BEHIND").parent
     focus.animation_data.action = None
     focus.keyframe_insert("location", frame=1)
     own = focus.animation_data.action
-    cameras.set_up(scene, route(cameras, hill()))
+    cameras.place_cameras(scene, route(cameras, hill()))
     assert focus.animation_data.action == own
 
 
 def test_laid_twice_leaves_one_action(cameras):
     for _ in range(3):
-        cameras.set_up(bpy.context.scene, route(cameras, circle()))
+        cameras.place_cameras(bpy.context.scene, route(cameras, circle()))
     assert len(bpy.data.actions) == 1 and len(bpy.data.cameras) == 4
 
 
 def test_a_way_that_is_one_point_and_one_that_is_vertical_have_their_cameras(cameras):
     for places in (np.zeros((3, 3)), np.stack([np.zeros(9), np.zeros(9), np.linspace(0.0, 3.0, 9)], axis=1)):
-        cameras.set_up(
-            bpy.context.scene, cameras.Route(places, np.arange(len(places)) + 1.0, places, np.zeros(len(places)))
+        cameras.place_cameras(
+            bpy.context.scene, cameras.CameraTargets(places, np.arange(len(places)) + 1.0, places, np.zeros(len(places)))
         )
         for kind in cameras.KINDS:
             assert np.isfinite(cameras.found(bpy.context.scene, kind).matrix_world).all()
@@ -139,7 +139,7 @@ def test_flicking_goes_through_all_four(cameras):
     scene = bpy.context.scene
     with pytest.raises(RuntimeError, match="Path Cameras"):
         bpy.ops.beyond_mocap.path_camera()
-    cameras.set_up(scene, route(cameras, circle()))
+    cameras.place_cameras(scene, route(cameras, circle()))
     looked = []
     for _ in range(5):
         assert bpy.ops.beyond_mocap.path_camera() == {"FINISHED"}
@@ -155,7 +155,7 @@ def test_flicking_goes_through_all_four(cameras):
 def test_the_scene_s_own_camera_comes_back(cameras):
     scene, own = bpy.context.scene, bpy.data.objects.new("Own", bpy.data.cameras.new("Own"))
     scene.collection.objects.link(own)
-    cameras.set_up(scene, route(cameras, circle()))
+    cameras.place_cameras(scene, route(cameras, circle()))
     bpy.ops.beyond_mocap.path_camera(which="FREE")
     assert scene.camera is None
     scene.camera = own

@@ -38,9 +38,9 @@ def choose(*things):
 def bits(part, body):
     """All keys that an armature plays, to the bit, and how it stands."""
     channels = part("core.channels")
-    action, slot = channels.playing(body)
-    keys = {place: [values.tobytes() for values in channels.keys_of(curve).values()]
-            for place, curve in channels.curves(action, slot).items()}
+    action, slot = channels.find_playing_action(body)
+    keys = {place: [values.tobytes() for values in channels.read_keys(curve).values()]
+            for place, curve in channels.collect_curves(action, slot).items()}
     stands = [(bone.rotation_mode, *bone.location, *bone.rotation_quaternion, *bone.rotation_euler)
               for bone in body.pose.bones]
     return action.name, slot.identifier, keys, stands, tuple(body.location), tuple(body.rotation_euler)
@@ -55,7 +55,7 @@ def pelvis(body, frame):
 
 def to_path(riders, body, frame):
     """Metres over the ground from the first bone to the new path."""
-    line = riders.shown(body).line[:, :2]
+    line = riders.find_computed_edit(body).line[:, :2]
     return np.linalg.norm(line - pelvis(body, frame)[:2], axis=1).min()
 
 
@@ -110,7 +110,7 @@ def test_the_body_goes_where_the_curve_is(scene, part):
     body = walker()
     bpy.ops.beyond_mocap.edit_path()
     drawn = bpy.context.object
-    assert live.follow(scene) == 0
+    assert live.update_all(scene) == 0
     for edit in ("point", "object", "edit mode"):
         if edit == "point":
             drawn.data.splines[0].bezier_points[2].co.y += 0.5
@@ -120,7 +120,7 @@ def test_the_body_goes_where_the_curve_is(scene, part):
             bpy.ops.object.mode_set(mode="EDIT")
             drawn.data.splines[0].bezier_points[1].co.x += 0.3
         bpy.context.view_layer.update()
-        assert live.follow(scene) == 1 and live.follow(scene) == 0
+        assert live.update_all(scene) == 1 and live.update_all(scene) == 0
         assert body.beyond_mocap_ride.told == ""
         assert max(to_path(riders, body, frame) for frame in (1, 15, 30)) < 0.12
     assert pelvis(body, 10)[2] > 1.5
@@ -131,20 +131,20 @@ def test_keys_are_plain_and_only_of_what_moves_otherwise(scene, part):
     channels, riders = part("core.channels"), part("path_editing.riders")
     body = walker()
     bone = next(bone for bone in body.pose.bones if "hand" in bone.name.lower())
-    action, slot = channels.playing(body)
-    curve = channels.curves(action, slot)[f'pose.bones["{bone.name}"].rotation_quaternion', 1]
+    action, slot = channels.find_playing_action(body)
+    curve = channels.collect_curves(action, slot)[f'pose.bones["{bone.name}"].rotation_quaternion', 1]
     while len(curve.keyframe_points) > 3:
         curve.keyframe_points.remove(curve.keyframe_points[1], fast=True)
     curve.update()
-    before = channels.keys_of(curve)
+    before = channels.read_keys(curve)
     bpy.ops.beyond_mocap.edit_path()
     bpy.context.object.location.y = 2.0
     bpy.context.view_layer.update()
-    riders.renew(scene, body)
-    mine = channels.curves(*channels.playing(body))
-    now = channels.keys_of(mine[f'pose.bones["{bone.name}"].rotation_quaternion', 1])
+    riders.update_motion(scene, body)
+    mine = channels.collect_curves(*channels.find_playing_action(body))
+    now = channels.read_keys(mine[f'pose.bones["{bone.name}"].rotation_quaternion', 1])
     assert all(np.array_equal(before[name], now[name]) for name in before)
-    keys = channels.keys_of(mine[f'pose.bones["{body.pose.bones[0].name}"].location', 1])
+    keys = channels.read_keys(mine[f'pose.bones["{body.pose.bones[0].name}"].location', 1])
     assert np.all(keys["interpolation"] == channels.LINEAR) and np.all(np.diff(keys["co"][:, 0]) == 1)
     assert np.all(np.isfinite(keys["handle_left"])) and np.abs(keys["handle_left"] - keys["co"]).max() < 2.0
 
@@ -158,25 +158,25 @@ def test_other_channels_are_shown_at_the_frames_that_are_shown(scene, part):
         body["switch"], body["slider"] = switch, slider
         body.keyframe_insert('["switch"]', frame=frame)
         body.keyframe_insert('["slider"]', frame=frame)
-    slot = channels.playing(body)[1]
-    was = channels.curves(channels.playing(body)[0], slot)
-    slider, steps = (channels.sample(was[f'["{name}"]', 0], np.arange(1.0, 42.0)) for name in ("slider", "switch"))
-    before = {place: channels.keys_of(curve)["co"].tobytes() for place, curve in was.items()}
+    slot = channels.find_playing_action(body)[1]
+    was = channels.collect_curves(channels.find_playing_action(body)[0], slot)
+    slider, steps = (channels.sample_curve(was[f'["{name}"]', 0], np.arange(1.0, 42.0)) for name in ("slider", "switch"))
+    before = {place: channels.read_keys(curve)["co"].tobytes() for place, curve in was.items()}
     bpy.ops.beyond_mocap.edit_path()
     ride = body.beyond_mocap_ride
-    last = lambda: channels.keyed_range({k: c for k, c in mine().items() if "pose" in k[0]})[1]
-    mine = lambda: channels.curves(*channels.playing(body))
+    last = lambda: channels.find_key_range({k: c for k, c in mine().items() if "pose" in k[0]})[1]
+    mine = lambda: channels.collect_curves(*channels.find_playing_action(body))
     whole = last()
     ride.speed = 2.0
-    live.follow(scene)
+    live.update_all(scene)
     assert last() == pytest.approx(whole / 2, abs=1) and ride.told == ""
-    found = channels.sample(mine()['["slider"]', 0], np.arange(1.0, 20.0))
+    found = channels.sample_curve(mine()['["slider"]', 0], np.arange(1.0, 20.0))
     np.testing.assert_allclose(found, slider[0:37:2], atol=1e-4)
-    switch = channels.sample(mine()['["switch"]', 0], np.arange(1.0, 20.0))
+    switch = channels.sample_curve(mine()['["switch"]', 0], np.arange(1.0, 20.0))
     assert set(switch) == {0.0, 1.0} and np.array_equal(switch, steps[0:37:2])
     ride.speed = 1.0
-    live.follow(scene)
-    now = {place: channels.keys_of(curve)["co"].tobytes() for place, curve in mine().items()}
+    live.update_all(scene)
+    now = {place: channels.read_keys(curve)["co"].tobytes() for place, curve in mine().items()}
     same = [place for place in now if now[place] == before.get(place)]
     assert ('["slider"]', 0) in same and ('["switch"]', 0) in same and len(same) > 0.5 * len(now)
     assert last() == whole
@@ -197,8 +197,8 @@ def test_the_rotation_mode_stays(scene, part, mode):
     assert bpy.ops.beyond_mocap.edit_path() == {"FINISHED"}
     assert body.beyond_mocap_ride.curve == round_about and body.beyond_mocap_ride.told == ""
     assert [bone.rotation_mode for bone in body.pose.bones] == modes
-    steps = [np.abs(np.diff(channels.keys_of(curve)["co"][:, 1])).max()
-             for (path, _), curve in channels.curves(*channels.playing(body)).items() if "rotation" in path]
+    steps = [np.abs(np.diff(channels.read_keys(curve)["co"][:, 1])).max()
+             for (path, _), curve in channels.collect_curves(*channels.find_playing_action(body)).items() if "rotation" in path]
     assert max(steps) < 1.0
     assert max(to_path(riders, body, frame) for frame in (40, 20, 1)) < 0.12
     choose(body)
@@ -222,9 +222,9 @@ def test_metres_and_seconds_are_the_scene_s(scene, part):
     drawn.location.y += 300.0
     drawn.rotation_euler[2] = 1.0
     assert bpy.ops.beyond_mocap.update_path() == {"FINISHED"}
-    line = riders.shown(body).line
+    line = riders.find_computed_edit(body).line
     assert np.linalg.norm(line[:, :2] - pelvis(body, 10)[:2] / 100, axis=1).min() < 0.12
-    figures = riders.shown(body).ridden
+    figures = riders.find_computed_edit(body).edited
     assert figures.motion.fps == pytest.approx(24 / 1.001)
 
 
@@ -237,7 +237,7 @@ def test_two_riders_each_on_his_own_or_both_on_one(scene, part):
     assert curves[0] != curves[1] and bpy.context.object == curves[0]
     curves[1].location.y += 1.0
     bpy.context.view_layer.update()
-    assert live.follow(scene) == 1
+    assert live.update_all(scene) == 1
     choose(first, second)
     assert bpy.ops.beyond_mocap.leave_path() == {"FINISHED"}
     shared = circle()
@@ -246,9 +246,9 @@ def test_two_riders_each_on_his_own_or_both_on_one(scene, part):
     assert first.beyond_mocap_ride.curve == second.beyond_mocap_ride.curve == shared
     shared.location.x += 1.0
     bpy.context.view_layer.update()
-    assert live.follow(scene) == 2
+    assert live.update_all(scene) == 2
     second.beyond_mocap_ride.delay = 2.0
-    assert live.follow(scene) == 1
+    assert live.update_all(scene) == 1
     assert max(to_path(riders, body, frame) for body in (first, second) for frame in (1, 30)) < 0.15
     choose(shared)
     assert bpy.ops.beyond_mocap.bake_path() == {"FINISHED"}
@@ -292,11 +292,11 @@ def test_a_curve_that_is_no_path_is_told_and_the_last_good_motion_stays(scene, p
     before = bits(part, body)
     body.beyond_mocap_ride.curve = odd
     bpy.context.view_layer.update()
-    assert live.follow(scene) == 0
+    assert live.update_all(scene) == 0
     assert line in body.beyond_mocap_ride.told and "\n" not in body.beyond_mocap_ride.told
     assert bits(part, body) == before
     bpy.data.objects.remove(odd)
-    assert live.follow(scene) == 0 and "its curve is not in the scene" in body.beyond_mocap_ride.told
+    assert live.update_all(scene) == 0 and "its curve is not in the scene" in body.beyond_mocap_ride.told
     assert bits(part, body) == before
 
 
@@ -307,8 +307,8 @@ def test_an_odd_curve_gives_numbers(scene, part, name, kind):
     body = walker()
     choose(body, drawn(ODD[name], kind))
     assert bpy.ops.beyond_mocap.edit_path() == {"FINISHED"}
-    for curve in channels.curves(*channels.playing(body)).values():
-        assert np.isfinite(channels.keys_of(curve)["co"]).all()
+    for curve in channels.collect_curves(*channels.find_playing_action(body)).values():
+        assert np.isfinite(channels.read_keys(curve)["co"]).all()
 
 
 def test_saved_riders_are_alive_again(scene, part, tmp_path):
@@ -322,11 +322,11 @@ def test_saved_riders_are_alive_again(scene, part, tmp_path):
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "ridden.blend"))
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "ridden.blend"))
     scene, body = bpy.context.scene, bpy.data.objects[name]
-    assert riders.shown(body) is None
-    assert live.follow(scene) == 1 and bits(part, body) == after and riders.shown(body) is not None
+    assert riders.find_computed_edit(body) is None
+    assert live.update_all(scene) == 1 and bits(part, body) == after and riders.find_computed_edit(body) is not None
     body.beyond_mocap_ride.curve.location.y += 1.0
     bpy.context.view_layer.update()
-    assert live.follow(scene) == 1 and bits(part, body) != after
+    assert live.update_all(scene) == 1 and bits(part, body) != after
     choose(body)
     bpy.ops.beyond_mocap.leave_path()
     assert bits(part, body) == before
@@ -348,7 +348,7 @@ def test_a_rider_appended_to_another_file_rides_there(scene, part, tmp_path):
     body, drawn = wanted.objects
     drawn.location.y += 1.0
     bpy.context.view_layer.update()
-    assert live.follow(bpy.context.scene) == 1 and body.beyond_mocap_ride.told == ""
+    assert live.update_all(bpy.context.scene) == 1 and body.beyond_mocap_ride.told == ""
     choose(body)
     bpy.ops.beyond_mocap.leave_path()
     assert bits(part, body) == before
@@ -366,19 +366,19 @@ def test_undo_brings_curve_and_motion_back_together(scene, part):
     for move in (1.0, 2.0):
         bpy.data.objects[name].beyond_mocap_ride.curve.data.splines[0].bezier_points[1].co.y += move
         bpy.context.view_layer.update()
-        assert live.follow(bpy.context.scene) == 1
+        assert live.update_all(bpy.context.scene) == 1
         bpy.ops.ed.undo_push(message=f"moved {move}")
         states.append(bits(part, bpy.data.objects[name])[:3])
     bpy.ops.ed.undo()
-    live.follow(bpy.context.scene)
+    live.update_all(bpy.context.scene)
     assert bits(part, bpy.data.objects[name])[:3] == states[0]
     bpy.ops.ed.redo()
-    live.follow(bpy.context.scene)
+    live.update_all(bpy.context.scene)
     assert bits(part, bpy.data.objects[name])[:3] == states[1]
     bpy.ops.ed.undo()
     bpy.data.objects[name].beyond_mocap_ride.curve.data.splines[0].bezier_points[1].co.y += 2.0
     bpy.context.view_layer.update()
-    live.follow(bpy.context.scene)
+    live.update_all(bpy.context.scene)
     assert bits(part, bpy.data.objects[name])[:3] == states[1]
 
 
@@ -428,14 +428,14 @@ def test_a_deleted_curve_and_ground_are_not_kept_for_who_rode_them(scene, part):
     drawn = bpy.context.object
     bpy.ops.mesh.primitive_plane_add(size=100.0, location=(0.0, 0.0, 0.3))
     body.beyond_mocap_ride.ground = bpy.context.object
-    assert live.follow(scene) == 1
+    assert live.update_all(scene) == 1
     was = bits(part, body)[:3]
     bpy.ops.object.delete()
-    assert (live.follow(scene) == 0 and "Plane is not in the scene" in body.beyond_mocap_ride.told
+    assert (live.update_all(scene) == 0 and "Plane is not in the scene" in body.beyond_mocap_ride.told
             and bits(part, body)[:3] == was)
     choose(drawn)
     bpy.ops.object.delete()
-    assert (live.follow(scene) == 0 and "its curve is not in the scene" in body.beyond_mocap_ride.told
+    assert (live.update_all(scene) == 0 and "its curve is not in the scene" in body.beyond_mocap_ride.told
             and bits(part, body)[:3] == was)
     choose(body)
     assert bpy.ops.beyond_mocap.leave_path() == {"FINISHED"}
@@ -456,9 +456,9 @@ def test_another_curve_takes_the_place_of_one_that_was_made_here(scene, part):
     with pytest.raises(RuntimeError, match="control points"):
         bpy.ops.beyond_mocap.path_curve(kind="NURBS", degree=5, count=4)
     assert [curve.name for curve in bpy.data.curves] == [name] == [body.beyond_mocap_ride.curve.name]
-    original = part("path_editing.riders").shown(body).source.arc.length
+    original = part("path_editing.riders").find_computed_edit(body).source.arc.length
     bpy.ops.beyond_mocap.path_curve(shape="STRAIGHT")
-    assert np.ptp(part("path_editing.riders").shown(body).line, axis=0).max() == pytest.approx(original, abs=0.02)
+    assert np.ptp(part("path_editing.riders").find_computed_edit(body).line, axis=0).max() == pytest.approx(original, abs=0.02)
     own = circle()
     body.beyond_mocap_ride.curve = own
     bpy.context.view_layer.update()
@@ -474,13 +474,13 @@ def test_a_new_curve_goes_round_every_corner_of_the_path(scene, part, extension,
     length = importlib.import_module(f"{extension.__name__}.beyond_mocap.motion.path.arc_length").ArcLength
     turn = np.linspace(-np.pi / 2, np.pi / 2, 20)
     bow = np.stack([15.0 + 0.3 * np.cos(turn), 0.3 + 0.3 * np.sin(turn), 0 * turn], axis=1)
-    path = core.through(np.concatenate([[[0.0, 0.0, 0.0]], bow, [[0.0, 0.6, 0.0]]]), "hairpin", closed=closed)
+    path = core.fit_line(np.concatenate([[[0.0, 0.0, 0.0]], bow, [[0.0, 0.6, 0.0]]]), "hairpin", closed=closed)
     curves = part("path_editing.curve")
-    drawn = curves.read(scene, curves.create(bpy.context, "Hairpin", path)).path()
+    drawn = curves.read_curve(scene, curves.create_curve(bpy.context, "Hairpin", path)).to_path()
     assert drawn.closed == closed
     own, made = length(path), length(drawn)
     s = np.linspace(0.0, min(own.length, made.length), 200)
-    apart = np.linalg.norm(path.at(own.parameter(s)) - drawn.at(made.parameter(s)), axis=1)
+    apart = np.linalg.norm(path.at(own.parameter_at(s)) - drawn.at(made.parameter_at(s)), axis=1)
     assert apart[:-1].max() < 0.06
 
 
@@ -520,14 +520,14 @@ def test_button_and_function_give_the_same(scene, part, core):
     """What is written is what the core says, for the motion and the curve as they are read."""
     action, curve = part("core.action"), part("path_editing.curve")
     body, round_about = walker(), circle()
-    motion = action.read(body, scene)
+    motion = action.read_motion(body, scene)
     recipe = core("path_editing.ride")
-    settings = recipe.RideSettings(speed=1.25, lean=False, cycle=True)
-    wanted = recipe.ride(recipe.prepare(motion, settings), curve.read(scene, round_about).path(), settings).motion
+    settings = recipe.PathEditSettings(speed=1.25, lean=False, cycle=True)
+    wanted = recipe.edit_path(recipe.prepare_source(motion, settings), curve.read_curve(scene, round_about).path(), settings).motion
     body.beyond_mocap_ride.speed, body.beyond_mocap_ride.lean, body.beyond_mocap_ride.cycle = 1.25, False, True
     choose(body, round_about)
     bpy.ops.beyond_mocap.edit_path()
-    found = action.read(body, scene)
+    found = action.read_motion(body, scene)
     assert len(found) == len(wanted)
     np.testing.assert_allclose(found.root_positions, wanted.root_positions, atol=1e-5)
     dots = np.abs(np.sum(found.rotations * wanted.rotations, axis=2))
@@ -546,14 +546,14 @@ def test_feet_follow_a_mesh(scene, part):
     bpy.context.view_layer.update()
     body.beyond_mocap_ride.ground = ramp
     was = pelvis(body, 1), pelvis(body, 40)
-    assert live.follow(scene) == 1 and live.follow(scene) == 0
+    assert live.update_all(scene) == 1 and live.update_all(scene) == 0
     now = pelvis(body, 1), pelvis(body, 40)
     climb = 0.2 * (now[1][0] - now[0][0])
     assert (now[1][2] - now[0][2]) - (was[1][2] - was[0][2]) == pytest.approx(climb, abs=0.06)
     mesh.vertices[1].co.z += 1.0
     mesh.update()
     bpy.context.view_layer.update()
-    assert live.follow(scene) == 1
+    assert live.update_all(scene) == 1
 
 
 def test_a_copy_that_shares_the_action_gets_its_own(scene, part):
@@ -566,8 +566,8 @@ def test_a_copy_that_shares_the_action_gets_its_own(scene, part):
     twin.beyond_mocap_ride.curve = circle()
     bpy.context.view_layer.update()
     assert twin.animation_data.action == body.animation_data.action
-    live.follow(scene)
-    assert twin.animation_data.action != body.animation_data.action and live.follow(scene) == 0
+    live.update_all(scene)
+    assert twin.animation_data.action != body.animation_data.action and live.update_all(scene) == 0
     assert to_path(riders, twin, 20) < 0.12 and to_path(riders, body, 20) < 0.12
 
 
@@ -580,13 +580,13 @@ def test_a_curve_that_moves_with_time_is_ridden_as_it_lay_when_edited(scene, par
         drawn.location.x = x
         drawn.keyframe_insert("location", frame=frame)
     scene.frame_set(50)
-    live.follow(scene)
+    live.update_all(scene)
     assert "its animation is ignored" in body.beyond_mocap_ride.told
     before = bits(part, body)[:3]
     scene.frame_set(90)
-    assert live.follow(scene) == 0 and bits(part, body)[:3] == before
+    assert live.update_all(scene) == 0 and bits(part, body)[:3] == before
     drawn.data.splines[0].bezier_points[1].co.y += 1.0
-    assert live.follow(scene) == 1
+    assert live.update_all(scene) == 1
 
 
 def test_a_curve_that_hangs_on_something_goes_with_it(scene, part):
@@ -604,11 +604,11 @@ def test_a_curve_that_hangs_on_something_goes_with_it(scene, part):
         thing.location = place
         bpy.context.view_layer.update()
         scene.frame_set(20)
-        assert live.follow(scene) == 1 and body.beyond_mocap_ride.told == ""
-        np.testing.assert_allclose(riders.shown(body).line[0], place, atol=1e-3)
+        assert live.update_all(scene) == 1 and body.beyond_mocap_ride.told == ""
+        np.testing.assert_allclose(riders.find_computed_edit(body).line[0], place, atol=1e-3)
     hook.rotation_euler[2] = 1.0
     bpy.context.view_layer.update()
-    assert live.follow(scene) == 1
+    assert live.update_all(scene) == 1
 
 
 def test_nobody_cycles_for_hours(scene, part):
@@ -619,10 +619,10 @@ def test_nobody_cycles_for_hours(scene, part):
     body.beyond_mocap_ride.cycle = True
     before = bits(part, body)[:3]
     bpy.context.view_layer.update()
-    assert live.follow(scene) == 0 and "22 minutes or less" in body.beyond_mocap_ride.told
+    assert live.update_all(scene) == 0 and "22 minutes or less" in body.beyond_mocap_ride.told
     assert bits(part, body)[:3] == before
     body.beyond_mocap_ride.cycle = False
-    assert live.follow(scene) == 1
+    assert live.update_all(scene) == 1
 
 
 def test_a_path_that_ends_early_is_repeated_cycled_or_stops(scene, part):
@@ -641,20 +641,20 @@ def test_a_path_that_ends_early_is_repeated_cycled_or_stops(scene, part):
         if name == "cycle":
             line.scale = (8.0, 1.0, 1.0)
         bpy.context.view_layer.update()
-        live.follow(scene)
+        live.update_all(scene)
         curves = {
-            place: curve for place, curve in channels.curves(*channels.playing(body)).items() if "location" in place[0]
+            place: curve for place, curve in channels.collect_curves(*channels.find_playing_action(body)).items() if "location" in place[0]
         }
-        frames[name] = channels.keyed_range(curves)[1]
-        assert all(np.isfinite(channels.keys_of(curve)["co"]).all() for curve in curves.values())
+        frames[name] = channels.find_key_range(curves)[1]
+        assert all(np.isfinite(channels.read_keys(curve)["co"]).all() for curve in curves.values())
     assert frames["stop"] < frames["repeat"] < frames["cycle"]
     ring = circle(1.5)
     ride.curve, ride.cycle = ring, False
     bpy.context.view_layer.update()
-    assert live.follow(scene) == 1 and ride.told == ""
+    assert live.update_all(scene) == 1 and ride.told == ""
     ring.data.splines[0].use_cyclic_u = False
     bpy.context.view_layer.update()
-    assert live.follow(scene) == 1
+    assert live.update_all(scene) == 1
 
 
 def test_the_ground_counts_while_it_is_edited(scene, part):
@@ -667,19 +667,19 @@ def test_the_ground_counts_while_it_is_edited(scene, part):
     scene.collection.objects.link(floor)
     body.beyond_mocap_ride.ground = floor
     bpy.context.view_layer.update()
-    assert live.follow(scene) == 1
+    assert live.update_all(scene) == 1
     choose(floor)
     bpy.ops.object.mode_set(mode="EDIT")
     bpy.context.view_layer.update()
-    assert live.follow(scene) == 0 and "without faces" not in body.beyond_mocap_ride.told
+    assert live.update_all(scene) == 0 and "without faces" not in body.beyond_mocap_ride.told
     bpy.ops.object.mode_set(mode="OBJECT")
     mesh.clear_geometry()
     bpy.context.view_layer.update()
     before = bits(part, body)[:3]
-    assert live.follow(scene) == 0 and "without faces" in body.beyond_mocap_ride.told
+    assert live.update_all(scene) == 0 and "without faces" in body.beyond_mocap_ride.told
     assert bits(part, body)[:3] == before
     body.beyond_mocap_ride.ground = None
-    assert live.follow(scene) == 1 and body.beyond_mocap_ride.told == ""
+    assert live.update_all(scene) == 1 and body.beyond_mocap_ride.told == ""
 
 
 def test_what_was_wrong_is_told_no_more_once_all_is_as_before(scene, part):
@@ -691,7 +691,7 @@ def test_what_was_wrong_is_told_no_more_once_all_is_as_before(scene, part):
     for ground, told in ((empty, "without faces"), (None, "")):
         body.beyond_mocap_ride.ground = ground
         bpy.context.view_layer.update()
-        assert live.follow(scene) == 0 and (
+        assert live.update_all(scene) == 0 and (
             told in body.beyond_mocap_ride.told if told else not body.beyond_mocap_ride.told
         )
 
@@ -707,10 +707,10 @@ def test_a_ground_that_moves_with_time_does_not_change_the_motion_with_the_frame
         floor.keyframe_insert("location", frame=frame)
     scene.frame_set(1)
     body.beyond_mocap_ride.ground = floor
-    assert live.follow(scene) == 1 and "ground Plane: its animation is ignored" in body.beyond_mocap_ride.told
+    assert live.update_all(scene) == 1 and "ground Plane: its animation is ignored" in body.beyond_mocap_ride.told
     was = bits(part, body)[:3]
     scene.frame_set(30)
-    assert live.follow(scene) == 0 and bits(part, body)[:3] == was
+    assert live.update_all(scene) == 0 and bits(part, body)[:3] == was
 
 
 def test_what_cannot_be_read_is_not_looked_at_again_and_again(scene, part, monkeypatch):
@@ -724,10 +724,10 @@ def test_what_cannot_be_read_is_not_looked_at_again_and_again(scene, part, monke
         looks.append(1)
         raise carrier.InputError("motion", "unreadable")
 
-    monkeypatch.setattr(carrier.PlainCarrier, "read", fails)
+    monkeypatch.setattr(carrier.PlainAdapter, "read", fails)
     body.beyond_mocap_ride.fit = "polynomial"
     for _ in range(3):
-        assert live.follow(scene) == 0 and body.beyond_mocap_ride.told == "motion: unreadable"
+        assert live.update_all(scene) == 0 and body.beyond_mocap_ride.told == "motion: unreadable"
     assert len(looks) == 1
     monkeypatch.undo()
     choose(body)
@@ -739,7 +739,7 @@ def test_a_motion_longer_than_the_scene_is_told_as_long_as_it_is(scene, part):
     scene.frame_end = 250
     choose(body, drawn)
     bpy.ops.beyond_mocap.edit_path()
-    ride, follow = body.beyond_mocap_ride, part("path_editing.live").follow
+    ride, follow = body.beyond_mocap_ride, part("path_editing.live").update_all
     assert "goes on" not in ride.told
     ride.cycle = True
     follow(scene)
@@ -754,7 +754,7 @@ def test_a_motion_longer_than_the_scene_is_told_as_long_as_it_is(scene, part):
 def test_a_new_curve_takes_back_the_line_about_the_one_before(scene, part):
     body = walker()
     bpy.ops.beyond_mocap.edit_path()
-    ride, follow = body.beyond_mocap_ride, part("path_editing.live").follow
+    ride, follow = body.beyond_mocap_ride, part("path_editing.live").update_all
     for point in ride.curve.data.splines[0].bezier_points:
         point.co = point.handle_left = point.handle_right = (0, 0, 0)
     bpy.context.view_layer.update()

@@ -26,7 +26,7 @@ def ride(body, part, scale=1.3):
     assert bpy.ops.beyond_mocap.edit_path() == {"FINISHED"}
     body.beyond_mocap_ride.curve.scale = (scale, scale, 1.0)
     bpy.context.view_layer.update()
-    assert part("path_editing.live").follow(bpy.context.scene) == 1 and "Error" not in body.beyond_mocap_ride.told
+    assert part("path_editing.live").update_all(bpy.context.scene) == 1 and "Error" not in body.beyond_mocap_ride.told
 
 
 @pytest.mark.parametrize("form", ["PREVIEW", "ACTION", "STRIPS"])
@@ -36,12 +36,12 @@ def test_a_result_rides_and_leaves_as_it_was(one, part, form):  # noqa: F811
         bpy.ops.beyond_mocap.accept(form=form)
     body = one.body
     bpy.context.scene.frame_set(10)
-    before, was, notes = look(one), poses(body, FRAMES), part("result.freshness").look(bpy.context.scene, one)
+    before, was, notes = look(one), poses(body, FRAMES), part("result.freshness").check_player(bpy.context.scene, one)
     bpy.context.scene.frame_set(10)
     ride(body, part)
     assert np.abs(poses(body, FRAMES) - was).max() > 0.3
-    assert part("result.freshness").look(bpy.context.scene, one) == notes
-    assert len(part("result.hand_keys").of_body(body)[0]) == 0
+    assert part("result.freshness").check_player(bpy.context.scene, one) == notes
+    assert len(part("result.hand_keys").find_in_body(body)[0]) == 0
     choose(body)
     assert bpy.ops.beyond_mocap.leave_path() == {"FINISHED"}
     np.testing.assert_array_equal(poses(body, FRAMES), was)
@@ -51,14 +51,14 @@ def test_a_result_rides_and_leaves_as_it_was(one, part, form):  # noqa: F811
 
 def test_hand_made_keys_are_known_while_the_body_rides(one, part):  # noqa: F811
     bpy.ops.beyond_mocap.synthesize()
-    action, slot = part("core.channels").playing(one.body)
-    curve = next(iter(part("core.channels").curves(action, slot).values()))
+    action, slot = part("core.channels").find_playing_action(one.body)
+    curve = next(iter(part("core.channels").collect_curves(action, slot).values()))
     curve.keyframe_points[50].co.y += 0.1
     curve.keyframe_points[50].type = "KEYFRAME"
-    notes = part("result.freshness").look(bpy.context.scene, one)[1]
+    notes = part("result.freshness").check_player(bpy.context.scene, one)[1]
     assert len(notes) == 1
     ride(one.body, part)
-    assert part("result.freshness").look(bpy.context.scene, one)[1] == notes
+    assert part("result.freshness").check_player(bpy.context.scene, one)[1] == notes
     assert bpy.ops.beyond_mocap.update(player=one.name) == {"FINISHED"}
     assert one.result.hand_keys == 1 and not one.body.beyond_mocap_ride.on
 
@@ -94,7 +94,7 @@ def test_a_motion_that_was_kept_is_the_users_own(one, part):  # noqa: F811
     assert_one_step(bpy.ops.beyond_mocap.bake_path)
     body = bpy.context.scene.beyond_mocap.players[0].body
     np.testing.assert_allclose(poses(body, FRAMES), seen, atol=1e-6)
-    made = part("core.channels").playing(body)[0]
+    made = part("core.channels").find_playing_action(body)[0]
     assert not [name for name in made.keys() if name.startswith("beyond_mocap_ride")]
     assert bpy.ops.beyond_mocap.synthesize() == {"FINISHED"}
     assert bpy.ops.beyond_mocap.discard() == {"FINISHED"}
@@ -105,13 +105,13 @@ def test_bake_to_rig_and_export_take_what_is_seen(part, tmp_path):
     bpy.context.scene.render.fps = 30
     body = walker()
     ride(body, part)
-    rig = rigs.unreal()
+    rig = rigs.create_unreal()
     settings = bpy.context.scene.beyond_mocap.rig
     settings.source, settings.target = body, rig
     bpy.ops.beyond_mocap.map_bones()
     assert bpy.ops.beyond_mocap.bake_to_rig() == {"FINISHED"}
     frames = (1, 20, 35)
-    seen, onto = rigs.heads(body, ["Hips"], frames), rigs.heads(rig, ["pelvis"], frames)
+    seen, onto = rigs.read_heads(body, ["Hips"], frames), rigs.read_heads(rig, ["pelvis"], frames)
     assert np.linalg.norm((seen - onto)[..., :2], axis=-1).max() < 0.1
     choose(body)
     assert bpy.ops.beyond_mocap.export_motion(filepath=str(tmp_path / "out.bvh"), format="BVH") == {"FINISHED"}
@@ -120,7 +120,7 @@ def test_bake_to_rig_and_export_take_what_is_seen(part, tmp_path):
 
 def test_baking_onto_a_rig_that_rides_takes_it_off_its_path(part):
     bpy.context.scene.render.fps = 30
-    body, rig = walker(), rigs.unreal()
+    body, rig = walker(), rigs.create_unreal()
     settings = bpy.context.scene.beyond_mocap.rig
     settings.source, settings.target = body, rig
     bpy.ops.beyond_mocap.map_bones()
@@ -152,17 +152,17 @@ def test_a_duplicate_is_a_rider_of_its_own(part, how):
         other = bpy.context.object
     bpy.context.view_layer.update()
     assert other != body and other.beyond_mocap_ride.on
-    part("path_editing.live").follow(scene)
+    part("path_editing.live").update_all(scene)
     assert other.animation_data.action != body.animation_data.action
     was = poses(body, (20,))
     other.beyond_mocap_ride.speed = 1.7
     bpy.context.view_layer.update()
-    assert part("path_editing.live").follow(scene) == 1
+    assert part("path_editing.live").update_all(scene) == 1
     np.testing.assert_array_equal(poses(body, (20,)), was)
     assert np.abs(poses(other, (20,)) - was).max() > 0.05
     choose(other)
     bpy.ops.beyond_mocap.leave_path()
-    assert body.beyond_mocap_ride.on and part("path_editing.live").follow(scene) == 0
+    assert body.beyond_mocap_ride.on and part("path_editing.live").update_all(scene) == 0
     np.testing.assert_array_equal(poses(body, (20,)), was)
     choose(body)
     bpy.ops.beyond_mocap.leave_path()
@@ -175,18 +175,18 @@ def test_names_may_change_and_armature_or_curve_may_go(part):
     body.name, body.data.name, body.beyond_mocap_ride.curve.name = "Walker", "Bones", "Way"
     body.beyond_mocap_ride.curve.location.x += 1.0
     bpy.context.view_layer.update()
-    assert part("path_editing.live").follow(scene) == 1 and body.beyond_mocap_ride.told == ""
+    assert part("path_editing.live").update_all(scene) == 1 and body.beyond_mocap_ride.told == ""
     was = poses(body, (20,))
     bpy.data.objects.remove(bpy.data.objects["Way"])
     bpy.context.view_layer.update()
-    assert part("path_editing.live").follow(scene) == 0 and "curve" in body.beyond_mocap_ride.told
+    assert part("path_editing.live").update_all(scene) == 0 and "curve" in body.beyond_mocap_ride.told
     np.testing.assert_array_equal(poses(body, (20,)), was)
     choose(body)
     assert bpy.ops.beyond_mocap.leave_path() == {"FINISHED"}
     bpy.ops.beyond_mocap.edit_path()
     bpy.data.objects.remove(body)
     bpy.context.view_layer.update()
-    assert part("path_editing.live").follow(scene) == 0
+    assert part("path_editing.live").update_all(scene) == 0
 
 
 def test_a_rider_is_saved_opened_and_appended(part, tmp_path):
@@ -197,14 +197,14 @@ def test_a_rider_is_saved_opened_and_appended(part, tmp_path):
     bpy.ops.wm.save_as_mainfile(filepath=file)
     bpy.ops.wm.open_mainfile(filepath=file)
     body = next(thing for thing in bpy.context.scene.objects if thing.type == "ARMATURE")
-    part("path_editing.live").follow(bpy.context.scene)
+    part("path_editing.live").update_all(bpy.context.scene)
     np.testing.assert_allclose(poses(body, (20,)), was, atol=1e-6)
     bpy.ops.wm.read_homefile(use_empty=True)
     bpy.context.scene.render.fps = 30
     bpy.ops.wm.append(directory=f"{file}/Object/", filename=body_name(file))
     body = next(thing for thing in bpy.context.scene.objects if thing.type == "ARMATURE")
     bpy.context.view_layer.update()
-    part("path_editing.live").follow(bpy.context.scene)
+    part("path_editing.live").update_all(bpy.context.scene)
     np.testing.assert_allclose(poses(body, (20,)), was, atol=1e-6)
     choose(body)
     assert bpy.ops.beyond_mocap.leave_path() == {"FINISHED"}

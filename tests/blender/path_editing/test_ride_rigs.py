@@ -24,19 +24,19 @@ def part(extension):
 def recorded(part, core):
     """Two seconds of a recorded jog with a turn, on an armature of its own."""
     bpy.context.scene.render.fps = 30
-    clip = core("files.bvh.bvh").read(SAMPLE / "jogging_turn_left.bvh").motion
+    clip = core("files.bvh.bvh").read_bvh(SAMPLE / "jogging_turn_left.bvh").motion
     clip = core("motion.motion").resample(clip, 30.0).frames(0, 60)
 
     def make(onto=None, **wishes):
         scene = bpy.context.scene
-        body = part("rigs.armature").create(bpy.context, clip.skeleton, "Body")
-        part("core.action").write(body, clip, scene, ride_rigs.START)
+        body = part("rigs.armature").create_armature(bpy.context, clip.skeleton, "Body")
+        part("core.action").write_motion(body, clip, scene, ride_rigs.START)
         if onto is None:
             return body
-        rig = onto() if callable(onto) else rigs.rigify(onto)
-        source, options = part("rigs.fit").source_of(body, scene), part("rigs.fit").BakeOptions(**wishes)
+        rig = onto() if callable(onto) else rigs.append_rigify(onto)
+        source, options = part("rigs.fit").read_source(body, scene), part("rigs.fit").BakeOptions(**wishes)
         bake = part("rigs.rig_bake")
-        bake.lay(bake.fitted(rig, part("rigs.bone_maps").suggest(rig), source, scene, options))
+        bake.apply_bake(bake.prepare_bake(rig, part("rigs.bone_maps").find_bone_map(rig), source, scene, options))
         bpy.data.objects.remove(body)
         bpy.context.view_layer.update()
         return rig
@@ -51,21 +51,21 @@ def ride(part, core):
 
     def go(rig, bent, **settings):
         scene, recipe = bpy.context.scene, core("path_editing.ride")
-        wanted = recipe.RideSettings(**settings)
-        carrier = part("path_editing.rigs").carrier_of(rig)
+        wanted = recipe.PathEditSettings(**settings)
+        carrier = part("path_editing.rigs").choose_adapter(rig)
         carrier.check()
-        read = carrier.read(scene)
-        source = recipe.prepare(read.motion, wanted, read.standing)
+        read = carrier.read_motion(scene)
+        source = recipe.prepare_source(read.motion, wanted, read.standing)
         path = source.path
         if bent:
             along = np.linspace(0.0, 1.0, 80)
             line = np.column_stack([3.0 + 1.2 * source.arc.length * along, 1.2 * np.sin(4.0 * along), 0.0 * along])
-            path = core("path_editing.path_line").through(line, "bent")
-        ridden = recipe.ride(source, path, wanted)
+            path = core("path_editing.path_line").fit_line(line, "bent")
+        ridden = recipe.edit_path(source, path, wanted)
         if not rig.beyond_mocap_ride.on:
-            carrier.begin()
+            carrier.start_edit()
             rig.beyond_mocap_ride.on = True
-        carrier.write(scene, read, ridden, "a digest")
+        carrier.write_motion(scene, read, ridden, "a digest")
         return read, ridden
 
     return go
@@ -78,23 +78,23 @@ def shown(rig, frames, bones=None):
     for frame in frames:
         scene.frame_set(int(frame))
         posed = rig.evaluated_get(bpy.context.evaluated_depsgraph_get())
-        found.append([np.array(posed.matrix_world @ posed.pose.bones[name].matrix) for name in bones])
+        found.append([np.array(posed.matrix_world @ posed.apply_pose.bones[name].matrix) for name in bones])
     return np.array(found)
 
 
 def off(core, rig, read, ridden):
     """Millimetres between the ridden motion and the bones that show it, the most of each joint."""
     rows = np.arange(0, len(ridden.motion), STEP)
-    bones = list(read.rig.carried.parts.shown.values())
+    bones = list(read.rig.carried.parts.visible_bones.values())
     places = core("motion.motion").forward_kinematics(ridden.motion)[0][rows]
     seen = shown(rig, read.first + rows, bones)[..., :3, 3]
-    return dict(zip(read.rig.carried.parts.shown, 1000 * np.linalg.norm(seen - places, axis=-1).max(axis=0)))
+    return dict(zip(read.rig.carried.parts.visible_bones, 1000 * np.linalg.norm(seen - places, axis=-1).max(axis=0)))
 
 
 def tuned(rig, part, path, value=0.0):
     """A property of the rig set, its curve gone."""
-    action, slot = part("core.channels").playing(rig)
-    for (where, _), curve in part("core.channels").curves(action, slot).items():
+    action, slot = part("core.channels").find_playing_action(rig)
+    for (where, _), curve in part("core.channels").collect_curves(action, slot).items():
         if where == path:
             action.layers[0].strips[0].channelbag(slot).fcurves.remove(curve)
     owner, _, name = path.rpartition("[")
@@ -113,28 +113,28 @@ def rigify_ik(recorded, part, file):
 
 
 def hand_rig(recorded, part, _):
-    return ride_rigs.walk_ik()
+    return ride_rigs.create_ik_rig()
 
 
 def hand_rig_of_few_keys(recorded, part, _):
-    return ride_rigs.walk_ik(every=6, interpolation="BEZIER")
+    return ride_rigs.create_ik_rig(every=6, interpolation="BEZIER")
 
 
 def without_root(recorded, part, _):
-    return ride_rigs.walk_ik(root=False, cog=False)
+    return ride_rigs.create_ik_rig(root=False, cog=False)
 
 
 def unreal_root_travels(recorded, part, _):
-    return recorded(rigs.unreal, root="SMOOTH", bakes_ik=True)
+    return recorded(rigs.create_unreal, root="SMOOTH", bakes_ik=True)
 
 
 def unreal_root_stays(recorded, part, _):
-    return recorded(rigs.unreal, bakes_ik=True)
+    return recorded(rigs.create_unreal, bakes_ik=True)
 
 
 def odd_modes(recorded, part, _):
     def make():
-        rig = rigs.mixamo()
+        rig = rigs.create_mixamo()
         for number, bone in enumerate(rig.pose.bones):
             bone.rotation_mode = ("XYZ", "AXIS_ANGLE", "ZYX", "QUATERNION", "YXZ")[number % 5]
         return rig
@@ -145,48 +145,48 @@ def odd_modes(recorded, part, _):
 
 
 def moved_object(recorded, part, _):
-    return ride_rigs.onto_object(recorded(), part("core.channels"))
+    return ride_rigs.move_to_object(recorded(), part("core.channels"))
 
 
 def moved_object_under_moved_empty(recorded, part, _):
-    rig = ride_rigs.onto_object(recorded(), part("core.channels"))
-    ride_rigs.under_empty(rig)
+    rig = ride_rigs.move_to_object(recorded(), part("core.channels"))
+    ride_rigs.parent_to_empty(rig)
     rig.delta_location, rig.delta_rotation_euler = (0.3, 0.2, 0.1), (0.0, 0.0, 0.4)
     return rig
 
 
 def under_scaled_empty(recorded, part, _):
     rig = recorded()
-    ride_rigs.under_empty(rig, 2.0)
+    ride_rigs.parent_to_empty(rig, 2.0)
     rig.scale = (0.5, 0.5, 0.5)
     return rig
 
 
 def strips(recorded, part, _):
-    return ride_rigs.onto_strip(recorded(), scale=1.3)
+    return ride_rigs.move_to_strip(recorded(), scale=1.3)
 
 
 def half_an_action_over_strips(recorded, part, _):
     rig = recorded()
     data = rig.animation_data
     action = data.action
-    ride_rigs.onto_strip(rig)
+    ride_rigs.move_to_strip(rig)
     other = action.copy()
-    rest = ride_rigs.bone_path(
+    rest = ride_rigs.build_bone_path(
         "Spine1" if "Spine1" in rig.pose.bones else rig.pose.bones[1].name, "rotation_quaternion"
     )
-    for curve in part("core.channels").curves(other, other.slots[0]).values():
+    for curve in part("core.channels").collect_curves(other, other.count_slots[0]).values():
         if curve.data_path == rest:
             for point in curve.keyframe_points:
                 point.co.y = 0.5
     data.action, data.action_influence = other, 0.5
-    data.action_slot = other.slots[0]
+    data.action_slot = other.count_slots[0]
     return rig
 
 
 def cyclic(recorded, part, _):
-    rig = ride_rigs.walk_ik(frames=31)
-    ride_rigs.cycled(rig, part("core.channels"))
+    rig = ride_rigs.create_ik_rig(frames=31)
+    ride_rigs.cycle_curves(rig, part("core.channels"))
     bpy.context.scene.frame_start, bpy.context.scene.frame_end = 5, 70
     return rig
 
@@ -203,9 +203,9 @@ def test_its_own_path_changes_nothing_and_another_is_gone_to_the_millimetre(
     rig = kind(recorded, part, rigify)
     bpy.context.view_layer.update()
     before = whole(part, rig)
-    carrier = part("path_editing.rigs").carrier_of(rig)
+    carrier = part("path_editing.rigs").choose_adapter(rig)
     assert type(carrier).__name__ == "RigCarrier"
-    seen = carrier.read(bpy.context.scene)
+    seen = carrier.read_motion(bpy.context.scene)
     assert whole(part, rig) == before  # looking changes nothing
     count, first = len(seen.motion), seen.first
     frames = np.arange(0, count, STEP)
@@ -221,7 +221,7 @@ def test_its_own_path_changes_nothing_and_another_is_gone_to_the_millimetre(
     feet = {name: value for name, value in found.items() if "foot" in name or name == "hips"}
     assert max(feet.values()) < 1.5, feet
     assert all(found[name] < model[name] + 3.0 for name in found if "lower_leg" not in name), found
-    part("path_editing.riders").end(rig)
+    part("path_editing.riders").revert_path_edit(rig)
     bpy.context.scene.frame_set(1)
     assert whole(part, rig) == before
 
@@ -237,12 +237,12 @@ def test_a_rig_on_its_path_is_saved_and_opened(part, recorded, tmp_path, kind):
     bpy.ops.wm.save_as_mainfile(filepath=file)
     bpy.ops.wm.open_mainfile(filepath=file)
     rig, scene = bpy.data.objects["Rig"], bpy.context.scene
-    assert part("path_editing.live").follow(scene) == 1  # the original is looked at again
+    assert part("path_editing.live").update_all(scene) == 1  # the original is looked at again
     assert rig.beyond_mocap_ride.told == ""
     np.testing.assert_allclose(shown(rig, [5, 20, 40]), was, atol=1e-5)
     rig.beyond_mocap_ride.curve.location.z += 0.5
     bpy.context.view_layer.update()
-    assert part("path_editing.live").follow(scene) == 1
+    assert part("path_editing.live").update_all(scene) == 1
     assert np.abs(shown(rig, [5, 20, 40]) - was).max() > 0.4
     choose(rig)
     assert bpy.ops.beyond_mocap.leave_path() == {"FINISHED"}
@@ -250,7 +250,7 @@ def test_a_rig_on_its_path_is_saved_and_opened(part, recorded, tmp_path, kind):
 
 
 def test_each_button_is_one_step_with_a_rig_too(part):
-    rig = ride_rigs.walk_ik()
+    rig = ride_rigs.create_ik_rig()
     choose(rig)
     assert_one_step(bpy.ops.beyond_mocap.edit_path)
     assert_one_step(bpy.ops.beyond_mocap.bake_path)
@@ -284,7 +284,7 @@ def bend(scene, drawn, part):
     drawn.location, drawn.rotation_euler = (4.0, 2.0, 0.0), (0.0, 0.0, 1.0)
     drawn.data.splines[0].bezier_points[-1].co.x += 1.0
     bpy.context.view_layer.update()
-    part("path_editing.live").follow(scene)
+    part("path_editing.live").update_all(scene)
 
 
 def refuses(verb, match):
@@ -298,12 +298,12 @@ def rigid(poses):
 
 
 def test_what_a_body_carries_goes_along_and_what_lies_stays(part, recorded):
-    rig = ride_rigs.with_props(recorded(), "Hips")
+    rig = ride_rigs.add_props(recorded(), "Hips")
     frames, scene = np.arange(5, 65), bpy.context.scene
     hips = shown(rig, frames, ["Hips"])[:, 0, :3, 3]
     rest = np.array(rig.data.bones["sword"].matrix_local.to_3x3())
     for index, values in enumerate(((hips - hips[0]) @ rest).T):
-        ride_rigs.keys(rig, ride_rigs.bone_path("sword", "location"), index, frames, values, "sword")
+        ride_rigs.add_keys(rig, ride_rigs.build_bone_path("sword", "location"), index, frames, values, "sword")
     was = shown(rig, frames[::STEP], ["Hips", "sword", "bag"])
     stone = shown(rig, [5, 40], ["stone"])
     bend(scene, start(rig, plant=False, lean=False), part)
@@ -316,7 +316,7 @@ def test_what_a_body_carries_goes_along_and_what_lies_stays(part, recorded):
 
 def test_a_dog_rides_as_it_is_and_that_is_told(part):
     bpy.context.scene.render.fps = 30
-    dog, frames = ride_rigs.quadruped(), np.arange(5, 65, STEP)
+    dog, frames = ride_rigs.create_quadruped(), np.arange(5, 65, STEP)
     was = shown(dog, frames)
     bend(bpy.context.scene, start(dog), part)
     now = shown(dog, frames)
@@ -326,13 +326,13 @@ def test_a_dog_rides_as_it_is_and_that_is_told(part):
 
 
 def test_muted_curves_stay_muted_and_half_frames_other_slots_and_drivers_are_kept(part, recorded):
-    scene, rig = bpy.context.scene, ride_rigs.walk_ik()
+    scene, rig = bpy.context.scene, ride_rigs.create_ik_rig()
     channels = part("core.channels")
-    action, slot = channels.playing(rig)
+    action, slot = channels.find_playing_action(rig)
     other = action.slots.new(id_type="OBJECT", name="Other")
-    channels.new_curve(action, other, "location", 0, "").keyframe_points.insert(1, 5.0)
-    ride_rigs.keys(rig, ride_rigs.bone_path("spine_01", "location"), 1, [5, 40], [0.0, 5.0]).mute = True
-    ride_rigs.keys(rig, ride_rigs.bone_path("head", "rotation_euler"), 1, [5.5, 20.25, 33.3], [0.0, 0.5, 0.0])
+    channels.add_curve(action, other, "location", 0, "").keyframe_points.insert(1, 5.0)
+    ride_rigs.add_keys(rig, ride_rigs.build_bone_path("spine_01", "location"), 1, [5, 40], [0.0, 5.0]).mute = True
+    ride_rigs.add_keys(rig, ride_rigs.build_bone_path("head", "rotation_euler"), 1, [5.5, 20.25, 33.3], [0.0, 0.5, 0.0])
     rig.pose.bones["head"].rotation_mode = "XYZ"
     driver = rig.driver_add('pose.bones["neck_01"].rotation_euler', 0).driver
     driver.type, driver.expression = "SCRIPTED", "0.2"
@@ -344,18 +344,18 @@ def test_muted_curves_stay_muted_and_half_frames_other_slots_and_drivers_are_kep
     bend(scene, start(rig, plant=False, lean=False), part)
     assert rig.beyond_mocap_ride.told == ""
     np.testing.assert_allclose(rigid(shown(rig, frames, upper)), rigid(was), atol=1e-4)
-    made, slot = channels.playing(rig)
+    made, slot = channels.find_playing_action(rig)
     assert len(made.slots) == 1 and len(action.slots) == 2
-    assert channels.curves(made, slot)[ride_rigs.bone_path("spine_01", "location"), 1].mute
+    assert channels.collect_curves(made, slot)[ride_rigs.build_bone_path("spine_01", "location"), 1].mute
 
 
 def test_the_controls_of_inverse_kinematics_stay_with_it(part):
     """No switch is turned: feet are moved by their controls, knees by their poles, the rest by the COG."""
-    rig, scene = ride_rigs.walk_ik(), bpy.context.scene
+    rig, scene = ride_rigs.create_ik_rig(), bpy.context.scene
     scene.render.fps = 30
-    original = set(part("core.channels").curves(*part("core.channels").playing(rig)))
+    original = set(part("core.channels").collect_curves(*part("core.channels").find_playing_action(rig)))
     bend(scene, start(rig), part)
-    now = part("core.channels").curves(*part("core.channels").playing(rig))
+    now = part("core.channels").collect_curves(*part("core.channels").find_playing_action(rig))
     bones = {path.split('"')[1] for path, _ in set(now) - original}
     legs = {f"{bone}_{side}" for bone in ("thigh", "calf", "foot") for side in "lr"}
     assert {"pelvis"} <= bones and not bones & legs
@@ -363,28 +363,28 @@ def test_the_controls_of_inverse_kinematics_stay_with_it(part):
 
 
 def test_one_root_carries_all_where_it_travels(part, recorded):
-    rig = recorded(rigs.unreal, root="SMOOTH")
+    rig = recorded(rigs.create_unreal, root="SMOOTH")
     channels, scene = part("core.channels"), bpy.context.scene
-    action, slot = channels.playing(rig)
-    before = {place: channels.keys_of(curve)["co"] for place, curve in channels.curves(action, slot).items()}
+    action, slot = channels.find_playing_action(rig)
+    before = {place: channels.read_keys(curve)["co"] for place, curve in channels.collect_curves(action, slot).items()}
     bend(scene, start(rig, plant=False, lean=False), part)
-    now = channels.curves(*channels.playing(rig))
+    now = channels.collect_curves(*channels.find_playing_action(rig))
     changed = {path for (path, i), curve in now.items()
-               if (path, i) not in before or not np.array_equal(channels.keys_of(curve)["co"], before[path, i])}
+               if (path, i) not in before or not np.array_equal(channels.read_keys(curve)["co"], before[path, i])}
     assert {path.split('"')[1] for path in changed} == {"root"}
 
 
 def test_one_that_is_hidden_or_shown_at_rest_rides_as_it_would_be_posed(part, ride):
-    rig = ride_rigs.walk_ik()
+    rig = ride_rigs.create_ik_rig()
     posed = ride(rig, bent=True)[1].motion.root_positions
-    part("path_editing.riders").end(rig)
+    part("path_editing.riders").revert_path_edit(rig)
     rig.data.pose_position, rig.hide_viewport = "REST", True
     np.testing.assert_allclose(ride(rig, bent=True)[1].motion.root_positions, posed, atol=1e-6)
     assert rig.data.pose_position == "REST" and rig.hide_viewport and len(bpy.data.scenes) == 1
 
 
 def test_motions_that_are_faster_slower_longer_and_shorter(core, part, recorded, ride):
-    rig = ride_rigs.walk_ik()
+    rig = ride_rigs.create_ik_rig()
     for settings in ({"speed": 0.8}, {"speed": 2.0}, {"delay": 0.5}, {"by_arc_length": False}):
         read, ridden = ride(rig, bent=True, **settings)
         assert max(off(core, rig, read, ridden).values()) < 5.0
@@ -394,7 +394,7 @@ def test_motions_that_are_faster_slower_longer_and_shorter(core, part, recorded,
 
 def test_what_cannot_ride_is_said(part, recorded, tmp_path):
     scene = bpy.context.scene
-    rig = ride_rigs.walk_ik()
+    rig = ride_rigs.create_ik_rig()
     choose(rig)
     action = rig.animation_data.action
     rig.animation_data.action = None

@@ -167,20 +167,20 @@ def test_live_begins_the_same_wish_once(extension, scene):
     freshness = importlib.import_module(f"{extension.__name__}.scene.result.freshness")
     bpy.ops.beyond_mocap.draw_track()
     player = scene.beyond_mocap.players[0]
-    parts = freshness.parts_of_plan(plans.plan_of(scene.beyond_mocap, player)[0])
+    parts = freshness.compute_plan_parts(plans.build_plan(scene.beyond_mocap, player)[0])
     player.take, player.result.made_of = "take", json.dumps(parts)
     player.height = 1.9
-    freshness.LIVE.mark()
-    now = freshness.LIVE.since
+    freshness.LIVE.mark_dirty()
+    now = freshness.LIVE.changed_at
     try:
-        assert freshness.due_update(scene, now + 0.2) == ("Drawn", "quick")
+        assert freshness.find_due_update(scene, now + 0.2) == ("Drawn", "quick")
         # it failed, or was cancelled
-        assert [freshness.due_update(scene, now + later) for later in (0.3, 0.5, 2.0, 3.0)] == [None] * 4
+        assert [freshness.find_due_update(scene, now + later) for later in (0.3, 0.5, 2.0, 3.0)] == [None] * 4
         player.height = 1.8
-        freshness.LIVE.mark()
-        assert freshness.due_update(scene, freshness.LIVE.since + 0.2) == ("Drawn", "quick")
+        freshness.LIVE.mark_dirty()
+        assert freshness.find_due_update(scene, freshness.LIVE.changed_at + 0.2) == ("Drawn", "quick")
     finally:
-        freshness.forget_edits()
+        freshness.clear_edits()
 
 
 def test_a_drawn_player_has_a_dot_and_is_one_step(scene):
@@ -198,7 +198,7 @@ def test_the_dot_goes_where_the_curve_is_bent_to(extension, scene):
     player.drawn_track.location.y = 3.0
     bpy.context.view_layer.update()
     actions = len(bpy.data.actions)
-    dots.renew(bpy.context, player)
+    dots.update_dot_track(bpy.context, player)
     scene.frame_set(1)
     assert player.dot.matrix_world.translation.y == pytest.approx(3.0) and len(bpy.data.actions) == actions
 
@@ -211,7 +211,7 @@ def test_pins_are_made_listed_and_taken_away_in_one_step_each(extension, scene, 
     assert_one_step(bpy.ops.beyond_mocap.add_pin, part="left_hand", at="CURSOR", hold=0.5)
     scene = bpy.context.scene  # undo has replaced what was there before
     player = scene.beyond_mocap.players[0]
-    pin, = plans.plan_of(scene.beyond_mocap, player)[0].pins
+    pin, = plans.build_plan(scene.beyond_mocap, player)[0].pins
     assert pin == core("synthesis.plan").Pin(2.0, "left_hand", (3, 1, 1.4), 0.5)
     assert bpy.context.object == player.pins[0].target
     with pytest.raises(RuntimeError, match="one position at a time"):
@@ -220,7 +220,7 @@ def test_pins_are_made_listed_and_taken_away_in_one_step_each(extension, scene, 
         bpy.ops.beyond_mocap.add_pin(part="gaze", at="BODY")
     bpy.ops.beyond_mocap.add_pin(part="gaze", at="CURSOR")
     bpy.data.objects.remove(player.pins[1].target)
-    assert len(plans.plan_of(scene.beyond_mocap, player)[0].pins) == 1
+    assert len(plans.build_plan(scene.beyond_mocap, player)[0].pins) == 1
     assert_one_step(bpy.ops.beyond_mocap.remove_pin)
 
 
@@ -228,10 +228,10 @@ def test_what_is_a_players_own_is_in_his_plan(extension, scene):
     plans = importlib.import_module(f"{extension.__name__}.scene.result.plans")
     bpy.ops.beyond_mocap.draw_track()
     player = scene.beyond_mocap.players[0]
-    plain = plans.plan_of(scene.beyond_mocap, player)[0]
+    plain = plans.build_plan(scene.beyond_mocap, player)[0]
     assert (plain.height, plain.strong_foot, plain.style, plain.pins) == (0.0, "", (), ())
     player.height, player.strong_foot, player.style, player.style_weight = 1.9, "left", " lmd/* ; running", 2.0
-    plan = plans.plan_of(scene.beyond_mocap, player)[0]
+    plan = plans.build_plan(scene.beyond_mocap, player)[0]
     assert plan.height == pytest.approx(1.9) and plan.style == ("lmd/*", "running")
     assert (plan.strong_foot, plan.style_weight) == ("left", 2.0)
 
@@ -247,35 +247,35 @@ def test_a_drawn_player_is_synthesized_updated_and_pinned(extension, scene, core
     settings.library_folder = str(tmp_path)
     bpy.ops.beyond_mocap.draw_track()
     player = settings.players[0]
-    assert not freshness.edited_parts(scene, player)  # nothing made yet
+    assert not freshness.compute_edited_parts(scene, player)  # nothing made yet
     assert bpy.ops.beyond_mocap.synthesize() == {"FINISHED"}
-    take = session.made(player.take).take
-    assert not freshness.edited_parts(scene, player)
+    take = session.find_take(player.take).take
+    assert not freshness.compute_edited_parts(scene, player)
     player.drawn_track.data.splines[0].bezier_points[1].co.y += 1.0
-    freshness.LIVE.mark()
-    assert freshness.edited_parts(scene, player)
-    now = freshness.LIVE.since
-    assert freshness.due_update(scene, now + 0.2) == ("Drawn", "quick")
+    freshness.LIVE.mark_dirty()
+    assert freshness.compute_edited_parts(scene, player)
+    now = freshness.LIVE.changed_at
+    assert freshness.find_due_update(scene, now + 0.2) == ("Drawn", "quick")
     assert bpy.ops.beyond_mocap.update_live(player="Drawn", kind="quick") == {"FINISHED"}
-    quick = session.made(player.take).take
+    quick = session.find_take(player.take).take
     assert len(quick.motion) != len(take.motion) and any("cut short" in line for line in quick.warnings)
-    assert freshness.due_update(scene, now + 0.4) is None
-    assert freshness.due_update(scene, now + 2.0) == ("Drawn", "whole")
+    assert freshness.find_due_update(scene, now + 0.4) is None
+    assert freshness.find_due_update(scene, now + 2.0) == ("Drawn", "whole")
     assert bpy.ops.beyond_mocap.update_live(player="Drawn", kind="whole") == {"FINISHED"}
-    assert not any("cut short" in line for line in session.made(player.take).take.warnings)
+    assert not any("cut short" in line for line in session.find_take(player.take).take.warnings)
     scene.frame_set(60)
     assert bpy.ops.beyond_mocap.add_pin(part="right_hand", at="BODY") == {"FINISHED"}
     target = player.pins[0].target
     target.location.z += 0.2
     bpy.context.view_layer.update()
-    assert freshness.edited_parts(scene, player)
+    assert freshness.compute_edited_parts(scene, player)
     assert bpy.ops.beyond_mocap.update() == {"FINISHED"}
-    made = session.made(player.take).take
+    made = session.find_take(player.take).take
     assert made.pins[0].miss < 0.005
     skeleton = made.motion.skeleton
-    wrist = skeleton.names[core("motion.humanoid").identify(skeleton).right.hand]
+    wrist = skeleton.names[core("motion.humanoid").identify_joints(skeleton).right.hand]
     place = player.body.matrix_world @ player.body.pose.bones[wrist].head
     assert (place - target.location).length < 0.01
     with pytest.raises(RuntimeError, match="no player 'Nobody'"):
         bpy.ops.beyond_mocap.update_live(player="Nobody")
-    session.clear()
+    session.clear_session()

@@ -7,7 +7,7 @@ import pathlib
 import bpy
 import numpy as np
 import pytest
-from undo import assert_one_step, press, state
+from undo import assert_one_step, press_operator, collect_state
 
 SAMPLE = pathlib.Path(__file__).resolve().parents[3] / "sample_blend"
 CLIPS = ("standing_1", "walking_1_2", "walk_jog_walk", "jogging_2_9", "jogging_turn_left", "running_4_2",
@@ -52,7 +52,7 @@ def ready(match, library_folder):
 def session(extension):
     module = importlib.import_module(f"{extension.__name__}.scene.core.session")
     yield module
-    module.clear()
+    module.clear_session()
 
 
 def test_tracking_becomes_players(match, core):
@@ -88,12 +88,12 @@ def test_words_of_a_text_count_more_than_those_on_disk(extension, ready, core):
     text = bpy.data.texts.new("Words")
     text.write("3.0 kick right running low inside\n")
     ready.players[0].annotation_text = text
-    assert plans.plan_of(ready, ready.players[0])[0].timeline.keys[0].time == 6.0  # strips count more than either
-    bpy.ops.beyond_mocap.read_words()
-    assert plans.plan_of(ready, ready.players[0])[0].timeline.keys[0].time == 3.0
+    assert plans.build_plan(ready, ready.players[0])[0].timeline.keys[0].time == 6.0  # strips count more than either
+    bpy.ops.beyond_mocap.read_labels()
+    assert plans.build_plan(ready, ready.players[0])[0].timeline.keys[0].time == 3.0
     text.clear()
     text.write("3.0 kik right\n")
-    bpy.ops.beyond_mocap.read_words()
+    bpy.ops.beyond_mocap.read_labels()
     with pytest.raises(RuntimeError, match="strips of player1: the word 'kik'"):
         bpy.ops.beyond_mocap.synthesize()
     bpy.data.objects.remove(ready.players[0].dot)  # without strips the text itself counts
@@ -104,7 +104,7 @@ def test_words_of_a_text_count_more_than_those_on_disk(extension, ready, core):
 def test_what_the_panel_lets_one_set_is_what_the_plan_asks(extension, ready, core):
     plans = importlib.import_module(f"{extension.__name__}.scene.result.plans")
     player = ready.players[0]
-    plain, planned = plans.plan_of(ready, player)[0], core("synthesis.plan").Plan
+    plain, planned = plans.build_plan(ready, player)[0], core("synthesis.plan").Plan
     numbers = {"alpha": 0.5, "delta": 0.25, "omega": 3.0, "seam_window": 0.5, "track_window": 1.5, "root_window": 1.0}
     for name, value in numbers.items():
         assert getattr(plain, name) == pytest.approx(getattr(planned, name))
@@ -112,7 +112,7 @@ def test_what_the_panel_lets_one_set_is_what_the_plan_asks(extension, ready, cor
     ready.made, ready.gaits = False, "walking = walk.bvh; jogging=jog.bvh;"
     assert not plain.solve_touches
     ready.solve_touches = True
-    plan = plans.plan_of(ready, player)[0]
+    plan = plans.build_plan(ready, player)[0]
     assert {name: getattr(plan, name) for name in numbers} == pytest.approx(numbers)
     assert (
         plain.made and not plan.made and plan.solve_touches
@@ -129,26 +129,26 @@ def test_the_whole_road(extension, ready, core, session):
     rate = 24 / 1.001
     bpy.ops.beyond_mocap.add_stage()
     bpy.ops.ed.undo_push(message="before")
-    assert press(bpy.ops.beyond_mocap.build_library) == {"FINISHED"}
+    assert press_operator(bpy.ops.beyond_mocap.build_library) == {"FINISHED"}
     settings = bpy.context.scene.beyond_mocap
     assert f"{len(CLIPS)} clips" in settings.library_holds
-    assert press(bpy.ops.beyond_mocap.synthesize) == {"FINISHED"}
+    assert press_operator(bpy.ops.beyond_mocap.synthesize) == {"FINISHED"}
     settings = bpy.context.scene.beyond_mocap
-    built = session.library(settings.library_folder, None)
+    built = session.find_library(settings.library_folder, None)
     for player in settings.players:
-        made = session.made(player.take)
+        made = session.find_take(player.take)
         again = core("synthesis.synthesize").synthesize(built, made.plan)
         assert np.array_equal(made.take.motion.rotations, again.motion.rotations)
         assert np.array_equal(made.take.motion.root_positions, again.motion.root_positions)
         assert "Foot slide" in player.quality
-    synthesized = state()
-    assert press(bpy.ops.beyond_mocap.accept) == {"FINISHED"}
-    accepted = state()
+    synthesized = collect_state()
+    assert press_operator(bpy.ops.beyond_mocap.accept) == {"FINISHED"}
+    accepted = collect_state()
     action = importlib.import_module(f"{extension.__name__}.scene.core.action")
     resample = core("motion.motion").resample
     for player in bpy.context.scene.beyond_mocap.players:
-        take = session.made(player.take).take
-        read, expected = action.read(player.body, bpy.context.scene), resample(take.motion, rate)
+        take = session.find_take(player.take).take
+        read, expected = action.read_motion(player.body, bpy.context.scene), resample(take.motion, rate)
         assert abs(len(read) - len(expected)) <= 1
         count = min(len(read), len(expected))
         np.testing.assert_allclose(read.root_positions[:count], expected.root_positions[:count], atol=1e-5)
@@ -156,28 +156,28 @@ def test_the_whole_road(extension, ready, core, session):
     assert "Ball" in bpy.data.objects and bpy.context.scene.frame_end >= int(12 * rate)
     assert (scene.render.fps, scene.render.fps_base) == (24, pytest.approx(1.001))
     bpy.ops.ed.undo()
-    assert state() == synthesized
+    assert collect_state() == synthesized
     bpy.ops.ed.undo()
     assert [player.take for player in bpy.context.scene.beyond_mocap.players] == ["", ""]
     bpy.ops.ed.undo()
     assert bpy.context.scene.beyond_mocap.library_holds == ""
     for _ in range(3):
         bpy.ops.ed.redo()
-    assert state() == accepted
+    assert collect_state() == accepted
 
 
 def test_update_makes_anew_what_a_changed_word_touches(extension, ready, match, core, session):
     bpy.ops.beyond_mocap.build_library()
     refused(bpy.ops.beyond_mocap.update, "Synthesize first")
     bpy.ops.beyond_mocap.synthesize()
-    before = [session.made(player.take) for player in ready.players]
+    before = [session.find_take(player.take) for player in ready.players]
     (match / "player1.txt").write_text(WORDS.replace("6.0", "6.2"))
-    bpy.ops.beyond_mocap.read_words()
+    bpy.ops.beyond_mocap.read_labels()
     assert_one_step(bpy.ops.beyond_mocap.update)
     settings = bpy.context.scene.beyond_mocap
-    after = [session.made(player.take) for player in settings.players]
+    after = [session.find_take(player.take) for player in settings.players]
     assert after[0].plan.timeline.keys[0].time == 6.2
-    built = session.library(settings.library_folder, None)
+    built = session.find_library(settings.library_folder, None)
     for old, new in zip(before, after):
         again = core("synthesis.resynthesize").resynthesize(built, new.plan, old.take)
         assert np.array_equal(new.take.motion.rotations, again.motion.rotations)
@@ -200,28 +200,28 @@ def test_solved_touches_come_out_as_the_core_has_them(extension, ready, match, c
     ready.players[1].use, ready.solve_touches = False, True
     assert_one_step(bpy.ops.beyond_mocap.synthesize)
     player = bpy.context.scene.beyond_mocap.players[0]
-    made = session.made(player.take)
+    made = session.find_take(player.take)
     key, = made.report["keys"]
     assert key["time_s"] == 6.0 and key["solved_time_s"] == pytest.approx(6.13, abs=0.03)
     assert key["contact_gap_m"] < 0.005 and f"touch at {key['solved_time_s']:.2f} s" in player.moments
-    built = session.library(bpy.context.scene.beyond_mocap.library_folder, None)
+    built = session.find_library(bpy.context.scene.beyond_mocap.library_folder, None)
     again = core("synthesis.synthesize").synthesize(built, made.plan)
     assert np.array_equal(made.take.motion.rotations, again.motion.rotations)
     assert np.array_equal(made.take.ball.positions, again.ball.positions)
     bpy.context.scene.beyond_mocap.solve_touches = False
     bpy.ops.beyond_mocap.update()
-    plain = session.made(bpy.context.scene.beyond_mocap.players[0].take)
+    plain = session.find_take(bpy.context.scene.beyond_mocap.players[0].take)
     assert plain.report["keys"][0]["solved_time_s"] is None
 
 
 def test_accepting_again_replaces_the_take_only(extension, ready, session):
     bpy.ops.beyond_mocap.synthesize()
     bpy.ops.beyond_mocap.accept()
-    once = state()
+    once = collect_state()
     ready.seed = 1
     bpy.ops.beyond_mocap.synthesize()
     bpy.ops.beyond_mocap.accept()
-    assert {kind: state()[kind] for kind in ("objects", "actions", "meshes", "curves", "armatures")} == {
+    assert {kind: collect_state()[kind] for kind in ("objects", "actions", "meshes", "curves", "armatures")} == {
         kind: once[kind] for kind in ("objects", "actions", "meshes", "curves", "armatures")}
     bpy.data.objects.remove(ready.players[0].body)
     bpy.ops.beyond_mocap.accept()
@@ -260,18 +260,18 @@ def test_another_unit_scale(ready, session):
     ("import_tracking", "no file given"),
 ])
 def test_nothing_filled_in(operator, message):
-    before = state()
+    before = collect_state()
     with pytest.raises(RuntimeError, match=message):
         getattr(bpy.ops.beyond_mocap, operator)()
-    assert state() == before
+    assert collect_state() == before
 
 
 def refused(operator, message, **arguments):
     """The operator reports `message` and the scene is as before."""
-    before = state()
+    before = collect_state()
     with pytest.raises(RuntimeError, match=message):
         operator(**arguments)
-    assert state() == before
+    assert collect_state() == before
 
 
 def test_missing_files_are_named(ready, match, tmp_path):
@@ -297,7 +297,7 @@ def test_bad_tracking(tmp_path, content, found):
 
 def test_words_that_the_library_lacks(ready, match):
     (match / "player1.txt").write_text("6.0 header\n")
-    bpy.ops.beyond_mocap.read_words()
+    bpy.ops.beyond_mocap.read_labels()
     refused(bpy.ops.beyond_mocap.synthesize, "strips of player1: .*6 s: .*header")
     ready.nearest = True
     assert bpy.ops.beyond_mocap.synthesize() == {"FINISHED"}
@@ -306,7 +306,7 @@ def test_words_that_the_library_lacks(ready, match):
 
 def test_a_take_of_another_session(ready, session):
     bpy.ops.beyond_mocap.synthesize()
-    session.clear()
+    session.clear_session()
     for player in ready.players:
         bpy.data.objects.remove(player.body)
     refused(bpy.ops.beyond_mocap.accept, "synthesize again")

@@ -52,12 +52,12 @@ def test_each_cause_has_its_line_and_update_mends_it(renew, made, ready, match, 
 def test_words_of_a_text_stay_the_words(renew, made, ready, scene):  # noqa: F811
     """A player without strips gets none by a synthesis: strips would count more than the text."""
     dots, strips = scene("player.dots"), scene("timeline.strips")
-    dots.remove(bpy.context.scene, made)
+    dots.remove_dot(bpy.context.scene, made)
     text = bpy.data.texts.new("words")
     text.write("6.0 kick right\n")
     made.annotation_text = text
     assert bpy.ops.beyond_mocap.synthesize() == {"FINISHED"}
-    assert strips.read(made, bpy.context.scene) is None and renew().lines == ""
+    assert strips.read_player_timeline(made, bpy.context.scene) is None and renew().lines == ""
     text.write("8.0 12.0 jogging\n")
     assert "labels" in renew().lines
 
@@ -67,7 +67,7 @@ def test_words(renew, made, ready, session, scene):  # noqa: F811
     strips.add_moment(bpy.context, made, 9.0, ("kick",))
     assert "labels" in renew().lines
     bpy.ops.beyond_mocap.update()
-    assert renew().lines == "" and session.made(made.take).plan.timeline == plans.plan_of(ready, made)[0].timeline
+    assert renew().lines == "" and session.find_take(made.take).plan.timeline == plans.build_plan(ready, made)[0].timeline
 
 
 def test_the_library_on_disk(renew, made, ready, tmp_path):  # noqa: F811
@@ -88,26 +88,26 @@ def test_after_the_file_was_opened_again_update_makes_the_same_bits(renew, made,
     bpy.ops.beyond_mocap.resynthesize_stretch(player=made.name, start=8.0, end=9.5)
     bpy.ops.beyond_mocap.accept()
     made.body.pose.bones["LeftArm"].keyframe_insert("rotation_quaternion", frame=50.5)
-    before = session.made(made.take).take
+    before = session.find_take(made.take).take
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "kept.blend"))
-    session.clear()
+    session.clear_session()
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "kept.blend"))
     player = bpy.context.scene.beyond_mocap.players[0]
     assert "not in this session" in renew().lines and "1 manual key:" in renew().notes
     assert player.result.state == "ACCEPTED"
     bpy.ops.beyond_mocap.update()
-    after = session.made(player.take).take
+    after = session.find_take(player.take).take
     np.testing.assert_array_equal(after.motion.rotations, before.motion.rotations)
     np.testing.assert_array_equal(after.motion.root_positions, before.motion.root_positions)
     assert renew().lines == "" and player.result.hand_keys == 1
 
 
 def test_a_stretch_is_another_solution_and_pressed_again_a_third(made, session):  # noqa: F811
-    first = session.made(made.take).take
+    first = session.find_take(made.take).take
     bpy.ops.beyond_mocap.resynthesize_stretch(player=made.name, start=3.0, end=5.0)
-    second = session.made(made.take).take
+    second = session.find_take(made.take).take
     bpy.ops.beyond_mocap.resynthesize_stretch(player=made.name, start=3.0, end=5.0)
-    third = session.made(made.take).take
+    third = session.find_take(made.take).take
     for one_, other in ((first, second), (second, third), (first, third)):
         off = np.any(one_.motion.rotations != other.motion.rotations, axis=(1, 2))
         assert off[3 * 30 : 5 * 30].mean() > 0.5 and not off[: 1 * 30].any() and not off[8 * 30 :].any()
@@ -127,12 +127,12 @@ def test_a_stretch_by_what_is_selected(made, session):  # noqa: F811
     track = made.body.animation_data.nla_tracks["Beyond Mocap"]
     for number, strip in enumerate(track.strips):
         strip.select = number == 2
-    before, seconds = session.made(made.take).take, [
+    before, seconds = session.find_take(made.take).take, [
         (f - 1) / 30 for f in (track.strips[2].frame_start, track.strips[2].frame_end)
     ]
     assert bpy.ops.beyond_mocap.resynthesize_stretch() == {"FINISHED"}
     off = (
-        np.any(before.motion.rotations != session.made(made.take).take.motion.rotations, axis=(1, 2)).nonzero()[0] / 30
+        np.any(before.motion.rotations != session.find_take(made.take).take.motion.rotations, axis=(1, 2)).nonzero()[0] / 30
     )
     assert len(off) and off.min() > seconds[0] - 2.0 and off.max() < seconds[1] + 2.0
     assert made.result.state == "PREVIEW"
@@ -143,7 +143,7 @@ def test_variants_to_choose_from(made, session):  # noqa: F811
     assert bpy.ops.beyond_mocap.variants(count=3) == {"FINISHED"}
     variants = made.result.variants
     assert len(variants) == 3 and made.take == variants[0].name and made.result.state == "PREVIEW"
-    takes = [session.made(variant.name).take for variant in variants]
+    takes = [session.find_take(variant.name).take for variant in variants]
     for a in range(3):
         for b in range(a):
             assert np.any(takes[a].motion.rotations != takes[b].motion.rotations, axis=(1, 2)).mean() > 0.5
@@ -162,12 +162,12 @@ def test_variants_to_choose_from(made, session):  # noqa: F811
 def test_variants_by_seed_where_the_method_draws_lots(made, session, ready):  # noqa: F811
     ready.method = "blocks"
     assert bpy.ops.beyond_mocap.variants(count=2) == {"FINISHED"}
-    assert [session.made(variant.name).plan.seed for variant in made.result.variants] == [0, 1]
+    assert [session.find_take(variant.name).plan.seed for variant in made.result.variants] == [0, 1]
 
 
 def test_fingerprints(extension):
     freshness = importlib.import_module(f"{extension.__name__}.scene.result.freshness")
-    one = freshness.fingerprint({"a": np.arange(3), "b": (1, "x", None)})
-    assert one == freshness.fingerprint({"b": (1, "x", None), "a": np.arange(3)})
-    assert one != freshness.fingerprint({"a": np.arange(3.0), "b": (1, "x", None)})
-    assert freshness.fingerprint(("ab", "c")) != freshness.fingerprint(("a", "bc"))
+    one = freshness.compute_fingerprint({"a": np.arange(3), "b": (1, "x", None)})
+    assert one == freshness.compute_fingerprint({"b": (1, "x", None), "a": np.arange(3)})
+    assert one != freshness.compute_fingerprint({"a": np.arange(3.0), "b": (1, "x", None)})
+    assert freshness.compute_fingerprint(("ab", "c")) != freshness.compute_fingerprint(("a", "bc"))

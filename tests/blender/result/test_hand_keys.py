@@ -23,12 +23,12 @@ def accepted(one):  # noqa: F811
 
 
 def curves(room, body):
-    action, slot = room("core.channels").playing(body)
-    return room("core.channels").curves(action, slot)
+    action, slot = room("core.channels").find_playing_action(body)
+    return room("core.channels").collect_curves(action, slot)
 
 
 def keys(room, body):
-    return {place: room("core.channels").keys_of(curve) for place, curve in curves(room, body).items()}
+    return {place: room("core.channels").read_keys(curve) for place, curve in curves(room, body).items()}
 
 
 def at(table, frame):
@@ -37,7 +37,7 @@ def at(table, frame):
 
 
 def found(room, body):
-    return room("result.hand_keys").found(*room("core.channels").playing(body))
+    return room("result.hand_keys").find_manual_keys(*room("core.channels").find_playing_action(body))
 
 
 def test_nothing_is_found_on_what_was_made(room, accepted):
@@ -155,4 +155,4 @@ def test_an_update_keeps_them_and_tells(room, accepted, one):  # noqa: F811
 def test_an_action_of_the_user_s_own_is_no_concern(room, accepted):
     own = bpy.data.actions.new("own")
     own.slots.new("OBJECT", "own")
-    assert len(room("result.hand_keys").found(own, own.slots[0])) == 0
+    assert len(room("result.hand_keys").find_manual_keys(own, own.slots[0])) == 0

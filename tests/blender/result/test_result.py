@@ -6,7 +6,7 @@ import bpy
 import numpy as np
 import pytest
 from test_players import library_folder, match, ready, refused, session  # noqa: F401  (fixtures)
-from undo import assert_one_step, press, state
+from undo import assert_one_step, press_operator, collect_state
 
 
 def look(player):
@@ -43,7 +43,7 @@ def one(ready, session):  # noqa: F811
 
 
 def kinds():
-    return {kind: state()[kind] for kind in ("objects", "armatures", "actions", "meshes", "curves", "materials")}
+    return {kind: collect_state()[kind] for kind in ("objects", "armatures", "actions", "meshes", "curves", "materials")}
 
 
 def test_a_preview_of_a_new_player_leaves_nothing_when_discarded(one):
@@ -88,11 +88,11 @@ def test_strips_play_what_the_action_plays(one, session):  # noqa: F811
     bpy.ops.beyond_mocap.synthesize()
     assert_one_step(bpy.ops.beyond_mocap.accept, form="ACTION")
     one = bpy.context.scene.beyond_mocap.players[0]
-    body, take = one.body, session.made(one.take).take
+    body, take = one.body, session.find_take(one.take).take
     frames = np.arange(1, 360, 3.37)
     whole = poses(body, frames)
     actions = len(bpy.data.actions)
-    assert press(bpy.ops.beyond_mocap.accept, form="STRIPS") == {"FINISHED"}
+    assert press_operator(bpy.ops.beyond_mocap.accept, form="STRIPS") == {"FINISHED"}
     strips = body.animation_data.nla_tracks["Beyond Mocap"].strips
     assert body.animation_data.action is None and 3 < len(strips) <= len(take.seams) + 1
     assert len(bpy.data.actions) == actions - 1 + len(strips)
@@ -119,7 +119,7 @@ def test_a_strip_that_was_split_becomes_part_of_the_action_once(one, extension):
     second.frame_start, second.frame_end = middle, end
     assert bpy.ops.beyond_mocap.accept(form="ACTION") == {"FINISHED"}
     np.testing.assert_allclose(poses(one.body, frames), whole, atol=1e-6)
-    assert len(hand_keys.of_body(one.body)[0]) == 0
+    assert len(hand_keys.find_in_body(one.body)[0]) == 0
 
 
 def test_a_player_is_removed_under_his_preview(one):
@@ -226,7 +226,7 @@ def test_a_linked_body_is_refused(one, tmp_path):
 
 def test_the_report_is_kept_with_the_take(extension, one, session):  # noqa: F811
     bpy.ops.beyond_mocap.synthesize()
-    assert session.made(one.take).report["root_error_m"]["mean"] < 0.2
+    assert session.find_take(one.take).report["root_error_m"]["mean"] < 0.2
 
 
 def test_the_body_deleted_under_a_preview(one):

@@ -20,16 +20,16 @@ def assert_same(a, b, tolerance):
 
 
 def test_there_and_back_is_exact(core, armature):
-    skeleton = made.skeleton(core)
-    body = armature.create(bpy.context, skeleton, "Body")
-    assert_same(armature.skeleton_of(body, bpy.context.scene), skeleton, 0.0)
+    skeleton = made.build_skeleton(core)
+    body = armature.create_armature(bpy.context, skeleton, "Body")
+    assert_same(armature.build_skeleton(body, bpy.context.scene), skeleton, 0.0)
 
 
 def test_from_bones_alone(core, armature):
-    skeleton = made.skeleton(core)
-    body = armature.create(bpy.context, skeleton, "Body")
-    del body.data[armature.PROPERTY]
-    derived = armature.skeleton_of(body, bpy.context.scene)
+    skeleton = made.build_skeleton(core)
+    body = armature.create_armature(bpy.context, skeleton, "Body")
+    del body.data[armature.SKELETON_PROPERTY]
+    derived = armature.build_skeleton(body, bpy.context.scene)
     order = [derived.names.index(name) for name in skeleton.names]
     np.testing.assert_allclose(derived.offsets[order], skeleton.offsets, atol=5e-7)
     assert [derived.names[derived.parents[i]] for i in order[1:]] == [skeleton.names[p] for p in skeleton.parents[1:]]
@@ -39,34 +39,34 @@ def test_from_bones_alone(core, armature):
 
 
 def test_edited_bones_count_more_than_what_was_kept(core, armature):
-    body = armature.create(bpy.context, made.skeleton(core), "Body")
-    with armature._editing(bpy.context, body):
+    body = armature.create_armature(bpy.context, made.build_skeleton(core), "Body")
+    with armature._edit_mode(bpy.context, body):
         body.data.edit_bones["LeftLeg"].head.z -= 0.05
-    changed = armature.skeleton_of(body, bpy.context.scene)
+    changed = armature.build_skeleton(body, bpy.context.scene)
     np.testing.assert_allclose(changed.offsets[changed.index("LeftLeg")], [0.01, 0, -0.46], atol=1e-6)
 
 
 @pytest.mark.parametrize("scale_length", (0.01, 0.3048, 1.0))
 def test_unit_scale(core, armature, scale_length):
-    skeleton = made.skeleton(core)
+    skeleton = made.build_skeleton(core)
     bpy.context.scene.unit_settings.scale_length = scale_length
-    body = armature.create(bpy.context, skeleton, "Body")
+    body = armature.create_armature(bpy.context, skeleton, "Body")
     knee = body.data.bones["LeftLeg"].head_local - body.data.bones["LeftUpLeg"].head_local
     assert knee.length * scale_length == pytest.approx(np.linalg.norm([0.01, 0, 0.41]), rel=1e-5)
-    assert_same(armature.skeleton_of(body, bpy.context.scene), skeleton, 0.0)
+    assert_same(armature.build_skeleton(body, bpy.context.scene), skeleton, 0.0)
     assert min(min(b.head_local.z, b.tail_local.z) for b in body.data.bones) == pytest.approx(
         0, abs=1e-5 / scale_length
     )
 
 
 def test_scaled_object(core, armature):
-    skeleton = made.skeleton(core)
-    body = armature.create(bpy.context, skeleton, "Body")
+    skeleton = made.build_skeleton(core)
+    body = armature.create_armature(bpy.context, skeleton, "Body")
     body.scale = (2, 2, 2)
-    np.testing.assert_allclose(armature.skeleton_of(body, bpy.context.scene).offsets, 2 * skeleton.offsets, atol=1e-6)
+    np.testing.assert_allclose(armature.build_skeleton(body, bpy.context.scene).offsets, 2 * skeleton.offsets, atol=1e-6)
     body.scale = (2, 1, 1)
     with pytest.raises(core("base.errors").InputError, match="Ctrl-A"):
-        armature.skeleton_of(body, bpy.context.scene)
+        armature.build_skeleton(body, bpy.context.scene)
 
 
 def test_the_active_object_and_its_mode_stay(core, armature):
@@ -74,10 +74,10 @@ def test_the_active_object_and_its_mode_stay(core, armature):
     bpy.context.scene.collection.objects.link(mesh)
     bpy.context.view_layer.objects.active = mesh
     bpy.ops.object.mode_set(mode="EDIT")
-    armature.create(bpy.context, made.skeleton(core), "Body")
+    armature.create_armature(bpy.context, made.build_skeleton(core), "Body")
     assert bpy.context.view_layer.objects.active == mesh and mesh.mode == "EDIT"
 
 
 def test_not_an_armature(core, armature):
     with pytest.raises(core("base.errors").InputError, match="select one"):
-        armature.skeleton_of(None, bpy.context.scene)
+        armature.build_skeleton(None, bpy.context.scene)

@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 import pytest
 import sample_rigs as rigs
-from undo import state
+from undo import collect_state
 
 SAMPLE = pathlib.Path(__file__).resolve().parents[3] / "sample_blend" / "library"
 START, FRAMES, RATE = 5, 40, 30
@@ -32,15 +32,15 @@ def rooms(extension):
 @pytest.fixture(scope="session")
 def clip(core):
     """A recorded jog with a turn, FRAMES long."""
-    found = core("files.bvh.bvh").read(SAMPLE / "jogging_turn_left.bvh").motion
+    found = core("files.bvh.bvh").read_bvh(SAMPLE / "jogging_turn_left.bvh").motion
     return core("motion.motion").resample(found, float(RATE)).frames(0, FRAMES)
 
 
 @pytest.fixture
 def body(rooms, clip):
     bpy.context.scene.render.fps = RATE
-    made = rooms["rigs.armature"].create(bpy.context, clip.skeleton, "Body")
-    rooms["core.action"].write(made, clip, bpy.context.scene, START)
+    made = rooms["rigs.armature"].create_armature(bpy.context, clip.skeleton, "Body")
+    rooms["core.action"].write_motion(made, clip, bpy.context.scene, START)
     return made
 
 
@@ -59,7 +59,7 @@ def skin(rig):
 def look(rig, frames, bones=None):
     """Bone -> places (F, 3) that Blender shows."""
     bones = bones or [bone.name for bone in rig.data.bones]
-    places = rigs.heads(rig, bones, frames)
+    places = rigs.read_heads(rig, bones, frames)
     return {bone: places[:, number] for number, bone in enumerate(bones)}
 
 
@@ -112,9 +112,9 @@ def test_a_body_goes_out_and_comes_back(body, tmp_path, format):
     shown = look(body, FRAMES_SHOWN)
     select(body)
     bpy.ops.ed.undo_push(message="before")
-    before = state()
+    before = collect_state()
     assert export(tmp_path / f"out{SUFFIXES[format]}", format=format) == {"FINISHED"}
-    assert state() == before and len(bpy.data.scenes) == 1
+    assert collect_state() == before and len(bpy.data.scenes) == 1
     assert [path.name for path in tmp_path.iterdir()] == [f"out{SUFFIXES[format]}"]
     assert_same(read_back(tmp_path / f"out{SUFFIXES[format]}", FRAMES), shown)
 
@@ -122,7 +122,7 @@ def test_a_body_goes_out_and_comes_back(body, tmp_path, format):
 @pytest.mark.parametrize("engine", ("UNREAL", "UNITY", "GODOT"))
 @pytest.mark.parametrize("format", ("FBX", "GLB", "USD"))
 def test_axes_of_engines_come_back_too(rooms, body, tmp_path, format, engine):
-    rig = rigs.unreal()
+    rig = rigs.create_unreal()
     baked(rooms, rig, body)
     skin(rig)
     shown = look(rig, FRAMES_SHOWN)
@@ -133,15 +133,15 @@ def test_axes_of_engines_come_back_too(rooms, body, tmp_path, format, engine):
 
 
 def baked(rooms, rig, body, **wishes):
-    source = rooms["rigs.fit"].source_of(body, bpy.context.scene)
-    table = rooms["rigs.bone_maps"].suggest(rig)
+    source = rooms["rigs.fit"].read_source(body, bpy.context.scene)
+    table = rooms["rigs.bone_maps"].find_bone_map(rig)
     options = rooms["rigs.fit"].BakeOptions(**wishes)
-    return rooms["rigs.rig_bake"].lay(rooms["rigs.rig_bake"].fitted(rig, table, source, bpy.context.scene, options))
+    return rooms["rigs.rig_bake"].apply_bake(rooms["rigs.rig_bake"].prepare_bake(rig, table, source, bpy.context.scene, options))
 
 
 @pytest.mark.parametrize("format", SUFFIXES)
 def test_nla_and_constraints_are_baked_first(rooms, body, tmp_path, format):
-    rig = rigs.mixamo()
+    rig = rigs.create_mixamo()
     baked(rooms, rig, body)
     skin(rig)
     data = rig.animation_data
@@ -163,7 +163,7 @@ def test_nla_and_constraints_are_baked_first(rooms, body, tmp_path, format):
 @pytest.mark.parametrize("format", ("FBX", "GLB", "USD"))
 @pytest.mark.parametrize("way", ("SMOOTH", "STRAIGHT"))
 def test_a_root_bone_is_added_to_the_copy(rooms, body, tmp_path, format, way):
-    rig = rigs.mixamo()
+    rig = rigs.create_mixamo()
     baked(rooms, rig, body)
     skin(rig)
     shown = look(rig, FRAMES_SHOWN)
@@ -177,7 +177,7 @@ def test_a_root_bone_is_added_to_the_copy(rooms, body, tmp_path, format, way):
 
 
 def test_in_place_stays(rooms, body, tmp_path):
-    rig = rigs.unreal()
+    rig = rigs.create_unreal()
     skin(rig)
     baked(rooms, rig, body)
     select(rig)
@@ -189,14 +189,14 @@ def test_in_place_stays(rooms, body, tmp_path):
 def test_another_rate(rooms, body, tmp_path):
     skin(body)
     bpy.context.scene.render.fps, bpy.context.scene.render.fps_base = 24, 1.001
-    rooms["rigs.export"].write(bpy.context, [body], rooms["rigs.export"].Wanted(tmp_path / "out.glb", "GLB", rate=30.0))
+    rooms["rigs.export"].export_motion(bpy.context, [body], rooms["rigs.export"].ExportOptions(tmp_path / "out.glb", "GLB", rate=30.0))
     seconds = (FRAMES - 1) / (24 / 1.001)
     found = read_back(tmp_path / "out.glb", int(np.floor(seconds * 30 + 1e-6)) + 1)
     assert len(found) >= 15
 
 
 def test_a_control_rig_goes_out_with_its_deform_bones(rooms, body, tmp_path):
-    rig = rigs.build(rigs.MIXAMO, "Controls", extra=[("control", None, "head"), ("helper", "mixamorig:Head", "head")])
+    rig = rigs.create_rig(rigs.MIXAMO, "Controls", extra=[("control", None, "head"), ("helper", "mixamorig:Head", "head")])
     for name in ("control", "helper"):
         rig.data.bones[name].use_deform = False
     baked(rooms, rig, body)
@@ -209,7 +209,7 @@ def test_a_control_rig_goes_out_with_its_deform_bones(rooms, body, tmp_path):
 
 
 def test_several_at_once(rooms, body, tmp_path):
-    other = rigs.mixamo()
+    other = rigs.create_mixamo()
     baked(rooms, other, body)
     select(body, other)
     assert export(tmp_path / "out.fbx", format="FBX") == {"FINISHED"}
@@ -231,22 +231,22 @@ def test_bad_places_and_choices_are_told(rooms, body, tmp_path, core, monkeypatc
     select(body)
 
     def complaint(**options):
-        before = state()
+        before = collect_state()
         with pytest.raises(RuntimeError) as error:
             export(**options)
-        assert state() == before and len(bpy.data.scenes) == 1
+        assert collect_state() == before and len(bpy.data.scenes) == 1
         assert "Traceback" not in str(error.value)
         return str(error.value)
 
     assert "does not exist" in complaint(path="", format="FBX") or True
     assert "cannot be written" in complaint(path=tmp_path / "nowhere" / "out.fbx", format="FBX")
-    still = rigs.mixamo()
+    still = rigs.create_mixamo()
     select(still)
     assert "does not move" in complaint(path=tmp_path / "out.fbx", format="FBX")
     bpy.ops.object.select_all(action="DESELECT")
     monkeypatch.setitem(rooms["rigs.export"]._OPERATORS, "USD", ("wm", "no_such_exporter"))
     with pytest.raises(core("base.errors").InputError, match="no USD exporter"):
-        rooms["rigs.export"].check("USD")
+        rooms["rigs.export"].check_exporter("USD")
 
 
 @pytest.mark.parametrize("suffix", (".fbx", ".glb", ".usdc"))
@@ -254,7 +254,7 @@ def test_what_the_command_delivers_comes_back(rooms, core, clip, tmp_path, suffi
     import types
 
     take = types.SimpleNamespace(motion=clip, ball=None, start_time=0.0)
-    rooms["rigs.deliver"].write(take, tmp_path / f"out{suffix}")
+    rooms["rigs.deliver"].write_result(take, tmp_path / f"out{suffix}")
     places, _ = core("motion.motion").forward_kinematics(clip)
     shown = {name: places[:, number] for number, name in enumerate(clip.skeleton.names)}
     assert_same(read_back(tmp_path / f"out{suffix}", FRAMES), shown)

@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 import pytest
 from conftest import EXTENSION
-from undo import assert_one_step, press, state
+from undo import assert_one_step, press_operator, collect_state
 
 CLIP = pathlib.Path(__file__).resolve().parents[3] / "sample_blend" / "library" / "kick_low_top.bvh"
 OPS = bpy.ops.beyond_mocap
@@ -40,14 +40,14 @@ def told():
 def send(core, port, rate=None, way="udp", path=CLIP):
     """Start a sender; returns its thread."""
     sender = core("passes.stream.sender").Sender(path, port, way, rate=rate)
-    thread = threading.Thread(target=sender.run, args=(lambda: False,))
+    thread = threading.Thread(target=sender.send_file, args=(lambda: False,))
     thread.start()
     return thread
 
 
 def follow(room, thread, seconds=20.0):
     """Look until the sender has gone and what it sent is shown; the strikes that were recognised."""
-    look, found, end = room("stream.follow").look, [], time.monotonic() + seconds
+    look, found, end = room("stream.follow").update_stream, [], time.monotonic() + seconds
     rest = None
     while time.monotonic() < end:
         found.append(look(bpy.context.scene))
@@ -60,11 +60,11 @@ def follow(room, thread, seconds=20.0):
 
 
 def test_the_body_does_what_arrives(room, core, port):
-    assert press(OPS.stream_start) == {"FINISHED"}
+    assert press_operator(OPS.stream_start) == {"FINISHED"}
     follow(room, send(core, port, 600.0))
     body = bpy.context.scene.beyond_mocap_stream.body
     assert body is not None and body.name == "Stream" and body.animation_data is None
-    motion = core("files.bvh.bvh").read(CLIP).motion
+    motion = core("files.bvh.bvh").read_bvh(CLIP).motion
     places, _ = core("motion.motion").forward_kinematics(motion)
     bpy.context.view_layer.update()
     shown = np.array([(body.matrix_world @ body.pose.bones[name].head)[:] for name in motion.skeleton.names])
@@ -77,7 +77,7 @@ def test_its_place_and_units_are_the_scenes(room, core, port):
     OPS.stream_start()
     follow(room, send(core, port, 600.0))
     body = bpy.context.scene.beyond_mocap_stream.body
-    motion = core("files.bvh.bvh").read(CLIP).motion
+    motion = core("files.bvh.bvh").read_bvh(CLIP).motion
     bpy.context.view_layer.update()
     hips = body.matrix_world @ body.pose.bones[motion.skeleton.names[0]].head
     np.testing.assert_allclose(np.array(hips) / 100.0, motion.root_positions[-1], atol=2e-3)
@@ -88,7 +88,7 @@ def test_it_can_be_put_aside(room, core, port):
     OPS.stream_start()
     follow(room, send(core, port, 600.0))
     body = bpy.context.scene.beyond_mocap_stream.body
-    motion = core("files.bvh.bvh").read(CLIP).motion
+    motion = core("files.bvh.bvh").read_bvh(CLIP).motion
     bpy.context.view_layer.update()
     upright = np.array([(body.matrix_world @ body.pose.bones[name].head)[:] for name in motion.skeleton.names])
     body.location, body.rotation_euler = (3.0, 1.0, 0.0), (0.0, 0.0, np.pi / 2)
@@ -118,18 +118,18 @@ def test_a_recording_can_be_kept(room, core, port):
 
 @pytest.mark.parametrize("rubbish", [b"hello", b"\xff\x00" * 300, b"1 2 3\n", b"HIERARCHY\n}}}\n", b"HIERARCHY ROOT"])
 def test_rubbish_changes_nothing(room, port, rubbish):
-    before = state()
+    before = collect_state()
     OPS.stream_start()
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as out:
         for _ in range(20):
             out.sendto(rubbish, ("127.0.0.1", port))
     end = time.monotonic() + 5.0
     while told().line.startswith("Waiting") and time.monotonic() < end:
-        room("stream.follow").look(bpy.context.scene)
+        room("stream.follow").update_stream(bpy.context.scene)
         time.sleep(0.02)
     assert "invalid pieces" in told().line
     OPS.stream_stop()
-    after = state()
+    after = collect_state()
     assert {name: after[name] for name in before} == before
 
 
@@ -145,13 +145,13 @@ def test_rubbish_amid_frames_is_left_out(room, core, port):
 
 
 def test_a_stream_that_stops_is_told_and_the_pose_stays(room, core, port, monkeypatch):
-    monkeypatch.setattr(core("passes.stream.listener"), "STALLED", 0.1)
+    monkeypatch.setattr(core("passes.stream.listener"), "STALL_SECONDS", 0.1)
     OPS.stream_start()
     follow(room, send(core, port, 600.0))
-    room("stream.follow").tell()
+    room("stream.follow").write_status()
     assert told().state == "stalled" and "no frame" in told().line
     before = [tuple(bone.rotation_quaternion) for bone in bpy.context.scene.beyond_mocap_stream.body.pose.bones]
-    room("stream.follow").look(bpy.context.scene)
+    room("stream.follow").update_stream(bpy.context.scene)
     assert before == [tuple(bone.rotation_quaternion) for bone in bpy.context.scene.beyond_mocap_stream.body.pose.bones]
 
 
@@ -160,7 +160,7 @@ def test_a_file_that_is_loaded_ends_the_stream(room, core, port, tmp_path):
     OPS.stream_start()
     listener = room("stream.follow").current_listener()
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "a.blend"))
-    assert room("stream.follow").current_listener() is None and not listener.running
+    assert room("stream.follow").current_listener() is None and not listener.is_running
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as again:
         again.bind(("127.0.0.1", port))
 
@@ -169,7 +169,7 @@ def test_a_taken_port_is_told(room, port):
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
         taken.bind(("127.0.0.1", port))
         with pytest.raises(RuntimeError, match="not available"):
-            press(OPS.stream_start)
+            press_operator(OPS.stream_start)
     assert not told().on
 
 
@@ -180,13 +180,13 @@ def test_what_cannot_be_pressed_says_why(room, port):
     with pytest.raises(RuntimeError, match="press Stop Stream first"):
         OPS.stream_start()
     with pytest.raises(RuntimeError, match="nothing has arrived yet"):
-        press(OPS.stream_keep)
+        press_operator(OPS.stream_keep)
 
 
 def test_a_suits_file_that_is_none(room, port, tmp_path):
     bpy.context.scene.beyond_mocap_stream.clip = str(tmp_path / "none.bvh")
     with pytest.raises(RuntimeError, match="no such file"):
-        press(OPS.stream_start)
+        press_operator(OPS.stream_start)
     assert room("stream.follow").current_listener() is None
 
 

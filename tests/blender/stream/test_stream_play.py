@@ -11,7 +11,7 @@ import bpy
 import numpy as np
 import pytest
 from conftest import EXTENSION
-from undo import assert_one_step, press
+from undo import assert_one_step, press_operator
 
 SAMPLE = pathlib.Path(__file__).resolve().parents[3] / "sample_blend"
 CLIPS = SAMPLE / "passes" / "library"
@@ -38,11 +38,11 @@ def playing(room, cache):
     scene = bpy.context.scene
     scene.render.fps = 24
     chosen = bpy.context.preferences.addons[EXTENSION].preferences
-    chosen.cache_folder = str(cache)
+    chosen.find_cache_folder = str(cache)
     OPS.passes_sample(sample="three")
     scene.beyond_mocap_passes.library_folder, scene.beyond_mocap_passes.start_frame = str(CLIPS), 5
     scene.frame_set(5)
-    assert press(OPS.stream_play) == {"FINISHED"}
+    assert press_operator(OPS.stream_play) == {"FINISHED"}
     yield scene
     chosen.property_unset("cache_folder")
 
@@ -52,7 +52,7 @@ def told():
 
 
 def kick(core, name="volley_pass"):
-    return core("passes.hits").analyse(core("files.bvh.bvh").read(CLIPS / f"{name}.bvh").motion).strongest
+    return core("passes.hits").detect_hits(core("files.bvh.bvh").read_bvh(CLIPS / f"{name}.bvh").motion).strongest
 
 
 def places(scene, frames):
@@ -66,7 +66,7 @@ def places(scene, frames):
 
 def test_all_stand_and_the_ball_lies(playing, room):
     assert (
-        room("stream.play").rally().holder == "Ann" and told().playing and told().played.startswith("Ann has the ball")
+        room("stream.play").current_rally().holder == "Ann" and told().playing and told().played.startswith("Ann has the ball")
     )
     assert all(row.body is not None for row in playing.beyond_mocap_passes.players)
     assert playing.frame_end >= 5 + 60 * 24
@@ -94,17 +94,17 @@ def test_a_strike_is_answered_from_now_on(playing, room, core):
 def test_whom_the_user_chooses_gets_it(playing, room, core):
     play = room("stream.play")
     with pytest.raises(RuntimeError, match="Ann has the ball"):
-        press(OPS.stream_target, number=1)
+        press_operator(OPS.stream_target, number=1)
     with pytest.raises(RuntimeError, match="1 to 3"):
-        press(OPS.stream_target, number=7)
+        press_operator(OPS.stream_target, number=7)
     OPS.stream_target(number=3)
     assert playing.beyond_mocap_stream.target == "Cho"
     assert play.answer_now(playing, kick(core)).receiver == "Cho"
     ben = next(row.body for row in playing.beyond_mocap_passes.players if row.name == "Ben")
-    play.look(playing)
+    play.update_rally(playing)
     bpy.context.view_layer.objects.active = ben
-    play.look(playing)
-    assert play.target(playing) == "Ben"
+    play.update_rally(playing)
+    assert play.find_target(playing) == "Ben"
 
 
 def test_a_stream_is_answered(playing, room, core):
@@ -115,63 +115,63 @@ def test_a_stream_is_answered(playing, room, core):
     playing.beyond_mocap_stream.port = port
     OPS.stream_start()
     sender = core("passes.stream.sender").Sender(CLIPS / "volley_toss.bvh", port)
-    thread = threading.Thread(target=sender.run, args=(lambda: False,))
+    thread = threading.Thread(target=sender.send_file, args=(lambda: False,))
     thread.start()
-    look, end = room("stream.follow").look, time.monotonic() + 60.0
-    while room("stream.play").rally().passes == 0 and time.monotonic() < end:
+    look, end = room("stream.follow").update_stream, time.monotonic() + 60.0
+    while room("stream.play").current_rally().passes == 0 and time.monotonic() < end:
         look(playing)
         time.sleep(0.02)
     thread.join()
-    assert room("stream.play").rally().passes == 1 and "Ann played volley_toss" in told().played
+    assert room("stream.play").current_rally().passes == 1 and "Ann played volley_toss" in told().played
 
 
 def test_what_cannot_be_answered_is_told_and_changes_nothing(playing, room, core):
     play = room("stream.play")
     actions = {row.name: row.body.animation_data.action.name for row in playing.beyond_mocap_passes.players}
     tail = replace(kick(core), part="tail")
-    play.struck(playing, tail, 0.0)
+    play.store_strike(playing, tail, 0.0)
     end = time.monotonic() + 60.0
     while "has the ball" in told().played and time.monotonic() < end:
-        play.look(playing)
+        play.update_rally(playing)
         time.sleep(0.02)
-    assert play.rally().passes == 0 and play.rally().holder == "Ann" and told().played
+    assert play.current_rally().passes == 0 and play.current_rally().holder == "Ann" and told().played
     assert actions == {row.name: row.body.animation_data.action.name for row in playing.beyond_mocap_passes.players}
 
 
 def test_stop_playing(playing, room):
     assert OPS.stream_end() == {"FINISHED"}
-    assert room("stream.play").rally() is None and not told().playing
+    assert room("stream.play").current_rally() is None and not told().playing
     with pytest.raises(RuntimeError, match="press Play Live first"):
         OPS.stream_end()
 
 
 def test_a_file_that_is_loaded_ends_it(playing, room):
     bpy.ops.wm.read_homefile(use_empty=True)
-    assert room("stream.play").rally() is None
+    assert room("stream.play").current_rally() is None
 
 
 def test_it_is_one_step(playing, room):
     OPS.stream_end()
     OPS.passes_clear()
     assert_one_step(OPS.stream_play)
-    assert room("stream.play").rally() is None and "Undo has ended" in told().played
+    assert room("stream.play").current_rally() is None and "Undo has ended" in told().played
 
 
 def test_an_armature_can_show_how(playing, room):
     """Its strike nearest to the present frame, without any stream; not one that has none."""
     with pytest.raises(RuntimeError, match="no strike with the foot"):
         bpy.context.view_layer.objects.active = playing.beyond_mocap_passes.players[1].body
-        press(OPS.stream_act)
+        press_operator(OPS.stream_act)
     bpy.ops.beyond_mocap.import_clips(filepath=str(CLIPS / "volley_toss.bvh"))
-    assert press(OPS.stream_act) == {"FINISHED"}
-    assert room("stream.play").rally().passes == 1 and "Ann played volley_toss" in told().played
+    assert press_operator(OPS.stream_act) == {"FINISHED"}
+    assert room("stream.play").current_rally().passes == 1 and "Ann played volley_toss" in told().played
 
 
 def test_a_scene_that_is_cleared_ends_it(playing, room):
     OPS.passes_clear()
     assert all(row.body is None for row in playing.beyond_mocap_passes.players)
-    room("stream.play").look(playing)
-    assert room("stream.play").rally() is None and "cleared" in told().played
+    room("stream.play").update_rally(playing)
+    assert room("stream.play").current_rally() is None and "cleared" in told().played
 
 
 def test_choosing_is_one_step(playing):
@@ -180,4 +180,4 @@ def test_choosing_is_one_step(playing):
 
 def test_an_unknown_holder_is_told(playing):
     with pytest.raises(RuntimeError, match="holder"):
-        press(OPS.stream_play, holder="Zoe")
+        press_operator(OPS.stream_play, holder="Zoe")

@@ -6,7 +6,7 @@ import bpy
 import made
 import numpy as np
 import pytest
-from undo import state
+from undo import collect_state
 
 SMALL = {"engine": "CYCLES", "width": 48, "height": 28, "fps": 10, "samples": 1}
 
@@ -15,10 +15,10 @@ SMALL = {"engine": "CYCLES", "width": 48, "height": 28, "fps": 10, "samples": 1}
 def study(core, tmp_path):
     """A folder with a study: two systems show the same motion, one of them four metres away; training is movies."""
     order, files, bvh = core("study.order"), core("study.order"), core("files.bvh.bvh")
-    here = made.motion(core, 7)
+    here = made.build_motion(core, 7)
     there = core("motion.motion").Motion(here.skeleton, here.root_positions + [4.0, 2.0, 0.0], here.rotations, here.fps)
-    bvh.write(tmp_path / "a.bvh", here)
-    bvh.write(tmp_path / "b.bvh", there)
+    bvh.write_bvh(tmp_path / "a.bvh", here)
+    bvh.write_bvh(tmp_path / "b.bvh", there)
     for name in ("good", "bad"):
         (tmp_path / f"{name}.mp4").write_bytes(name.encode())
     rows = (("good.mp4", "training"), ("bad.mp4", "training"), ("a.bvh", "ours"), ("b.bvh", "theirs"))
@@ -41,9 +41,9 @@ def pixels(path):
 
 def test_pictures_show_the_same_wherever_a_body_is(study):
     folder, names = study
-    before, things = state(), {kind: len(getattr(bpy.data, kind)) for kind in ("objects", "scenes", "meshes", "worlds")}
+    before, things = collect_state(), {kind: len(getattr(bpy.data, kind)) for kind in ("objects", "scenes", "meshes", "worlds")}
     assert bpy.ops.beyond_mocap.study_render(directory=f"{folder}/", pictures=True, **SMALL) == {"FINISHED"}
-    assert state() == before
+    assert collect_state() == before
     assert {kind: len(getattr(bpy.data, kind)) for kind in things} == things
     frames = {file: sorted((folder / "clips" / names[file]).iterdir()) for file in ("a.bvh", "b.bvh")}
     assert [path.name for path in frames["a.bvh"]] == ["0001.png", "0002.png", "0003.png"]
@@ -89,7 +89,7 @@ def test_pictures_that_cannot_be_made_again_stay(study, extension, core, monkeyp
     def broken(_path, *_):
         raise core("base.errors").InputError("film", "no light")
 
-    monkeypatch.setattr(importlib.import_module(f"{extension.__name__}.scene.study"), "film", broken)
+    monkeypatch.setattr(importlib.import_module(f"{extension.__name__}.scene.study"), "render_motion", broken)
     with pytest.raises(RuntimeError, match="no light"):
         bpy.ops.beyond_mocap.study_render(directory=f"{folder}/", pictures=True, again=True, **SMALL)
     assert (shown / "0001.png").read_bytes() == b"before"
@@ -111,8 +111,8 @@ def test_what_is_missing_is_told_before_anything_is_rendered(study, spoil, words
 @pytest.mark.parametrize("engine", ["AUTO", "EEVEE", "CYCLES", "WORKBENCH"])
 def test_every_engine_of_this_blender_takes_the_settings(extension, engine):
     study = importlib.import_module(f"{extension.__name__}.scene.study")
-    scene, name = bpy.context.scene, study.engine_here(engine)
-    study._settings(scene, study.Look(name, (64, 36), 25, 3))
+    scene, name = bpy.context.scene, study.find_engine(engine)
+    study._apply_settings(scene, study.RenderLook(name, (64, 36), 25, 3))
     assert scene.render.engine == name and (scene.render.fps, scene.render.resolution_x) == (25, 64)
     assert engine != "AUTO" or name == "CYCLES"  # there is no window here
 
@@ -124,16 +124,16 @@ def test_without_the_cycles_add_on_another_engine_renders(extension, engine):
     study = importlib.import_module(f"{extension.__name__}.scene.study")
     addon_utils.disable("cycles")
     try:
-        name = study.engine_here(engine)
-        study._settings(bpy.context.scene, study.Look(name, (64, 36), 25, 3))
+        name = study.find_engine(engine)
+        study._apply_settings(bpy.context.scene, study.RenderLook(name, (64, 36), 25, 3))
     finally:
         addon_utils.enable("cycles")
     assert name.startswith("BLENDER_EEVEE") and bpy.context.scene.render.engine == name
-    assert study.engine_here(engine) == "CYCLES"
+    assert study.find_engine(engine) == "CYCLES"
 
 
 def test_the_camera_glides_without_lag(extension):
-    followed = importlib.import_module(f"{extension.__name__}.scene.study").followed
+    followed = importlib.import_module(f"{extension.__name__}.scene.study").smooth_path
     time = np.arange(90) / 30.0
     straight = np.stack([3.0 * time, 1.0 - time], axis=1)
     assert np.allclose(followed(straight, 30.0), straight, atol=1e-9)

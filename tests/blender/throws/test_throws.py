@@ -12,8 +12,8 @@ import ride_rigs
 import sample_rigs as rigs
 import worlds
 from conftest import EXTENSION
-from throw_models import model_file
-from undo import assert_one_step, press, state
+from throw_models import write_model_file
+from undo import assert_one_step, press_operator, collect_state
 
 SAMPLE = pathlib.Path(__file__).resolve().parents[3] / "sample_blend" / "library"
 TARGET = (18.0, 1.0, 1.2)
@@ -24,7 +24,7 @@ def work_once(extension):
     """The same order is worked out once."""
     core = importlib.import_module(f"{extension.__name__}.beyond_mocap.library.library")
     with pytest.MonkeyPatch.context() as monkeypatch:
-        remembered.remember(monkeypatch, core.Library)
+        remembered.cache_work(monkeypatch, core.Library)
         yield
 
 
@@ -32,7 +32,7 @@ def work_once(extension):
 def usual_model(monkeypatch):
     """Bodies throw by that model."""
     files = importlib.import_module(f"{EXTENSION}.beyond_mocap.throws.network_npz")
-    monkeypatch.setattr(files, "shipped_model", lambda action: files.read_model(model_file(action)))
+    monkeypatch.setattr(files, "read_shipped_model", lambda action: files.read_model(write_model_file(action)))
 
 
 @pytest.fixture
@@ -82,7 +82,7 @@ def closest(ball, target, first, last):
 @pytest.mark.parametrize("fps", [(30, 1.0), (24, 1.001)])
 def test_the_ball_leaves_the_hand_and_hits(room, fps):
     body = a_body(fps=fps)
-    assert press(bpy.ops.beyond_mocap.throw_at_target) == {"FINISHED"}
+    assert press_operator(bpy.ops.beyond_mocap.throw_at_target) == {"FINISHED"}
     wish = body.beyond_mocap_throw
     assert wish.made == "throw" and abs(wish.release - 60.0) <= 0.51
     ball, first = wish.flown, int(np.floor(wish.release))
@@ -108,7 +108,7 @@ def bpy_vector(values):
 def test_the_models_that_come_with_it(act, monkeypatch):
     monkeypatch.undo()  # the extension's own
     body = a_body()
-    assert press(getattr(bpy.ops.beyond_mocap, f"{act}_at_target")) == {"FINISHED"}
+    assert press_operator(getattr(bpy.ops.beyond_mocap, f"{act}_at_target")) == {"FINISHED"}
     wish, first = body.beyond_mocap_throw, int(np.floor(body.beyond_mocap_throw.release))
     assert closest(wish.flown, np.array(TARGET), first + 1, first + 60) < 0.10
     moved = next(line for line in wish.figures.splitlines() if "correction" in line)
@@ -118,53 +118,53 @@ def test_the_models_that_come_with_it(act, monkeypatch):
 def test_a_library_joins_it(room, clips):
     bpy.context.scene.beyond_mocap.library_folder = str(clips)
     body = a_body("walking_1_2", frame=70)
-    own = room("core.action").read(body, bpy.context.scene)
-    assert press(bpy.ops.beyond_mocap.throw_at_target) == {"FINISHED"}
+    own = room("core.action").read_motion(body, bpy.context.scene)
+    assert press_operator(bpy.ops.beyond_mocap.throw_at_target) == {"FINISHED"}
     wish = body.beyond_mocap_throw
     shares = [line for line in wish.figures.splitlines() if line.startswith("Transition jerk")]
     assert float(shares[0].split(":")[1].rstrip(" %")) <= 100.0
-    now = room("core.action").read(body, bpy.context.scene)
+    now = room("core.action").read_motion(body, bpy.context.scene)
     assert len(now) >= len(own)
 
 
 def test_a_ball_that_lies_is_kicked_into_the_target(room):
     goal = (16.0, 3.0, 0.8)
     body = a_body(target=goal)
-    ball = importlib.import_module(f"{EXTENSION}.scene.stage.ball").create(
+    ball = importlib.import_module(f"{EXTENSION}.scene.stage.ball").create_ball(
         bpy.context, "Ball of mine", bpy.context.scene.collection
     )
     ball.location = (1.5, 0.5, 0.11)
     wish = body.beyond_mocap_throw
     wish.ball = ball
-    assert press(bpy.ops.beyond_mocap.kick_at_target) == {"FINISHED"}
+    assert press_operator(bpy.ops.beyond_mocap.kick_at_target) == {"FINISHED"}
     assert wish.made == "kick" and wish.flown == ball and not ball.constraints
     first = int(np.floor(wish.release))
     assert closest(ball, np.array(goal), first + 1, first + 60) < 0.10
     for frame in (1, first - 10, first):
         assert ball_at(ball, frame) == pytest.approx((1.5, 0.5, 0.11), abs=1e-4)
     # the foot is at the ball when it leaves
-    toe = room("passes.possession").bone_of(bpy.context.scene, body, "foot", "right")
+    toe = room("passes.possession").find_bone(bpy.context.scene, body, "foot", "right")
     bpy.context.scene.frame_set(first)
     away = np.array(body.matrix_world @ body.pose.bones[toe].head) - (1.5, 0.5, 0.11)
     assert np.linalg.norm(away) < 0.5
-    press(bpy.ops.beyond_mocap.leave_throw)
+    press_operator(bpy.ops.beyond_mocap.leave_throw)
     assert tuple(ball.location) == pytest.approx((1.5, 0.5, 0.11)) and ball.animation_data is None
 
 
 def test_again_with_another_target_begins_from_the_same_motion(room):
     body = a_body()
-    before = room("core.action").read(body, bpy.context.scene)
-    press(bpy.ops.beyond_mocap.throw_at_target)
+    before = room("core.action").read_motion(body, bpy.context.scene)
+    press_operator(bpy.ops.beyond_mocap.throw_at_target)
     wish = body.beyond_mocap_throw
     wish.target.location.y += 2.0
     bpy.context.view_layer.update()
     count = len(bpy.data.actions), len(bpy.data.objects)
-    press(bpy.ops.beyond_mocap.throw_at_target)
+    press_operator(bpy.ops.beyond_mocap.throw_at_target)
     assert (len(bpy.data.actions), len(bpy.data.objects)) == count
     first = int(np.floor(wish.release))
     assert closest(wish.flown, np.array(TARGET) + [0.0, 2.0, 0.0], first + 1, first + 60) < 0.10
-    press(bpy.ops.beyond_mocap.leave_throw)
-    after = room("core.action").read(body, bpy.context.scene)
+    press_operator(bpy.ops.beyond_mocap.leave_throw)
+    after = room("core.action").read_motion(body, bpy.context.scene)
     assert np.array_equal(after.rotations, before.rotations) and len(bpy.data.objects) == 2 + 0
 
 
@@ -176,39 +176,39 @@ def test_all_is_as_before_when_it_is_left():
     bpy.context.scene.collection.objects.link(ball)
     wish.ball = ball
     bpy.context.scene.frame_end = 250
-    before = state()
-    press(bpy.ops.beyond_mocap.throw_at_target)
+    before = collect_state()
+    press_operator(bpy.ops.beyond_mocap.throw_at_target)
     assert wish.flown == ball and len(ball.constraints) == 1
-    press(bpy.ops.beyond_mocap.leave_throw)
-    after = state()
+    press_operator(bpy.ops.beyond_mocap.leave_throw)
+    after = collect_state()
     assert {key for key in before if before[key] != after[key]} <= {"materials", "collections", "frames"}
     assert tuple(ball.location) == pytest.approx((0.3, 0.2, 0.5))
 
 
 def test_kept_it_is_the_own_motion(room):
     body = a_body()
-    press(bpy.ops.beyond_mocap.throw_at_target)
+    press_operator(bpy.ops.beyond_mocap.throw_at_target)
     wish = body.beyond_mocap_throw
-    ball, shown = wish.flown, room("core.action").read(body, bpy.context.scene)
-    press(bpy.ops.beyond_mocap.keep_throw)
+    ball, shown = wish.flown, room("core.action").read_motion(body, bpy.context.scene)
+    press_operator(bpy.ops.beyond_mocap.keep_throw)
     assert not wish.made and wish.flown is None and ball.name in bpy.context.scene.objects
-    assert np.array_equal(room("core.action").read(body, bpy.context.scene).rotations, shown.rotations)
+    assert np.array_equal(room("core.action").read_motion(body, bpy.context.scene).rotations, shown.rotations)
     wish.frame = 200  # the next one begins from it
-    press(bpy.ops.beyond_mocap.throw_at_target)
+    press_operator(bpy.ops.beyond_mocap.throw_at_target)
     assert wish.flown != ball
-    now = room("core.action").read(body, bpy.context.scene)
+    now = room("core.action").read_motion(body, bpy.context.scene)
     assert np.allclose(now.rotations[:60], shown.rotations[:60], atol=1e-6)
 
 
 def test_an_armature_that_plays_nothing_stands(core):
     armature = importlib.import_module(f"{EXTENSION}.scene.rigs.armature")
-    skeleton = core("motion.retargeting.adult").adult_skeleton()
-    body = armature.create(bpy.context, skeleton, "Thrower", bpy.context.scene.collection)
+    skeleton = core("motion.retargeting.adult").build_adult_skeleton()
+    body = armature.create_armature(bpy.context, skeleton, "Thrower", bpy.context.scene.collection)
     body.location, body.rotation_euler = (2.0, -1.0, 0.0), (0.0, 0.0, 0.4)
-    worlds.choose(body)
+    worlds.select_objects(body)
     bpy.context.scene.cursor.location = (12.0, 3.0, 1.0)
     bpy.context.scene.frame_set(80)
-    assert press(bpy.ops.beyond_mocap.throw_at_target) == {"FINISHED"}
+    assert press_operator(bpy.ops.beyond_mocap.throw_at_target) == {"FINISHED"}
     wish = body.beyond_mocap_throw
     first = int(np.floor(wish.release))
     assert abs(wish.release - 80.0) <= 0.51
@@ -228,18 +228,18 @@ def test_unit_scale(room):
     scene = bpy.context.scene
     scene.unit_settings.scale_length = 0.01
     body = a_body(target=[100.0 * value for value in TARGET])
-    assert press(bpy.ops.beyond_mocap.throw_at_target) == {"FINISHED"}
+    assert press_operator(bpy.ops.beyond_mocap.throw_at_target) == {"FINISHED"}
     wish = body.beyond_mocap_throw
     first = int(np.floor(wish.release))
     assert closest(wish.flown, 100.0 * np.array(TARGET), first + 1, first + 60) < 10.0
 
 
 def refused(match, operator=bpy.ops.beyond_mocap.throw_at_target):
-    before = state()
+    before = collect_state()
     with pytest.raises(RuntimeError, match=match) as caught:
         operator()
     assert "Traceback" not in str(caught.value)
-    assert state() == before
+    assert collect_state() == before
 
 
 def test_what_is_refused(tmp_path):
@@ -250,7 +250,7 @@ def test_what_is_refused(tmp_path):
     (tmp_path / "bad.npz").write_bytes(b"PK\x03\x04 truncated")
     wish.throw_model = str(tmp_path / "bad.npz")
     refused("bad.npz")
-    wish.throw_model = model_file("kick")
+    wish.throw_model = write_model_file("kick")
     refused("trained for")
     wish.throw_model = ""
     wish.target.location = (400.0, 0.0, 0.0)
@@ -267,7 +267,7 @@ def test_what_is_refused(tmp_path):
 
 
 def test_a_body_without_hands_is_refused(core):
-    skeleton = core("motion.retargeting.adult").adult_skeleton()
+    skeleton = core("motion.retargeting.adult").build_adult_skeleton()
     legs = [j for j, name in enumerate(skeleton.names) if "Arm" not in name and "Hand" not in name]
     table = {"names": [skeleton.names[j] for j in legs],
              "parents": [legs.index(skeleton.parents[j]) if j else -1 for j in legs]}
@@ -276,19 +276,19 @@ def test_a_body_without_hands_is_refused(core):
         tuple(table["names"]), tuple(table["parents"]), skeleton.offsets[legs], (), np.zeros((0, 3))
     )
     armature = importlib.import_module(f"{EXTENSION}.scene.rigs.armature")
-    worlds.choose(armature.create(bpy.context, small, "Legs", bpy.context.scene.collection))
+    worlds.select_objects(armature.create_armature(bpy.context, small, "Legs", bpy.context.scene.collection))
     bpy.context.scene.cursor.location = (12.0, 0.0, 1.0)
     refused("hand|arm")
 
 
 @pytest.mark.parametrize("kind", ["mixamo", "walk_ik"])
 def test_rigs(kind, room):
-    body = rigs.mixamo() if kind == "mixamo" else ride_rigs.walk_ik()
-    worlds.choose(body)
+    body = rigs.create_mixamo() if kind == "mixamo" else ride_rigs.create_ik_rig()
+    worlds.select_objects(body)
     wish = body.beyond_mocap_throw
     wish.target, wish.frame = an_empty(TARGET), 60
-    before = state()
-    assert press(bpy.ops.beyond_mocap.throw_at_target) == {"FINISHED"}
+    before = collect_state()
+    assert press_operator(bpy.ops.beyond_mocap.throw_at_target) == {"FINISHED"}
     assert wish.rigged == (kind == "walk_ik")
     ball, first = wish.flown, int(np.floor(wish.release))
     assert closest(ball, np.array(TARGET), first + 1, first + 60) < 0.10
@@ -296,49 +296,49 @@ def test_rigs(kind, room):
     assert max(steps) < 1.5 * min(steps[-2:])  # no jump from the hand into the flight
     wish.target.location.y += 1.0
     bpy.context.view_layer.update()
-    press(bpy.ops.beyond_mocap.throw_at_target)
+    press_operator(bpy.ops.beyond_mocap.throw_at_target)
     assert closest(wish.flown, np.array(TARGET) + [0.0, 1.0, 0.0], first - 2, first + 60) < 0.10
     wish.target.location.y -= 1.0
-    press(bpy.ops.beyond_mocap.leave_throw)
+    press_operator(bpy.ops.beyond_mocap.leave_throw)
     bpy.context.scene.frame_set(1)
-    after = state()
+    after = collect_state()
     assert {key for key in before if before[key] != after[key]} <= {"materials", "collections", "frames"}
 
 
 def test_a_kicked_ball_that_was_kept_is_not_lost_by_the_next_kick():
     body = a_body()
     wish = body.beyond_mocap_throw
-    press(bpy.ops.beyond_mocap.kick_at_target)
+    press_operator(bpy.ops.beyond_mocap.kick_at_target)
     ball = wish.flown
     name, action, scale = ball.name, ball.animation_data.action.name, tuple(ball.scale)
-    press(bpy.ops.beyond_mocap.keep_throw)
+    press_operator(bpy.ops.beyond_mocap.keep_throw)
     wish.ball, wish.frame, wish.kind = ball, 150, "handball"
-    press(bpy.ops.beyond_mocap.kick_at_target)
+    press_operator(bpy.ops.beyond_mocap.kick_at_target)
     assert wish.flown.name == name and tuple(ball.scale) == scale
-    press(bpy.ops.beyond_mocap.leave_throw)
+    press_operator(bpy.ops.beyond_mocap.leave_throw)
     assert bpy.data.objects[name].animation_data.action.name == action
 
 
 def test_a_kept_throw_of_a_rig_and_a_bake_are_not_lost_by_the_next_throw():
-    body = ride_rigs.walk_ik()
-    worlds.choose(body)
+    body = ride_rigs.create_ik_rig()
+    worlds.select_objects(body)
     wish = body.beyond_mocap_throw
     wish.target, wish.frame = an_empty(TARGET), 60
-    press(bpy.ops.beyond_mocap.throw_at_target)
-    press(bpy.ops.beyond_mocap.keep_throw)
+    press_operator(bpy.ops.beyond_mocap.throw_at_target)
+    press_operator(bpy.ops.beyond_mocap.keep_throw)
     kept = body.animation_data.action
     kept["beyond_mocap_rig"], kept["beyond_mocap_before"], name = True, "{}", kept.name  # as one that was baked
     wish.frame = 100
-    press(bpy.ops.beyond_mocap.throw_at_target)
+    press_operator(bpy.ops.beyond_mocap.throw_at_target)
     assert body.animation_data.action.name != name
-    press(bpy.ops.beyond_mocap.leave_throw)
+    press_operator(bpy.ops.beyond_mocap.leave_throw)
     kept = body.animation_data.action
     assert kept.name == name and kept["beyond_mocap_rig"]
 
 
 def a_ball(place, name="Ball of mine"):
     balls = importlib.import_module(f"{EXTENSION}.scene.stage.ball")
-    ball = balls.create(bpy.context, name, bpy.context.scene.collection)
+    ball = balls.create_ball(bpy.context, name, bpy.context.scene.collection)
     ball.location = place
     return ball
 
@@ -347,11 +347,11 @@ def test_a_ball_in_the_air_is_kicked_where_it_is_or_refused_with_its_height():
     body = a_body(target=(16.0, 3.0, 0.8))
     wish = body.beyond_mocap_throw
     wish.ball = a_ball((1.5, 0.5, 0.25))
-    press(bpy.ops.beyond_mocap.kick_at_target)
+    press_operator(bpy.ops.beyond_mocap.kick_at_target)
     first = int(np.floor(wish.release))
     assert ball_at(wish.ball, first) == pytest.approx((1.5, 0.5, 0.25), abs=1e-4)
     assert closest(wish.ball, np.array((16.0, 3.0, 0.8)), first + 1, first + 60) < 0.10
-    press(bpy.ops.beyond_mocap.leave_throw)
+    press_operator(bpy.ops.beyond_mocap.leave_throw)
     wish.ball.location.z = 5.0
     bpy.context.view_layer.update()
     refused("5.00 m above the ground", bpy.ops.beyond_mocap.kick_at_target)
@@ -362,32 +362,32 @@ def test_nothing_is_left_of_a_shown_ball_that_was_deleted(deleted):
     body = a_body()
     bpy.context.scene.frame_end = 250
     actions, things = {one.name for one in bpy.data.actions}, {one.name for one in bpy.data.objects}
-    press(bpy.ops.beyond_mocap.throw_at_target)
+    press_operator(bpy.ops.beyond_mocap.throw_at_target)
     ball = body.beyond_mocap_throw.flown
     if deleted == "of the file":
         bpy.data.objects.remove(ball)
     else:
         with bpy.context.temp_override(selected_objects=[ball], active_object=ball):
             bpy.ops.object.delete()
-    press(bpy.ops.beyond_mocap.leave_throw)
+    press_operator(bpy.ops.beyond_mocap.leave_throw)
     assert {one.name for one in bpy.data.actions} == actions
     assert {one.name for one in bpy.data.objects} == things
-    press(bpy.ops.beyond_mocap.throw_at_target)  # and a new one is made
+    press_operator(bpy.ops.beyond_mocap.throw_at_target)  # and a new one is made
     assert body.beyond_mocap_throw.flown.name in bpy.context.scene.objects
 
 
 def test_a_throw_that_begins_before_the_scene_is_told_or_waits():
     body = a_body(frame=1)
     wish = body.beyond_mocap_throw
-    press(bpy.ops.beyond_mocap.throw_at_target)
+    press_operator(bpy.ops.beyond_mocap.throw_at_target)
     assert "before the scene's first frame 1: set Release Frame to" in wish.told
     frame = int(wish.told.split("Release Frame to ")[1].split()[0])
     wish.frame = frame
-    press(bpy.ops.beyond_mocap.throw_at_target)
+    press_operator(bpy.ops.beyond_mocap.throw_at_target)
     assert "first frame" not in wish.told and wish.release == pytest.approx(frame, abs=0.51)
     wish.frame = 0  # now, or as soon as it fits in
     bpy.context.scene.frame_set(1)
-    press(bpy.ops.beyond_mocap.throw_at_target)
+    press_operator(bpy.ops.beyond_mocap.throw_at_target)
     assert wish.release == pytest.approx(frame, abs=1.51) and "the ball leaves on frame" in wish.told
 
 
@@ -395,14 +395,14 @@ def test_a_throw_that_begins_before_the_scene_is_told_or_waits():
 def test_a_kept_ball_is_thrown_again(first):
     body = a_body("walking_1_2")
     wish = body.beyond_mocap_throw
-    press(getattr(bpy.ops.beyond_mocap, f"{first}_at_target"))
+    press_operator(getattr(bpy.ops.beyond_mocap, f"{first}_at_target"))
     ball, release = wish.flown, wish.release
-    press(bpy.ops.beyond_mocap.keep_throw)
+    press_operator(bpy.ops.beyond_mocap.keep_throw)
     frames = [*range(40, int(release) + 50, 3)]
     way = np.array([ball_at(ball, frame) for frame in frames])
     names = {one.name for one in bpy.data.actions}
     wish.ball, wish.frame = ball, 260
-    press(bpy.ops.beyond_mocap.throw_at_target)
+    press_operator(bpy.ops.beyond_mocap.throw_at_target)
     again = int(np.floor(wish.release))
     assert np.abs([ball_at(ball, frame) - place for frame, place in zip(frames, way)]).max() < 2e-3
     assert closest(ball, np.array(TARGET), again + 1, again + 60) < 0.10
@@ -411,10 +411,10 @@ def test_a_kept_ball_is_thrown_again(first):
         assert np.linalg.norm(ball_at(ball, frame) - np.array(body.matrix_world @ hand.head)) < 0.3
     wish.target.location.y -= 1.0
     bpy.context.view_layer.update()
-    press(bpy.ops.beyond_mocap.throw_at_target)  # again, with the same ball
+    press_operator(bpy.ops.beyond_mocap.throw_at_target)  # again, with the same ball
     assert closest(ball, np.array(TARGET) - [0.0, 1.0, 0.0], again - 1, again + 60) < 0.10
     assert np.abs([ball_at(ball, frame) - place for frame, place in zip(frames, way)]).max() < 2e-3
-    press(bpy.ops.beyond_mocap.leave_throw)
+    press_operator(bpy.ops.beyond_mocap.leave_throw)
     assert np.abs([ball_at(ball, frame) - place for frame, place in zip(frames, way)]).max() < 2e-3
     assert {one.name for one in bpy.data.actions} == names
 
@@ -427,12 +427,12 @@ def test_a_ball_that_rolls_or_was_put_down_is_kicked_where_it_is_by_then(room):
     ball.keyframe_insert("location", frame=101)
     wish.ball = ball
     rolls = [ball_at(ball, frame) for frame in (10, 30, 59, 60)]
-    press(bpy.ops.beyond_mocap.kick_at_target)
+    press_operator(bpy.ops.beyond_mocap.kick_at_target)
     for frame, place in zip((10, 30, 59, 60), rolls):
         assert ball_at(ball, frame) == pytest.approx(place, abs=0.02 if frame == 60 else 1e-3)
     first = int(np.floor(wish.release))
     assert closest(ball, np.array((16.0, 3.0, 0.8)), first + 1, first + 60) < 0.10
-    press(bpy.ops.beyond_mocap.leave_throw)
+    press_operator(bpy.ops.beyond_mocap.leave_throw)
     assert np.allclose([ball_at(ball, frame) for frame in (10, 30, 59, 60)], rolls, atol=1e-6)
 
 
@@ -440,7 +440,7 @@ def test_whose_throw_a_ball_shows_keeps_it_from_others():
     one = a_body(target=(16.0, 3.0, 0.8))
     ball = a_ball((1.5, 0.5, 0.11))
     one.beyond_mocap_throw.ball = ball
-    press(bpy.ops.beyond_mocap.kick_at_target)
+    press_operator(bpy.ops.beyond_mocap.kick_at_target)
     shown = ball_at(ball, 90)
     bpy.ops.beyond_mocap.import_clips(filepath=str(SAMPLE / "standing_1.bvh"))
     other = bpy.context.object
@@ -448,24 +448,24 @@ def test_whose_throw_a_ball_shows_keeps_it_from_others():
     other.beyond_mocap_throw.frame = 200
     refused(f"Apply or Revert for {one.name} first", bpy.ops.beyond_mocap.kick_at_target)
     assert ball_at(ball, 90) == pytest.approx(shown)
-    worlds.choose(one)
-    press(bpy.ops.beyond_mocap.keep_throw)
-    worlds.choose(other)
+    worlds.select_objects(one)
+    press_operator(bpy.ops.beyond_mocap.keep_throw)
+    worlds.select_objects(other)
     other.beyond_mocap_throw.target = an_empty(ball_at(ball, 260) + [-12.0, 4.0, 1.0])
-    press(bpy.ops.beyond_mocap.kick_at_target)  # where it has come to rest
+    press_operator(bpy.ops.beyond_mocap.kick_at_target)  # where it has come to rest
     assert ball_at(ball, 90) == pytest.approx(shown, abs=1e-3)
-    press(bpy.ops.beyond_mocap.leave_throw)
+    press_operator(bpy.ops.beyond_mocap.leave_throw)
     assert ball_at(ball, 90) == pytest.approx(shown, abs=1e-3)
 
 
 def test_a_duplicate_of_a_thrower_leaves_the_ball_to_him():
     body = a_body()
-    press(bpy.ops.beyond_mocap.throw_at_target)
+    press_operator(bpy.ops.beyond_mocap.throw_at_target)
     ball = body.beyond_mocap_throw.flown
     twin = body.copy()
     bpy.context.scene.collection.objects.link(twin)
-    worlds.choose(twin)
-    press(bpy.ops.beyond_mocap.leave_throw)
+    worlds.select_objects(twin)
+    press_operator(bpy.ops.beyond_mocap.leave_throw)
     assert ball.name in bpy.context.scene.objects and body.beyond_mocap_throw.flown == ball
     first = int(np.floor(body.beyond_mocap_throw.release))
     assert closest(ball, np.array(TARGET), first + 1, first + 60) < 0.10
@@ -481,7 +481,7 @@ def test_a_target_that_moves_is_met_where_it_is_by_then():
     for curve in curves_of(carrier):
         for key in curve.keyframe_points:
             key.interpolation = "LINEAR"
-    press(bpy.ops.beyond_mocap.throw_at_target)
+    press_operator(bpy.ops.beyond_mocap.throw_at_target)
     first, away = int(np.floor(wish.release)), []
     for frame in np.arange(first + 1, first + 60, 0.1):
         place = ball_at(wish.flown, frame)
@@ -493,12 +493,12 @@ def test_a_target_that_moves_is_met_where_it_is_by_then():
 
 def curves_of(thing):
     channels = importlib.import_module(f"{EXTENSION}.scene.core.channels")
-    return channels.curves(*channels.playing(thing)).values()
+    return channels.collect_curves(*channels.find_playing_action(thing)).values()
 
 
 def test_keeping_and_the_second_throw_are_one_step_of_undo_each():
     body = a_body()
-    press(bpy.ops.beyond_mocap.throw_at_target)
+    press_operator(bpy.ops.beyond_mocap.throw_at_target)
     assert_one_step(bpy.ops.beyond_mocap.keep_throw)
     body = bpy.context.object
     wish = body.beyond_mocap_throw
@@ -514,7 +514,7 @@ def test_an_armature_that_is_scaled_and_hangs_on_something():
     hangs.rotation_euler.z, hangs.scale = 0.8, (1.1, 1.1, 1.1)
     body.parent, body.scale = hangs, tuple(value * 0.9 for value in body.scale)
     bpy.context.view_layer.update()
-    press(bpy.ops.beyond_mocap.throw_at_target)
+    press_operator(bpy.ops.beyond_mocap.throw_at_target)
     wish = body.beyond_mocap_throw
     first = int(np.floor(wish.release))
     assert closest(wish.flown, np.array((20.0, 6.0, 1.2)), first + 1, first + 60) < 0.10
@@ -530,7 +530,7 @@ def test_a_hidden_ball_flies_too(how):
         ball.hide_set(True)
     else:
         setattr(ball, how, True)
-    press(bpy.ops.beyond_mocap.throw_at_target)
+    press_operator(bpy.ops.beyond_mocap.throw_at_target)
     ball.hide_viewport = False
     ball.hide_set(False)
     first = int(np.floor(body.beyond_mocap_throw.release))
@@ -546,25 +546,25 @@ def test_an_armature_of_another_file_throws_as_an_override_only(tmp_path):
         here.objects = [name for name in there.objects if name == "standing_1"]
     linked = here.objects[0]
     bpy.context.scene.collection.objects.link(linked)
-    worlds.choose(linked)
+    worlds.select_objects(linked)
     refused("linked from")
     own = linked.override_create(remap_local_usages=True)
     own.override_library.is_system_override = False
-    worlds.choose(own)
+    worlds.select_objects(own)
     wish = own.beyond_mocap_throw
     wish.target, wish.frame = an_empty(TARGET), 60
-    press(bpy.ops.beyond_mocap.throw_at_target)
+    press_operator(bpy.ops.beyond_mocap.throw_at_target)
     first = int(np.floor(wish.release))
     assert closest(wish.flown, np.array(TARGET), first + 1, first + 60) < 0.10
-    press(bpy.ops.beyond_mocap.leave_throw)
+    press_operator(bpy.ops.beyond_mocap.leave_throw)
     assert not wish.made
 
 
 def test_a_ball_that_a_hand_has_put_down_is_kicked_there(room):
     body = a_body(target=(16.0, 3.0, 0.8), frame=90)
     wish, ball = body.beyond_mocap_throw, a_ball((0.3, 0.3, 0.9))
-    bone = room("passes.possession").bone_of(bpy.context.scene, body, "hand", "right")
-    room("passes.possession").take(bpy.context.scene, ball, body, bone, 5, 30)
+    bone = room("passes.possession").find_bone(bpy.context.scene, body, "hand", "right")
+    room("passes.possession").add_hold(bpy.context.scene, ball, body, bone, 5, 30)
     wish.ball = ball
     refused("m above the ground", bpy.ops.beyond_mocap.kick_at_target)  # he stands: it is let go beside the hip
     wish.frame = 20
@@ -574,23 +574,23 @@ def test_a_ball_that_a_hand_has_put_down_is_kicked_there(room):
 def test_what_is_shown_follows_its_target(room):
     live, scene = room("throws.shown"), bpy.context.scene
     body = a_body()
-    assert live.due(scene) is None
-    press(bpy.ops.beyond_mocap.throw_at_target)
+    assert live.find_outdated(scene) is None
+    press_operator(bpy.ops.beyond_mocap.throw_at_target)
     wish = body.beyond_mocap_throw
-    assert live.due(scene) is None
+    assert live.find_outdated(scene) is None
     wish.target.location.y += 2.0
     bpy.context.view_layer.update()
     wish.live = False
-    assert live.due(scene) is None
+    assert live.find_outdated(scene) is None
     wish.live = True
-    assert live.due(scene) == body and live.due(scene) is None  # once
+    assert live.find_outdated(scene) == body and live.find_outdated(scene) is None  # once
     job = live.begin(scene, body)
     while not job.poll():
         pass
     live.finish(scene, job)
     first = int(np.floor(wish.release))
     assert closest(wish.flown, np.array(TARGET) + [0.0, 2.0, 0.0], first + 1, first + 60) < 0.10
-    assert live.due(scene) is None
+    assert live.find_outdated(scene) is None
     wish.target.location.y += 1.0
     bpy.context.view_layer.update()
     late = live.begin(scene, body)
@@ -606,8 +606,8 @@ def test_what_is_shown_follows_its_target(room):
         pass
     with pytest.raises(Exception, match="at least .* m/s"):
         live.finish(scene, refused_job)
-    press(bpy.ops.beyond_mocap.leave_throw)
-    assert live.due(scene) is None
+    press_operator(bpy.ops.beyond_mocap.leave_throw)
+    assert live.find_outdated(scene) is None
 
 
 def followed(live, scene):
@@ -620,27 +620,27 @@ def followed(live, scene):
 def test_undo_after_a_throw_has_followed(act, room):
     live, scene = room("throws.shown"), bpy.context.scene
     a_body()
-    press(getattr(bpy.ops.beyond_mocap, f"{act}_at_target"))
+    press_operator(getattr(bpy.ops.beyond_mocap, f"{act}_at_target"))
     for message in ("deselected", "target selected"):  # nothing of the armature changes between two steps
         bpy.context.view_layer.update()
         bpy.ops.ed.undo_push(message=message)
-    thrown = state()
+    thrown = collect_state()
     bpy.data.objects["Target"].location.y += 2.0
     bpy.context.view_layer.update()
     bpy.ops.ed.undo_push(message="dragged")
-    dragged = state()
+    dragged = collect_state()
     followed(live, scene)
-    after = state()
+    after = collect_state()
     assert after["keys"] != dragged["keys"]
     for expected in (dragged, thrown):
         bpy.ops.ed.undo()
-        assert state() == expected
+        assert collect_state() == expected
         followed(live, bpy.context.scene)  # what undo has brought back stays
-        assert state() == expected
+        assert collect_state() == expected
     for expected in (dragged, after):
         bpy.ops.ed.redo()
         followed(live, bpy.context.scene)
-        assert state() == expected
+        assert collect_state() == expected
 
 
 @pytest.mark.parametrize("hidden", ["hide_viewport", "excluded"])
@@ -663,25 +663,25 @@ def test_a_hidden_target_stays_where_it_is_over_undo(hidden, room):
     other = an_empty((0.0, 0.0, 0.0))
     hangs.beyond_mocap_throw.target = target
     bpy.ops.ed.undo_push(message="hidden")
-    told = targets.target_key(scene, hangs.beyond_mocap_throw)
+    told = targets.build_target_key(scene, hangs.beyond_mocap_throw)
     other.location.x = 1.0
     bpy.ops.ed.undo_push(message="moved another")
     bpy.ops.ed.undo()
     scene = bpy.context.scene
     wish = next(thing.beyond_mocap_throw for thing in bpy.data.objects if thing.beyond_mocap_throw.target)
-    assert targets.target_places(scene, wish, 1)[0] == pytest.approx(place, abs=1e-5)
-    assert targets.target_key(scene, wish) == told
+    assert targets.read_target_positions(scene, wish, 1)[0] == pytest.approx(place, abs=1e-5)
+    assert targets.build_target_key(scene, wish) == told
 
 
 def test_a_deleted_thrower_does_not_keep_the_ball(room):
     body, other, ball = a_body(), a_body(), a_ball((0.3, 0.2, 0.11))
     wish, earlier = body.beyond_mocap_throw, room("throws.order")
     wish.made, wish.flown = "throw", ball
-    bone = room("passes.possession").bone_of(bpy.context.scene, body, "hand", "right")
-    room("passes.possession").take(bpy.context.scene, ball, body, bone, 5, 30)
-    assert earlier.flies_for(ball, other) == body
+    bone = room("passes.possession").find_bone(bpy.context.scene, body, "hand", "right")
+    room("passes.possession").add_hold(bpy.context.scene, ball, body, bone, 5, 30)
+    assert earlier.find_other_thrower(ball, other) == body
     with bpy.context.temp_override(selected_objects=[body], active_object=body):
         bpy.ops.object.delete()
-    assert earlier.flies_for(ball, other) is None
+    assert earlier.find_other_thrower(ball, other) is None
     ball.animation_data_clear()  # and by hand; its stretch is still there
-    assert earlier.way_before(ball, other.beyond_mocap_throw, np.array([40]))[0].to_translation().z < 2.0
+    assert earlier.compute_transforms_before(ball, other.beyond_mocap_throw, np.array([40]))[0].to_translation().z < 2.0

@@ -45,7 +45,7 @@ def keys(text, second=None):
 
 
 def said(room, player):
-    timeline = room("timeline.strips").read(player, bpy.context.scene)
+    timeline = room("timeline.strips").read_player_timeline(player, bpy.context.scene)
     return ([(s.start, s.end, " ".join(s.words)) for s in timeline.spans],
             [(k.time, " ".join(k.words)) for k in timeline.keys])
 
@@ -76,11 +76,11 @@ def test_a_moment_on_the_frame_of_another_takes_its_place(room, players):
 def test_in_and_out_make_a_span(room, players, scene):
     annotating = room("timeline.annotating")
     core = import_module(f"{EXTENSION}.beyond_mocap.annotation.annotating")
-    state, told = core.State(), []
+    state, told = core.AnnotationState(), []
     for second, key in ((10.0, "IN"), (11.2, "OUT"), (11.2, "4"), (11.2, "ENTER")):
         scene.frame_float = 1 + 25 * second
-        state, commands = core.press(state, key, annotating.now(bpy.context))
-        told += [annotating.do(bpy.context, command).line for command in commands]
+        state, commands = core.handle_key(state, key, annotating.compute_now(bpy.context))
+        told += [annotating.run_command(bpy.context, command).line for command in commands]
     assert said(room, players[0])[0] == [(1.0, 3.0, "dribble"), (10.0, 11.2, "running")]
     assert told == ["running from 10.00 to 11.20 s"]
 
@@ -132,7 +132,7 @@ def test_what_has_no_side_cannot_be_mirrored(room, players):
 def test_arrows_go_from_moment_to_moment_and_pick_it(room, players, scene):
     keys("NEXT", 0.0)
     assert scene.frame_current == 126
-    assert [moment.time for moment in room("timeline.lanes").moments(players[0].dot) if moment.selected] == [5.0]
+    assert [moment.time for moment in room("timeline.lanes").list_moments(players[0].dot) if moment.is_selected] == [5.0]
     keys("NEXT")
     assert scene.frame_current == 201
     keys("NEXT")
@@ -154,8 +154,8 @@ def test_up_and_down_choose_the_player(room, players, scene):
 def test_an_overlap_is_told(room, players):
     annotating = room("timeline.annotating")
     core = import_module(f"{EXTENSION}.beyond_mocap.annotation.annotating")
-    told = annotating.do(bpy.context, core.AddSpan(2.0, 4.0, ("walking",)))
-    assert told.words and "overlaps dribble" in told.line
+    told = annotating.run_command(bpy.context, core.AddSpan(2.0, 4.0, ("walking",)))
+    assert told.changed_labels and "overlaps dribble" in told.line
 
 
 def test_each_call_is_one_step(room, players):
@@ -225,7 +225,7 @@ def test_what_the_library_holds_is_known_with_and_without_mirrored_clips(room, s
     annotating, settings = room("timeline.annotating"), scene.beyond_mocap
     assert annotating.held(scene) is None
     settings.library_folder = str(tmp_path)
-    room("core.session").keep_library(library, None)
+    room("core.session").store_library(library, None)
     found = annotating.held(scene)
     assert set(found.moments) == {frozenset({"kick", "right"}), frozenset({"kick", "left"})}
     assert set(found.spans) == {frozenset({"walking"}), frozenset({"dribble"}), frozenset({"walking", "dribble"})}
@@ -238,11 +238,11 @@ def test_a_clip_with_lanes_of_its_own_is_annotated_while_it_is_the_active_object
     clip = bpy.data.objects.new("clip", bpy.data.armatures.new("clip"))
     bpy.context.scene.collection.objects.link(clip)
     clock, core = room("core.measure").Clock(1.0, 0.0, 25.0), import_module(f"{EXTENSION}.beyond_mocap.annotation")
-    room("timeline.lay_strips").write(clip, core.Timeline(), clock)
+    room("timeline.lay_strips").write_timeline(clip, core.Timeline(), clock)
     bpy.context.view_layer.objects.active = clip
     before = said(room, players[0])
     keys("2 2 ENTER", 2.0)
-    assert [(k.time, k.words) for k in room("timeline.lanes").read(clip, "clip").keys] == [(2.0, ("kick", "right"))]
+    assert [(k.time, k.words) for k in room("timeline.lanes").read_timeline(clip, "clip").keys] == [(2.0, ("kick", "right"))]
     assert said(room, players[0]) == before
 
 
@@ -255,10 +255,10 @@ def rects_overlap(a, b):
 @pytest.mark.parametrize("pressed", ["", "2", "2 2 3", "NEXT_PAGE", "IN OUT"])
 def test_the_menu_lies_within_the_editor_and_no_row_on_another(room, at, free, pressed):
     popup, core = room("core.popup"), import_module(f"{EXTENSION}.beyond_mocap.annotation.annotating")
-    state = core.State(import_module(f"{EXTENSION}.beyond_mocap.annotation.decision").Held((frozenset({"jump"}),), ()))
+    state = core.AnnotationState(import_module(f"{EXTENSION}.beyond_mocap.annotation.decision").LibraryCombinations((frozenset({"jump"}),), ()))
     for number, key in enumerate(pressed.split()):
-        state, _ = core.press(state, key, core.Now(9.7 + number))
-    box = popup.laid_out(popup.content(state, "player 1", "kick at 3 s"), at, free, 14.0, lambda text: 7.0 * len(text))
+        state, _ = core.handle_key(state, key, core.Playhead(9.7 + number))
+    box = popup.place_menu(popup.build_content(state, "player 1", "kick at 3 s"), at, free, 14.0, lambda text: 7.0 * len(text))
     assert free[0] <= box.box[0] and box.box[2] <= free[2] and free[1] <= box.box[1] and box.box[3] <= free[3]
     for number, rect in enumerate(box.rows):
         assert box.box[0] <= rect[0] and rect[2] <= box.box[2] and box.box[1] <= rect[1] and rect[3] <= box.box[3]
@@ -276,27 +276,27 @@ def test_the_part_of_an_editor_that_nothing_lies_over(room):
     others = [region("TOOLS", 100, 200, 60, 300), region("UI", 680, 50, 220, 560), region("HEADER", 100, 624, 800, 26),
               region("FOOTER", 100, 50, 800, 1), region("CHANNELS", 0, 50, 100, 600)]
     area = SimpleNamespace(regions=[main, *others])
-    assert room("core.window").free_region(area, main) == (64, 4, 576, 570)
-    assert room("core.window").free_region(SimpleNamespace(regions=[main]), main) == (4, 4, 796, 596)
-    assert room("core.window").free_region(SimpleNamespace(regions=[main, region("HUD", 110, 60, 300, 120)]),
+    assert room("core.window").find_free_region(area, main) == (64, 4, 576, 570)
+    assert room("core.window").find_free_region(SimpleNamespace(regions=[main]), main) == (4, 4, 796, 596)
+    assert room("core.window").find_free_region(SimpleNamespace(regions=[main, region("HUD", 110, 60, 300, 120)]),
                                    main) == (4, 134, 796, 596)
-    assert room("core.window").free_region(SimpleNamespace(regions=[main, region("HUD", 110, 60, 300, 400)]),
+    assert room("core.window").find_free_region(SimpleNamespace(regions=[main, region("HUD", 110, 60, 300, 400)]),
                                    main) == (314, 4, 796, 596)
 
 
 def test_the_list_in_the_corner_can_be_folded(room):
     popup, core = room("core.popup"), import_module(f"{EXTENSION}.beyond_mocap.annotation.annotating")
-    folded = popup.content(core.State(), "me", folded=True)
-    assert folded.rows == () and popup.content(core.State(), "me").rows
-    assert popup.content(core.press(core.State(), "2", core.Now(1.0))[0], "me", folded=True).rows
-    box = popup.laid_out(folded, None, (0, 0, 800, 600), 14.0, lambda text: 7.0 * len(text))
+    folded = popup.build_content(core.AnnotationState(), "me", is_folded=True)
+    assert folded.rows == () and popup.build_content(core.AnnotationState(), "me").rows
+    assert popup.build_content(core.handle_key(core.AnnotationState(), "2", core.Playhead(1.0))[0], "me", is_folded=True).rows
+    box = popup.place_menu(folded, None, (0, 0, 800, 600), 14.0, lambda text: 7.0 * len(text))
     assert box.box[3] - box.box[1] < 100
 
 
 def test_a_word_that_the_library_lacks_is_faint_with_the_nearest(room):
     popup, core = room("core.popup"), import_module(f"{EXTENSION}.beyond_mocap.annotation.annotating")
-    held = import_module(f"{EXTENSION}.beyond_mocap.annotation.decision").Held((frozenset({"jump", "high"}),), ())
-    rows = {row.text: row for row in popup.content(core.State(held), "me").rows}
+    held = import_module(f"{EXTENSION}.beyond_mocap.annotation.decision").LibraryCombinations((frozenset({"jump", "high"}),), ())
+    rows = {row.text: row for row in popup.build_content(core.AnnotationState(held), "me").rows}
     assert not rows["jump"].faint and rows["header"].faint and rows["header"].note.endswith("jump high")
-    state, _ = core.press(core.State(held), "4", core.Now(1.0))
-    assert "not in the library" in popup.content(state, "me").foot[0]
+    state, _ = core.handle_key(core.AnnotationState(held), "4", core.Playhead(1.0))
+    assert "not in the library" in popup.build_content(state, "me").foot[0]

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import bpy
 import pytest
-from undo import assert_one_step, press, state
+from undo import assert_one_step, press_operator, collect_state
 
 SAMPLE = Path(__file__).resolve().parents[3] / "sample_blend" / "library"
 
@@ -31,7 +31,7 @@ def library(tmp_path):
 
 def rows_of(core, clip):
     scan = core("library.scan")
-    return scan.Annotations(clip.parent, [clip]).of(clip, core("files.bvh.bvh").read(clip).motion.fps)
+    return scan.Annotations(clip.parent, [clip]).read_rows(clip, core("files.bvh.bvh").read_bvh(clip).motion.fps)
 
 
 @pytest.mark.parametrize("fps, base", [(24, 1.001), (25, 1.0), (30, 1.0), (60, 1.0)])
@@ -40,10 +40,10 @@ def test_a_clip_is_opened_with_its_words(core, rooms, library, fps, base):
     shutil.copy(SAMPLE / "kick_low_top.txt", library / "kick_low_top.txt")
     assert bpy.ops.beyond_mocap.annotate_clip(path="kick_low_top.bvh") == {"FINISHED"}
     rig = bpy.context.object
-    assert rooms["library.recordings"].shown_clip(rig) == "kick_low_top.bvh"
-    assert rooms["library.recordings"].read_words(rig) == rows_of(core, library / "kick_low_top.bvh")
+    assert rooms["library.recordings"].find_shown_clip(rig) == "kick_low_top.bvh"
+    assert rooms["library.recordings"].read_labels(rig) == rows_of(core, library / "kick_low_top.bvh")
     assert rig.animation_data.action is not None, "the strips took the motion's place"
-    moment = rooms["timeline.lanes"].moments(rig)[0]
+    moment = rooms["timeline.lanes"].list_moments(rig)[0]
     assert moment.frame == round(1 + 156 / 60 * fps / base)
 
 
@@ -52,10 +52,10 @@ def test_words_are_proposed_saved_and_used_by_the_library(core, rooms, library):
     bpy.ops.beyond_mocap.annotate_clip(path="kick_low_top.bvh")
     rig = bpy.context.object
     assert bpy.ops.beyond_mocap.propose_words() == {"FINISHED"}
-    said = rooms["library.recordings"].read_words(rig)
+    said = rooms["library.recordings"].read_labels(rig)
     kick = next(row for row in said if row.key is not None)
     assert {"kick", "right"} <= set(kick.words) and abs(kick.key - 156) <= 2
-    assert press(bpy.ops.beyond_mocap.save_words) == {"FINISHED"}
+    assert press_operator(bpy.ops.beyond_mocap.save_words) == {"FINISHED"}
     assert rows_of(core, library / "kick_low_top.bvh") == said
     listing = bpy.context.window_manager.beyond_mocap_clips
     assert next(clip for clip in listing.shown if clip.name == "kick_low_top").words.startswith("kick right")
@@ -68,7 +68,7 @@ def test_a_strip_that_is_moved_says_so_when_saved(core, rooms, library):
     bpy.ops.beyond_mocap.annotate_clip(path="kick_low_top.bvh")
     rig = bpy.context.object
     keys = core("annotation")
-    clock = rooms["timeline.lanes"].written_for(rig)
+    clock = rooms["timeline.lanes"].read_clock(rig)
     rooms["timeline.lay_strips"].add_span(rig, keys.Span(0.0, 1.0, ("jogging", "front")), clock)
     rooms["timeline.lay_strips"].add_moment(rig, keys.KeyMoment(2.6, ("kick", "left")), clock)
     bpy.ops.beyond_mocap.save_words()
@@ -90,11 +90,11 @@ def test_words_that_are_there_stay_until_told(library):
 
 def test_undo_and_removal_leave_nothing_behind(library):
     bpy.ops.ed.undo_push(message="before")
-    before = state()
+    before = collect_state()
     assert_one_step(bpy.ops.beyond_mocap.annotate_clip, path="kick_low_top.bvh")
     assert_one_step(bpy.ops.beyond_mocap.propose_words)
     assert_one_step(bpy.ops.beyond_mocap.remove_clip)
-    after = state()
+    after = collect_state()
     for kind in ("objects", "armatures", "meshes", "actions"):
         assert after[kind] == before[kind], kind
 
@@ -112,13 +112,13 @@ def test_proposals_beside_what_is_there(rooms, library):
     bpy.ops.beyond_mocap.annotate_clip(path="kick_low_top.bvh")
     bpy.ops.beyond_mocap.propose_words(least=0.99)
     with pytest.raises(Exception, match="no labels in the strips"):
-        rooms["library.recordings"].read_words(bpy.context.object)
+        rooms["library.recordings"].read_labels(bpy.context.object)
     with pytest.raises(RuntimeError, match="no labels in the strips"):
         bpy.ops.beyond_mocap.save_words()
     bpy.ops.beyond_mocap.propose_words()
-    count = len(rooms["library.recordings"].read_words(bpy.context.object))
+    count = len(rooms["library.recordings"].read_labels(bpy.context.object))
     bpy.ops.beyond_mocap.propose_words(replace=False)
-    assert len(rooms["library.recordings"].read_words(bpy.context.object)) > count
+    assert len(rooms["library.recordings"].read_labels(bpy.context.object)) > count
 
 
 def test_nothing_chosen_or_something_else():
@@ -139,7 +139,7 @@ def test_a_text_of_words_is_dropped_on_a_clip_and_on_a_player(core, rooms, libra
     words = tmp_path / "words.txt"
     words.write_text("0 1 walking front\n0.5 kick left\n")
     assert_one_step(bpy.ops.beyond_mocap.import_words, directory=str(tmp_path), files=[{"name": "words.txt"}])
-    assert [row.words for row in rooms["library.recordings"].read_words(bpy.context.object)] == [("walking", "front"),
+    assert [row.words for row in rooms["library.recordings"].read_labels(bpy.context.object)] == [("walking", "front"),
                                                                                         ("kick", "left")]
     bpy.ops.beyond_mocap.remove_clip()
     track = tmp_path / "player.csv"
@@ -147,13 +147,13 @@ def test_a_text_of_words_is_dropped_on_a_clip_and_on_a_player(core, rooms, libra
     bpy.ops.beyond_mocap.import_tracking(filepath=str(track))
     assert_one_step(bpy.ops.beyond_mocap.import_words, filepath=str(words))
     settings = bpy.context.scene.beyond_mocap
-    timeline = rooms["timeline.strips"].read(rooms["core.settings"].active_player(settings), bpy.context.scene)
+    timeline = rooms["timeline.strips"].read_player_timeline(rooms["core.settings"].find_active_player(settings), bpy.context.scene)
     assert [key.words for key in timeline.keys] == [("kick", "left")]
     (tmp_path / "words.txt").write_text("nonsense\n")
-    before = state()
+    before = collect_state()
     with pytest.raises(RuntimeError, match="words.txt:1"):
         bpy.ops.beyond_mocap.import_words(filepath=str(words))
-    assert state() == before
+    assert collect_state() == before
 
 
 def test_a_clip_of_another_file_is_left_alone(rooms, library, tmp_path):
@@ -166,8 +166,8 @@ def test_a_clip_of_another_file_is_left_alone(rooms, library, tmp_path):
     rig = bpy.data.objects["kick_low_top"]
     bpy.context.scene.collection.objects.link(rig)
     bpy.context.view_layer.objects.active = rig
-    before = state()
+    before = collect_state()
     for operator in (bpy.ops.beyond_mocap.propose_words, bpy.ops.beyond_mocap.remove_clip):
         with pytest.raises(RuntimeError, match="file"):
             operator()
-    assert state() == before
+    assert collect_state() == before

@@ -27,7 +27,7 @@ def dot(room, parse):
     made = bpy.data.objects.new("dot", None)
     bpy.context.scene.collection.objects.link(made)
     timeline = parse("1.013 3.007 running\n3.007 5 walking\n2.222 kick\n4.444 header\n")
-    room("timeline.lay_strips").write(made, timeline, room("core.measure").Clock(1.0, 0.0, 25.0), (0.0, 8.0))
+    room("timeline.lay_strips").write_timeline(made, timeline, room("core.measure").Clock(1.0, 0.0, 25.0), (0.0, 8.0))
     return made
 
 
@@ -35,10 +35,10 @@ def dot(room, parse):
 def tidied(room, core, dot):
     """What the strips say once they are in order; it is the same as before, and nothing more is to be done then."""
     def put():
-        before = room("timeline.lanes").read(dot)
-        assert room("timeline.strip_events").tidy(dot)
-        assert not room("timeline.strip_events").tidy(dot)
-        assert room("timeline.lanes").read(dot) == before
+        before = room("timeline.lanes").read_timeline(dot)
+        assert room("timeline.strip_events").normalize_object(dot)
+        assert not room("timeline.strip_events").normalize_object(dot)
+        assert room("timeline.lanes").read_timeline(dot) == before
         for track in dot.animation_data.nla_tracks:
             ends = [
                 (strip.frame_start, strip.frame_end) for strip in sorted(track.strips, key=lambda one: one.frame_start)
@@ -71,8 +71,8 @@ def split(dot, track, strip, frame, action=None):
 
 
 def test_in_order_already(room, dot):
-    assert not room("timeline.strip_events").tidy(dot)
-    assert not room("timeline.strip_events").put_in_order(bpy.context.scene)
+    assert not room("timeline.strip_events").normalize_object(dot)
+    assert not room("timeline.strip_events").normalize_strips(bpy.context.scene)
 
 
 def test_dragged(dot, tidied):
@@ -130,7 +130,7 @@ def test_duplicated(dot, tidied):
 def test_linked_duplicates_of_the_lane_of_moments_count_once(dot, room):
     track = dot.animation_data.nla_tracks.new()
     track.strips.new("Moments", 1, strip_of(dot, "Moments").action.copy())
-    assert [moment.words for moment in room("timeline.lanes").moments(dot)] == [("kick",), ("header",)]
+    assert [moment.labels for moment in room("timeline.lanes").list_moments(dot)] == [("kick",), ("header",)]
 
 
 def test_renamed(dot, tidied, room):
@@ -139,20 +139,20 @@ def test_renamed(dot, tidied, room):
     assert tidied().splitlines()[:2] == ["1.013 3.007 jogging left", "2.222 receive"]
     assert strip_of(dot, "jogging left").action.name == "dot jogging left"
     strip_of(dot, "walking").name = "3 times"
-    assert not room("timeline.strip_events").tidy(dot) and strip_of(dot, "3 times")
+    assert not room("timeline.strip_events").normalize_object(dot) and strip_of(dot, "3 times")
 
 
 def test_muted_and_heard_again(dot, room, core):
     strip_of(dot, "running").mute = True
-    assert not room("timeline.strip_events").tidy(dot)
+    assert not room("timeline.strip_events").normalize_object(dot)
     strip_of(dot, "running").mute = False
-    assert room("timeline.lanes").read(dot).spans[0].start == 1.013
+    assert room("timeline.lanes").read_timeline(dot).spans[0].start == 1.013
 
 
 def test_an_automatic_strip_that_is_touched_becomes_asked_for(dot, tidied, room, parse):
-    laid = room("timeline.lanes").written_for(dot)
-    room("timeline.lay_strips").set_automatic(dot, parse("0 1.013 standing\n5 6 walking\n"), laid)
-    assert not room("timeline.strip_events").tidy(dot)
+    laid = room("timeline.lanes").read_clock(dot)
+    room("timeline.lay_strips").show_automatic_spans(dot, parse("0 1.013 standing\n5 6 walking\n"), laid)
+    assert not room("timeline.strip_events").normalize_object(dot)
     standing = strip_of(dot, "standing")
     standing.frame_start_raw = standing.action_frame_start = 11
     assert tidied().splitlines()[0] == "0.4 1.013 standing"
@@ -164,18 +164,18 @@ def test_put_onto_the_lane_of_automatic_ones_it_is_still_asked_for(dot, room):
     action = strip_of(dot, "running").action
     lane(dot, "Words").strips.remove(strip_of(dot, "running"))
     lane(dot, "Automatic").strips.new("running", 26, action)
-    assert room("timeline.lanes").read(dot).spans[0].words == ("running",)
-    room("timeline.strip_events").tidy(dot)
-    assert room("timeline.lanes").read(dot).spans[0].start == 1.013
+    assert room("timeline.lanes").read_timeline(dot).spans[0].words == ("running",)
+    room("timeline.strip_events").normalize_object(dot)
+    assert room("timeline.lanes").read_timeline(dot).spans[0].start == 1.013
 
 
 def test_deleted(dot, room):
     lane(dot, "Words").strips.remove(strip_of(dot, "running"))
-    assert not room("timeline.strip_events").tidy(dot)
-    assert len(room("timeline.lanes").read(dot).spans) == 1
+    assert not room("timeline.strip_events").normalize_object(dot)
+    assert len(room("timeline.lanes").read_timeline(dot).spans) == 1
     for track in list(dot.animation_data.nla_tracks):
         dot.animation_data.nla_tracks.remove(track)
-    assert room("timeline.lanes").read(dot).spans == ()
+    assert room("timeline.lanes").read_timeline(dot).spans == ()
 
 
 def test_no_strip_is_touched_while_one_is_edited(dot, room):
@@ -184,7 +184,7 @@ def test_no_strip_is_touched_while_one_is_edited(dot, room):
     dot.animation_data.nla_tracks.active = lane(dot, "Words")
     dot.animation_data.use_tweak_mode = True
     if dot.animation_data.use_tweak_mode:
-        assert not room("timeline.strip_events").put_in_order(bpy.context.scene)
+        assert not room("timeline.strip_events").normalize_strips(bpy.context.scene)
         dot.animation_data.use_tweak_mode = False
 
 
@@ -194,22 +194,22 @@ def test_another_frame_rate_of_the_scene(room, tmp_path, core):
     bpy.ops.beyond_mocap.import_tracking(filepath=str(tmp_path / "player1.csv"))
     scene = bpy.context.scene
     player = scene.beyond_mocap.players[0]
-    before = room("timeline.strips").read(player, scene)
+    before = room("timeline.strips").read_player_timeline(player, scene)
     scene.render.fps, scene.render.fps_base = 24, 1.001
     scene.beyond_mocap.start_frame = 101
-    assert room("timeline.strips").read(player, scene) == before
-    assert room("timeline.strip_events").put_in_order(scene)
-    assert room("timeline.strips").read(player, scene) == before
-    assert room("timeline.lanes").moments(player.dot)[0].frame == round(101 + 6.022 * 24 / 1.001)
+    assert room("timeline.strips").read_player_timeline(player, scene) == before
+    assert room("timeline.strip_events").normalize_strips(scene)
+    assert room("timeline.strips").read_player_timeline(player, scene) == before
+    assert room("timeline.lanes").list_moments(player.dot)[0].frame == round(101 + 6.022 * 24 / 1.001)
     scene.render.fps = 30
-    strip = next(strip for track, strip in room("timeline.lanes").strips(player.dot) if strip.name == "running")
+    strip = next(strip for track, strip in room("timeline.lanes").iter_strips(player.dot) if strip.name == "running")
     strip.name = "take 5 #"  # which nobody can read: all of it waits, and says so
     stands = strip.frame_start, player.dot.beyond_mocap_lanes.clock
-    room("timeline.strip_events").put_in_order(scene)
+    room("timeline.strip_events").normalize_strips(scene)
     assert (strip.frame_start, player.dot.beyond_mocap_lanes.clock) == stands
     strip.name = "running"
-    assert room("timeline.strip_events").put_in_order(scene) and room("timeline.strips").read(player, scene) == before
+    assert room("timeline.strip_events").normalize_strips(scene) and room("timeline.strips").read_player_timeline(player, scene) == before
     scene.render.fps = 24
-    room("timeline.strip_events").put_in_order(scene)
+    room("timeline.strip_events").normalize_strips(scene)
     scene.frame_set(101 + 120)
     assert player.dot.matrix_world.translation.x == pytest.approx(2 * 120 / (24 / 1.001), abs=1e-3)

@@ -54,7 +54,7 @@ def random_timeline(core, dice, count=12):
     spans = []
     for _ in range(count):
         start = dice.uniform(-30.0, 90.0)
-        spans.append(annotation.Span(start, start + dice.exponential(2.0) + 1e-9, words(0)))
+        spans.append(annotation.Span(start, start + dice.to_quaternions(2.0) + 1e-9, words(0)))
     spans.append(annotation.Span(200.0, 201.0, tuple(f"a_very_long_word_{i}" for i in range(9))))
     keys = [annotation.KeyMoment(dice.uniform(-30.0, 90.0), words(1)) for _ in range(count)]
     return annotation.Timeline(tuple(spans), tuple(keys))
@@ -67,9 +67,9 @@ def test_there_and_back_to_the_bit(room, core, text, dot, seed):
         float(dice.integers(-100, 100)), dice.uniform(-50, 50), dice.choice([23.976, 24.0, 25.0, 60.0])
     )
     timeline = random_timeline(core, dice)
-    room("timeline.lay_strips").write(dot, timeline, clock)
-    assert room("timeline.lanes").read(dot) == timeline
-    assert text.format_timeline(room("timeline.lanes").read(dot)) == text.format_timeline(timeline)
+    room("timeline.lay_strips").write_timeline(dot, timeline, clock)
+    assert room("timeline.lanes").read_timeline(dot) == timeline
+    assert text.format_timeline(room("timeline.lanes").read_timeline(dot)) == text.format_timeline(timeline)
     for track in dot.animation_data.nla_tracks:
         for strip in track.strips:
             assert strip.frame_start == int(strip.frame_start) and strip.frame_end == int(strip.frame_end)
@@ -81,13 +81,13 @@ def test_another_clock_lays_the_strips_anew_and_says_the_same(room, core, dot, s
     dice = np.random.default_rng(seed)
     Clock, lanes, lay_strips = room("core.measure").Clock, room("timeline.lanes"), room("timeline.lay_strips")
     timeline = random_timeline(core, dice)
-    lay_strips.write(dot, timeline, Clock(1.0, 0.0, 25.0))
+    lay_strips.write_timeline(dot, timeline, Clock(1.0, 0.0, 25.0))
     for clock in (Clock(1.0, 0.0, 120.0), Clock(101.0, -3.3, 23.976), Clock(-40.0, 7.0, 10.0), Clock(1.0, 0.0, 25.0)):
         assert lay_strips.relay(dot, clock)
-        assert lanes.read(dot) == timeline
-        for placed in lanes.spans(dot):
-            assert (placed.first, placed.last) == room("timeline.strip_lines").frames_of(placed.span, clock)
-        assert [placed.frame for placed in lanes.moments(dot)] == [clock.whole(key.time) for key in timeline.keys]
+        assert lanes.read_timeline(dot) == timeline
+        for placed in lanes.list_spans(dot):
+            assert (placed.first, placed.last) == room("timeline.strip_lines").compute_frames(placed.span, clock)
+        assert [placed.frame for placed in lanes.list_moments(dot)] == [clock.to_whole_frame(key.time) for key in timeline.keys]
     assert not lay_strips.relay(dot, Clock(1.0, 0.0, 25.0))
 
 
@@ -96,8 +96,8 @@ def strip_of(dot, name):
 
 
 def test_each_end_is_exact_until_it_is_moved_by_a_frame(room, core, text, dot, clock):
-    room("timeline.lay_strips").write(dot, text.parse_timeline("2.413 4.107 running\n3.333 kick\n"), clock)
-    read, strip = room("timeline.lanes").read, strip_of(dot, "running")
+    room("timeline.lay_strips").write_timeline(dot, text.parse_timeline("2.413 4.107 running\n3.333 kick\n"), clock)
+    read, strip = room("timeline.lanes").read_timeline, strip_of(dot, "running")
     assert (strip.frame_start, strip.frame_end) == (61, 104)
     strip.frame_start_raw = 61.6  # less than a frame
     assert read(dot).spans[0].start == 2.413
@@ -114,8 +114,8 @@ def test_each_end_is_exact_until_it_is_moved_by_a_frame(room, core, text, dot, c
 
 
 def test_names_are_words(room, core, text, dot, clock):
-    room("timeline.lay_strips").write(dot, text.parse_timeline("2 4 running\n5 6 running\n7 9\n3 kick\n"), clock)
-    read, InputError = room("timeline.lanes").read, core("base.errors").InputError
+    room("timeline.lay_strips").write_timeline(dot, text.parse_timeline("2 4 running\n5 6 running\n7 9\n3 kick\n"), clock)
+    read, InputError = room("timeline.lanes").read_timeline, core("base.errors").InputError
     assert strip_of(dot, "running ") and strip_of(dot, "(automatic)")
     strip_of(dot, "running ").name = "Jogging dribble.002"
     strip_of(dot, "(automatic)").name = "walking"
@@ -134,31 +134,31 @@ def test_names_are_words(room, core, text, dot, clock):
 
 
 def test_muted_is_off(room, text, dot, clock):
-    room("timeline.lay_strips").write(dot, text.parse_timeline("2 4 running\n3 kick\n"), clock)
+    room("timeline.lay_strips").write_timeline(dot, text.parse_timeline("2 4 running\n3 kick\n"), clock)
     strip_of(dot, "running").mute = True
-    assert text.format_timeline(room("timeline.lanes").read(dot)) == "3 kick\n"
+    assert text.format_timeline(room("timeline.lanes").read_timeline(dot)) == "3 kick\n"
     dot.animation_data.nla_tracks["Moments"].mute = True
-    assert text.format_timeline(room("timeline.lanes").read(dot)) == ""
+    assert text.format_timeline(room("timeline.lanes").read_timeline(dot)) == ""
 
 
 def test_automatic_strips_are_asked_for_once_touched(room, text, dot, clock):
     lanes, lay_strips, parse = room("timeline.lanes"), room("timeline.lay_strips"), text.parse_timeline
-    lay_strips.write(dot, parse("2 4 running\n"), clock)
-    lay_strips.set_automatic(dot, parse("0 2 walking\n2 4 running\n4 6 walking\n6 9 jogging\n"), clock)
+    lay_strips.write_timeline(dot, parse("2 4 running\n"), clock)
+    lay_strips.show_automatic_spans(dot, parse("0 2 walking\n2 4 running\n4 6 walking\n6 9 jogging\n"), clock)
     strips = [strip for strip in dot.animation_data.nla_tracks["Automatic"].strips]
     assert [strip.name for strip in strips] == ["walking", "walking ", "jogging"] and all(
         strip.mute for strip in strips
     )
-    assert text.format_timeline(lanes.read(dot)) == "2 4 running\n"
+    assert text.format_timeline(lanes.read_timeline(dot)) == "2 4 running\n"
     strip_of(dot, "walking").name = "sprinting"
     strip_of(dot, "walking ").frame_end_raw = 145
     strip_of(dot, "jogging").mute = False
-    assert text.format_timeline(lanes.read(dot)) == "0 2 sprinting\n2 4 running\n4 5.76 walking\n6 9 jogging\n"
-    lay_strips.set_automatic(
+    assert text.format_timeline(lanes.read_timeline(dot)) == "0 2 sprinting\n2 4 running\n4 5.76 walking\n6 9 jogging\n"
+    lay_strips.show_automatic_spans(
         dot, parse("0 2 sprinting\n2 4 running\n4 5.76 walking\n5.76 6 standing\n6 9 jogging\n"), clock
     )
-    assert text.format_timeline(lanes.read(dot)) == "0 2 sprinting\n2 4 running\n4 5.76 walking\n6 9 jogging\n"
-    assert [placed.span.words for placed in lanes.spans(dot) if placed.automatic] == [("standing",)]
+    assert text.format_timeline(lanes.read_timeline(dot)) == "0 2 sprinting\n2 4 running\n4 5.76 walking\n6 9 jogging\n"
+    assert [placed.span.words for placed in lanes.list_spans(dot) if placed.is_automatic] == [("standing",)]
 
 
 def test_one_by_one(room, core, text, dot, clock):
@@ -168,17 +168,17 @@ def test_one_by_one(room, core, text, dot, clock):
     assert (first.track, second.track) == ("Words", "Words 2")
     kick = lay_strips.add_moment(dot, annotation.KeyMoment(30.123, ("kick",)), clock)
     header = lay_strips.add_moment(dot, annotation.KeyMoment(-5.0, ("header",)), clock)
-    assert [moment.words for moment in lanes.moments(dot)] == [("header",), ("kick",)]
-    assert [moment.selected for moment in lanes.moments(dot)] == [True, False]
-    lay_strips.pick(dot, kick.strip, kick.index)
+    assert [moment.words for moment in lanes.list_moments(dot)] == [("header",), ("kick",)]
+    assert [moment.is_selected for moment in lanes.list_moments(dot)] == [True, False]
+    lay_strips.select_moment(dot, kick.strip, kick.index)
     lay_strips.change_moment(dot, header.strip, header.index, annotation.KeyMoment(60.0, ("header", "jump")))
-    assert [moment.time for moment in lanes.moments(dot)] == [30.123, 60.0]
+    assert [moment.time for moment in lanes.list_moments(dot)] == [30.123, 60.0]
     lay_strips.change_span(dot, second.strip, annotation.Span(4.0, 5.0, ("dribble", "walking")))
-    assert text.format_timeline(lanes.read(dot)) == "2 4 running\n4 5 dribble walking\n30.123 kick\n60 header jump\n"
-    assert lanes.span_at(dot, 4.5).span.words == ("dribble", "walking") and lanes.span_at(dot, 5.0) is None
-    lay_strips.remove_moment(dot, kick.strip, lanes.moments(dot)[0].index)
+    assert text.format_timeline(lanes.read_timeline(dot)) == "2 4 running\n4 5 dribble walking\n30.123 kick\n60 header jump\n"
+    assert lanes.find_span(dot, 4.5).span.words == ("dribble", "walking") and lanes.find_span(dot, 5.0) is None
+    lay_strips.remove_moment(dot, kick.strip, lanes.list_moments(dot)[0].index)
     lay_strips.remove_span(dot, "running")
-    assert text.format_timeline(lanes.read(dot)) == "4 5 dribble walking\n60 header jump\n"
+    assert text.format_timeline(lanes.read_timeline(dot)) == "4 5 dribble walking\n60 header jump\n"
     assert {action.name for action in bpy.data.actions} == {"dot dribble walking", "dot Moments"}
 
 
@@ -191,17 +191,17 @@ def test_import_tracking_makes_dot_ball_and_strips(room, player):
         np.testing.assert_allclose(
             bpy.data.objects["Ball dot"].matrix_world.translation[0], dot.location[0] + 0.6, atol=1e-4
         )
-    asked = strips.read(player, scene)
+    asked = strips.read_player_timeline(player, scene)
     assert asked.spans[0].start == 2.413 and asked.keys[0].words == ("kick", "right", "low")
     plans = room("result.plans")
-    assert plans.plan_of(scene.beyond_mocap, player)[0].timeline == asked
-    assert plans.words_from(player) == "strips of player1"
+    assert plans.build_plan(scene.beyond_mocap, player)[0].timeline == asked
+    assert plans.describe_label_source(player) == "strips of player1"
     lanes, lay_strips = room("timeline.lanes"), room("timeline.lay_strips")
-    moment, = lanes.moments(dot)
+    moment, = lanes.list_moments(dot)
     assert moment.time == 6.02
     lay_strips.remove_moment(dot, moment.strip, moment.index)
-    lay_strips.remove_span(dot, lanes.span_at(dot, 3.0).strip)
-    assert strips.read(player, scene).spans == () and strips.read(player, scene).keys == ()
+    lay_strips.remove_span(dot, lanes.find_span(dot, 3.0).strip)
+    assert strips.read_player_timeline(player, scene).spans == () and strips.read_player_timeline(player, scene).keys == ()
 
 
 def test_the_dot_goes_with_its_player(player):
@@ -214,21 +214,21 @@ def test_the_dot_goes_with_its_player(player):
 def test_a_dot_that_was_deleted_in_the_view_comes_back_with_its_words(room, player):
     strips, scene = room("timeline.strips"), bpy.context.scene
     strips.add_span(bpy.context, player, 7.0, 8.0, ("walking",))
-    asked, dot = strips.read(player, scene), player.dot
+    asked, dot = strips.read_player_timeline(player, scene), player.dot
     for collection in dot.users_collection:
         collection.objects.unlink(dot)
-    assert strips.read(player, scene) is None
+    assert strips.read_player_timeline(player, scene) is None
     strips.add_moment(bpy.context, player, 9.0, ("header",))
-    assert player.dot == dot and strips.read(player, scene).spans == asked.spans
-    assert len(strips.read(player, scene).keys) == 2
+    assert player.dot == dot and strips.read_player_timeline(player, scene).spans == asked.spans
+    assert len(strips.read_player_timeline(player, scene).keys) == 2
 
 
 def test_bad_words_do_not_keep_the_track_out(room, tmp_path, player):
     (tmp_path / "player1.txt").write_text("kick 3\n")
     assert bpy.ops.beyond_mocap.import_tracking(filepath=str(tmp_path / "player1.csv")) == {"FINISHED"}
     second = bpy.context.scene.beyond_mocap.players[1]
-    assert second.dot is not None and room("timeline.strips").read(second, bpy.context.scene) is None
-    assert room("result.plans").words_from(second).endswith("player1.txt")
+    assert second.dot is not None and room("timeline.strips").read_player_timeline(second, bpy.context.scene) is None
+    assert room("result.plans").describe_label_source(second).endswith("player1.txt")
 
 
 def test_a_first_strip_does_not_put_the_words_of_a_file_out_of_force(room, player):
@@ -237,9 +237,9 @@ def test_a_first_strip_does_not_put_the_words_of_a_file_out_of_force(room, playe
         player.dot.animation_data.nla_tracks.remove(track)
     player.dot.beyond_mocap_lanes.clock = ""
     strips, scene = room("timeline.strips"), bpy.context.scene
-    assert strips.read(player, scene) is None
+    assert strips.read_player_timeline(player, scene) is None
     strips.add_span(bpy.context, player, 8.0, 9.0, ("walking", "-dribble"))
-    asked = strips.read(player, scene)
+    asked = strips.read_player_timeline(player, scene)
     assert [span.words for span in asked.spans] == [("running",), ("walking",)] and len(asked.keys) == 1
     assert asked.spans[1].avoid == ("dribble",)
 
@@ -252,13 +252,13 @@ def test_the_track_is_read_once(room, tmp_path, player, monkeypatch):
 
 @pytest.mark.parametrize("how", ["linked", "override"])
 def test_what_another_file_owns_is_left_alone(room, core, text, dot, clock, tmp_path, how):
-    room("timeline.lay_strips").write(dot, text.parse_timeline("2 4 running\n"), clock)
+    room("timeline.lay_strips").write_timeline(dot, text.parse_timeline("2 4 running\n"), clock)
     bpy.data.libraries.write(str(tmp_path / "dot.blend"), {dot})
     with bpy.data.libraries.load(str(tmp_path / "dot.blend"), link=True) as (_, wanted):
         wanted.objects = ["dot"]
     linked = wanted.objects[0]
     if how == "override":
         linked = linked.override_create()
-    assert text.format_timeline(room("timeline.lanes").read(linked)) == "2 4 running\n"
+    assert text.format_timeline(room("timeline.lanes").read_timeline(linked)) == "2 4 running\n"
     with pytest.raises(core("base.errors").InputError, match="make it local"):
-        room("timeline.lay_strips").write(linked, text.parse_timeline("2 4 walking\n"), clock)
+        room("timeline.lay_strips").write_timeline(linked, text.parse_timeline("2 4 walking\n"), clock)

@@ -7,7 +7,7 @@ import pathlib
 import bpy
 import numpy as np
 import pytest
-from undo import assert_one_step, state
+from undo import assert_one_step, collect_state
 
 ops = bpy.ops.beyond_mocap
 
@@ -33,7 +33,7 @@ def asked(room, core):
     """What the first player's strips ask for, as text."""
     def read():
         scene = bpy.context.scene
-        return core("annotation").format_timeline(room("timeline.strips").read(scene.beyond_mocap.players[0], scene))
+        return core("annotation").format_timeline(room("timeline.strips").read_player_timeline(scene.beyond_mocap.players[0], scene))
     return read
 
 
@@ -60,7 +60,7 @@ def test_text_and_file(player, asked, tmp_path):
     assert ops.export_words(filepath=str(tmp_path / "out.txt")) == {"FINISHED"}
     assert (tmp_path / "out.txt").read_text() == before
     text.write("10 11 walking\n")
-    assert_one_step(ops.read_words)
+    assert_one_step(ops.read_labels)
     assert asked() == before + "10 11 walking\n"
 
 
@@ -155,7 +155,7 @@ def test_a_dot_appended_to_another_file(player, asked, tmp_path, room):
     new = bpy.context.scene.beyond_mocap.players[0]
     assert (new.name, new.dot.name) == ("player1", "player1 dot") and pathlib.Path(new.tracking_file).is_file()
     assert asked() == before
-    assert room("timeline.lanes").moments(new.dot)[0].frame == round(11 + 6.02 * 60)
+    assert room("timeline.lanes").list_moments(new.dot)[0].frame == round(11 + 6.02 * 60)
     bpy.context.scene.frame_set(11 + 60)
     assert new.dot.matrix_world.translation.x == pytest.approx(3.0, abs=1e-3)
     refused("appended from another file", ops.player_from_dot)
@@ -196,13 +196,13 @@ def test_what_is_wrong_is_told(player, room):
 
 def test_nobody_there():
     for operator in (ops.add_span, ops.add_moment, ops.split_span, ops.words_to_text, ops.choose_player,
-                     ops.read_words):
+                     ops.read_labels):
         refused("Import tracking", operator)
 
 
 def refused(message, operator, **arguments):
     """The operator reports `message` and the scene is as before."""
-    before = state()
+    before = collect_state()
     with pytest.raises(RuntimeError, match=message):
         operator(**arguments)
-    assert state() == before
+    assert collect_state() == before

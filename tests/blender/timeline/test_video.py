@@ -62,14 +62,14 @@ def wrong_frames(scene, rate, begins, frames=range(-30, 90)):
 @pytest.mark.parametrize("rate", ["25", "50", "24000/1001", "30000/1001", "12"])
 def test_the_picture_of_every_frame_is_the_one_of_its_second(video, scene, pictures, fps, base, rate):
     scene.render.fps, scene.render.fps_base = fps, base
-    video.show(scene, video.load(pictures), float(Fraction(rate)))
+    video.show_clip(scene, video.load_clip(pictures), float(Fraction(rate)))
     assert wrong_frames(scene, rate, 0) == []
 
 
 @pytest.mark.parametrize("begins", ["1/2", "-3/4", "1/25", "12"])
 def test_a_changed_setting_counts_at_once(video, scene, pictures, begins):
     scene.render.fps = 25
-    video.show(scene, video.load(pictures), 25.0)
+    video.show_clip(scene, video.load_clip(pictures), 25.0)
     scene.frame_set(10)
     scene.beyond_mocap.video.begins = float(Fraction(begins))
     bpy.context.view_layer.update()
@@ -78,7 +78,7 @@ def test_a_changed_setting_counts_at_once(video, scene, pictures, begins):
 
 
 def test_the_scenes_clock_and_rate_count(video, scene, pictures):
-    video.show(scene, video.load(pictures), 25.0)
+    video.show_clip(scene, video.load_clip(pictures), 25.0)
     settings = scene.beyond_mocap
     settings.start_frame, settings.start_time, settings.video.begins = 101, 2700.0, 2700.0
     scene.render.fps = 60
@@ -132,10 +132,10 @@ def test_the_operators_load_move_and_remove(scene, pictures):
 
 
 def test_another_video_leaves_the_first_undriven(video, scene, pictures, tmp_path):
-    first, second = video.load(pictures), video.load(made_movie(tmp_path / "other.avi", pictures))
-    video.show(scene, first)
-    video.show(scene, second)
-    video.show(scene, second)
+    first, second = video.load_clip(pictures), video.load_clip(made_movie(tmp_path / "other.avi", pictures))
+    video.show_clip(scene, first)
+    video.show_clip(scene, second)
+    video.show_clip(scene, second)
     assert not first.animation_data.drivers and len(second.animation_data.drivers) == 1
     assert scene.active_clip == second
 
@@ -171,7 +171,7 @@ def test_what_is_no_video_is_told_and_changes_nothing(scene, pictures, tmp_path,
 
 def test_it_survives_save_and_load(video, scene, pictures, tmp_path):
     scene.render.fps = 60
-    video.show(scene, video.load(pictures), 25.0)
+    video.show_clip(scene, video.load_clip(pictures), 25.0)
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "file.blend"))
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "file.blend"))
     scene = bpy.context.scene

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import bpy
 import pytest
-from undo import assert_one_step, press
+from undo import assert_one_step, press_operator
 
 SAMPLE = Path(__file__).resolve().parents[3] / "sample_blend" / "library"
 TAUGHT = ("kick_low_inside", "kick_low_inside_slow", "kick_low_top", "jogging_2_9", "walking_1_2")
@@ -55,24 +55,24 @@ def test_words_are_learned_and_proposed_for_a_new_clip(core, rooms, library):
     kick = listed.listed[place_of(listed, "kick")]
     assert kick.source == "learned" and abs(kick.key - 156) <= 2 and kick.confidence > 0.5
     read = core("library.classify.classifier").read_classifier(kept)
-    recording = core("files.bvh.bvh").read(library / "new.bvh").motion
-    same = [one.annotation for one in core("library.proposals").propose(recording, classifier=read)
+    recording = core("files.bvh.bvh").read_bvh(library / "new.bvh").motion
+    same = [one.annotation for one in core("library.proposals").propose_labels(recording, classifier=read)
             if one.confidence >= 0.5]
-    assert [rooms["timeline.proposals"].row_of(one) for one in listed.listed] == same
+    assert [rooms["timeline.proposals"].to_row(one) for one in listed.listed] == same
 
 
 def test_nothing_is_said_until_it_is_accepted(core, rooms, listed):
     rig = bpy.context.object
-    assert rooms["timeline.lanes"].read(rig).keys == ()
+    assert rooms["timeline.lanes"].read_timeline(rig).keys == ()
     number = place_of(listed, "kick")
     assert bpy.ops.beyond_mocap.judge_proposal(what="ACCEPT", index=number) == {"FINISHED"}
-    (key,) = rooms["timeline.lanes"].read(rig).keys
+    (key,) = rooms["timeline.lanes"].read_timeline(rig).keys
     assert key.words == tuple(listed.listed[number].name.split())
     assert listed.listed[number].state == "ACCEPTED"
     bpy.ops.beyond_mocap.judge_proposal(what="ACCEPT", index=number)
-    assert len(rooms["timeline.lanes"].read(rig).keys) == 1, "accepted twice it is said once"
+    assert len(rooms["timeline.lanes"].read_timeline(rig).keys) == 1, "accepted twice it is said once"
     bpy.ops.beyond_mocap.judge_proposal(what="REFUSE", index=number)
-    assert rooms["timeline.lanes"].read(rig).keys == rooms["timeline.lanes"].read(rig).spans == ()
+    assert rooms["timeline.lanes"].read_timeline(rig).keys == rooms["timeline.lanes"].read_timeline(rig).spans == ()
 
 
 def test_the_playhead_goes_to_what_is_looked_at(listed):
@@ -105,9 +105,9 @@ def test_judging_is_one_step_of_undo(listed):
 def test_words_are_saved_with_who_said_them(core, rooms, library, listed):
     rig = bpy.context.object
     bpy.ops.beyond_mocap.judge_proposal(what="ACCEPT", index=place_of(listed, "kick"))
-    clock = rooms["timeline.lanes"].written_for(rig)
+    clock = rooms["timeline.lanes"].read_clock(rig)
     rooms["timeline.lay_strips"].add_span(rig, core("annotation").Span(0.0, 1.0, ("jogging", "front")), clock)
-    press(bpy.ops.beyond_mocap.save_words)
+    press_operator(bpy.ops.beyond_mocap.save_words)
     lines = (library / "new.txt").read_text().splitlines()
     assert all("# rules 0." in line for line in lines if "kick" in line)
     assert [line for line in lines if "jogging" in line] == ["0f 60f jogging front"]
@@ -120,10 +120,10 @@ def test_words_are_saved_with_who_said_them(core, rooms, library, listed):
 def test_a_row_that_is_changed_is_the_users_own(rooms, library, listed):
     rig = bpy.context.object
     bpy.ops.beyond_mocap.judge_proposal(what="ACCEPT", index=place_of(listed, "kick"))
-    moment = rooms["timeline.lanes"].moments(rig)[0]
+    moment = rooms["timeline.lanes"].list_moments(rig)[0]
     bpy.ops.beyond_mocap.go_to_moment(strip=moment.strip, index=moment.index)
     bpy.ops.beyond_mocap.move_moment(frames=3)
-    press(bpy.ops.beyond_mocap.save_words)
+    press_operator(bpy.ops.beyond_mocap.save_words)
     assert "#" not in (library / "new.txt").read_text()
 
 
@@ -151,7 +151,7 @@ def test_what_cannot_be_done_is_told(library, listed):
 def test_what_is_said_already_is_not_proposed_again(rooms, library):
     bpy.ops.beyond_mocap.annotate_clip(path="new.bvh")
     bpy.ops.beyond_mocap.propose_words()
-    before = rooms["timeline.proposals"].sources(bpy.context.object)
+    before = rooms["timeline.proposals"].collect_sources(bpy.context.object)
     bpy.ops.beyond_mocap.propose_words(review=True)
     assert {one.state for one in bpy.context.object.beyond_mocap_proposals.listed} == {"ACCEPTED"}
-    assert rooms["timeline.proposals"].sources(bpy.context.object) == before != {}
+    assert rooms["timeline.proposals"].collect_sources(bpy.context.object) == before != {}

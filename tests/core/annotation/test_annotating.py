@@ -6,24 +6,24 @@ from beyond_mocap.annotation.annotating import (
     KEYS,
     AddMoment,
     AddSpan,
-    AtPlayhead,
-    Go,
-    Leave,
-    Now,
-    State,
-    Tell,
-    pick,
-    press,
+    ChangeAtPlayhead,
+    GoToNeighbour,
+    StopAnnotating,
+    Playhead,
+    AnnotationState,
+    ShowMessage,
+    select_label,
+    handle_key,
 )
-from beyond_mocap.annotation.decision import Held
+from beyond_mocap.annotation.decision import LibraryCombinations
 
 
-def typed(keys, state=State(), times=None, before=None):
+def typed(keys, state=AnnotationState(), times=None, before=None):
     """The state and all commands after these keys, at these times of the playhead (0.1 s apart where not given)."""
     commands = []
     for number, key in enumerate(keys):
         time = times[number] if times else 9.7 + 0.1 * number
-        state, done = press(state, key, Now(time, 0.04, before))
+        state, done = handle_key(state, key, Playhead(time, 0.04, before))
         commands += done
     return state, commands
 
@@ -53,8 +53,8 @@ def test_out_before_in_is_the_other_way_round():
 def test_out_alone_begins_where_the_last_thing_ended():
     assert typed(["OUT", "2", "ENTER"], before=9.0)[1] == [AddSpan(9.0, 9.7, ("walking",))]
     state, commands = typed(["OUT"])
-    assert isinstance(commands[0], Tell) and state == State()
-    assert isinstance(typed(["IN", "OUT"], times=[3.0, 3.01])[1][0], Tell)
+    assert isinstance(commands[0], ShowMessage) and state == AnnotationState()
+    assert isinstance(typed(["IN", "OUT"], times=[3.0, 3.01])[1][0], ShowMessage)
 
 
 def test_back_takes_one_word_and_then_closes_the_menu():
@@ -68,7 +68,7 @@ def test_escape_closes_the_menu_then_the_in_point_then_leaves():
     assert not state.trail and state.start == 9.7 and commands == []
     state, commands = typed(["ESC"], state)
     assert state.start is None and commands == []
-    assert typed(["ESC"], state)[1] == [Leave()]
+    assert typed(["ESC"], state)[1] == [StopAnnotating()]
 
 
 def test_enter_without_words_does_nothing():
@@ -77,7 +77,7 @@ def test_enter_without_words_does_nothing():
 
 
 def test_another_key_accepts_what_was_chosen_first():
-    assert typed(["2", "NEXT"])[1] == [AddMoment(9.7, ("kick",)), Go("moment", 1)]
+    assert typed(["2", "NEXT"])[1] == [AddMoment(9.7, ("kick",)), GoToNeighbour("moment", 1)]
     state, commands = typed(["2", "IN"])
     assert commands == [AddMoment(9.7, ("kick",))] and state.start == pytest.approx(9.8)
 
@@ -89,48 +89,48 @@ def test_an_in_point_survives_a_moment_within_the_stretch():
 
 def test_mirror_swaps_the_words_that_are_being_chosen_else_those_at_the_playhead():
     assert typed(["2", "2", "MIRROR", "ENTER"])[1] == [AddMoment(9.7, ("kick", "left"))]
-    assert typed(["MIRROR"])[1] == [AtPlayhead("mirror")]
+    assert typed(["MIRROR"])[1] == [ChangeAtPlayhead("mirror")]
 
 
 def test_nudging_moves_the_moment_that_is_being_named_else_the_one_at_the_playhead():
     state, commands = typed(["2", "LATER", "LATER", "EARLIER", "ENTER"])
     assert commands[0].time == pytest.approx(9.74)
-    assert typed(["EARLIER", "LATER"])[1] == [AtPlayhead("earlier"), AtPlayhead("later")]
+    assert typed(["EARLIER", "LATER"])[1] == [ChangeAtPlayhead("earlier"), ChangeAtPlayhead("later")]
 
 
 def test_remove_gives_up_the_words_else_removes_what_is_at_the_playhead():
-    assert typed(["2", "REMOVE"]) == (State(time=9.7), [])
-    assert typed(["REMOVE"])[1] == [AtPlayhead("remove")]
+    assert typed(["2", "REMOVE"]) == (AnnotationState(time=9.7), [])
+    assert typed(["REMOVE"])[1] == [ChangeAtPlayhead("remove")]
 
 
 def test_another_player_forgets_the_in_point():
     state, commands = typed(["IN", "NEXT_PLAYER"])
-    assert state.start is None and commands == [Go("player", 1)]
+    assert state.start is None and commands == [GoToNeighbour("player", 1)]
 
 
 def test_a_digit_without_a_word_and_an_unknown_key_do_nothing():
     assert typed(["2", "2", "6"]) == typed(["2", "2"])
-    assert typed(["TAB"]) == (State(), [])
+    assert typed(["TAB"]) == (AnnotationState(), [])
 
 
 def test_a_word_that_the_library_lacks_can_still_be_chosen():
-    state = State(Held((frozenset({"jump"}),), ()))
+    state = AnnotationState(LibraryCombinations((frozenset({"jump"}),), ()))
     assert typed(["2", "ENTER"], state)[1] == [AddMoment(9.7, ("kick",))]
-    shown = {option.word: option.served for option in state.shown}
+    shown = {option.word: option.is_available for option in state.page_options}
     assert shown["jump"] and not shown["kick"]
 
 
 def test_the_mouse_picks_as_the_digit_does():
-    assert pick(State(), "kick", Now(9.7))[0] == typed(["2"])[0]
+    assert select_label(AnnotationState(), "kick", Playhead(9.7))[0] == typed(["2"])[0]
 
 
 def test_pages_go_round():
     state, _ = typed(["NEXT_PAGE"])
-    assert (state.page, state.pages) == (1, 2)
+    assert (state.page, state.page_count) == (1, 2)
     assert typed(["NEXT_PAGE"], state)[0].page == typed(["PREVIOUS_PAGE"], state)[0].page == 0
 
 
 def test_every_key_of_the_table_is_understood_in_every_state():
     for before in ([], ["2"], ["IN"], ["IN", "OUT"]):
         for key in (*KEYS, *"0123456789"):
-            press(typed(before)[0], key, Now(1.0))
+            handle_key(typed(before)[0], key, Playhead(1.0))

@@ -15,27 +15,27 @@ from beyond_mocap.annotation import (
     KeyMoment,
     Span,
     Timeline,
-    automatic_gaits,
-    avoided_per_frame,
-    fill,
+    choose_gaits,
+    avoided_labels_per_frame,
+    fill_timeline,
     format_timeline,
-    gait_thresholds,
-    missing_keys,
-    nearest,
+    compute_gait_thresholds,
+    find_missing_keys,
+    find_nearest_labels,
     parse_timeline,
-    problems,
+    find_problems,
     read_annotation_csv,
     read_clip_annotations,
     read_timeline,
-    recorded_thresholds,
-    relatives,
-    similar_words,
-    spoken,
+    estimate_gait_thresholds,
+    find_relatives,
+    find_similar_labels,
+    sort_labels,
     swap_sides,
-    validate,
-    vocabulary_words,
-    words_below,
-    words_per_frame,
+    check_timeline,
+    list_vocabulary,
+    list_labels_below,
+    labels_per_frame,
 )
 from beyond_mocap.base.errors import InputError
 
@@ -54,7 +54,7 @@ FAUSTINO = """\
 def complaint(text, **options):
     """The message that reading and validating `text` ends with."""
     with pytest.raises(InputError) as caught:
-        validate(parse_timeline(text, "a.txt", fps=30), where="a.txt", **options)
+        check_timeline(parse_timeline(text, "a.txt", fps=30), where="a.txt", **options)
     return str(caught.value)
 
 
@@ -62,28 +62,28 @@ def complaint(text, **options):
 
 
 def test_the_tree_holds_the_words_of_the_appendix():
-    words = vocabulary_words()
+    words = list_vocabulary()
     assert {"kick", "bicycle", "half", "with_setup", "subtle", "left", "long_duration", "letgo", "sprinting"} <= words
-    assert "moonwalk" not in words and "moonwalk" in vocabulary_words(["moonwalk"])
+    assert "moonwalk" not in words and "moonwalk" in list_vocabulary(["moonwalk"])
     assert "kick" in DISCRETE and "walking" in CONTINUOUS and not DISCRETE & CONTINUOUS
 
 
 def test_the_tree_knows_what_comes_below_and_beside():
-    assert words_below(["kick", "low"]) == ("inside", "outside", "top", "volley")
-    assert words_below(["stomp", "dive", "short_duration"]) == ("high", "low")
-    assert {"foot", "body", "low"} <= relatives("receive") and "kick" not in relatives("receive")
+    assert list_labels_below(["kick", "low"]) == ("inside", "outside", "top", "volley")
+    assert list_labels_below(["stomp", "dive", "short_duration"]) == ("high", "low")
+    assert {"foot", "body", "low"} <= find_relatives("receive") and "kick" not in find_relatives("receive")
 
 
 @pytest.mark.parametrize("word, meant", [("kikc", "kick"), ("Insid".lower(), "inside"), ("dribbel", "dribble")])
 def test_misspelt_words_find_the_one_meant(word, meant):
-    assert similar_words(word, vocabulary_words())[0] == meant
+    assert find_similar_labels(word, list_vocabulary())[0] == meant
 
 
 def test_nearest_puts_the_action_before_its_colour():
     held = [("jump", "high", "right"), ("kick", "low", "left"), ("walking",), ("kick", "high", "left", "running")]
-    assert nearest(["kick", "high", "right"], held) == (held[3], held[1], held[0])
-    assert nearest(["header"], held, count=1) == (held[0],)
-    assert nearest(["kick", "low"], [("low", "kick"), ("kick", "low")]) == (("kick", "low"),)
+    assert find_nearest_labels(["kick", "high", "right"], held) == (held[3], held[1], held[0])
+    assert find_nearest_labels(["header"], held, count=1) == (held[0],)
+    assert find_nearest_labels(["kick", "low"], [("low", "kick"), ("kick", "low")]) == (("kick", "low"),)
 
 
 def test_sides_change_places_and_come_back():
@@ -99,7 +99,7 @@ def test_faustinos_example_is_read_as_he_means_it():
     timeline = parse_timeline(FAUSTINO)
     assert timeline.keys == (KeyMoment(9.8, ("top", "kick", "low", "right")),)
     assert [span.words for span in timeline.spans] == [(), ("right", "dribble"), (), ("celebration", "arms", "inside")]
-    assert problems(timeline, start=0.0, end=20.0) == []
+    assert find_problems(timeline, start=0.0, end=20.0) == []
 
 
 def test_comments_marks_line_ends_and_frames():
@@ -143,7 +143,7 @@ TOKENS = "0 1 2.5 9f -3 1e400 nan inf kick walking -walking -kick - transition -
 @given(st.lists(st.sampled_from(TOKENS), max_size=12))
 def test_any_line_of_plausible_tokens_is_read_or_refused(tokens):
     try:
-        validate(parse_timeline(" ".join(tokens[:6]) + "\n" + " ".join(tokens[6:]), "a.txt", fps=30), start=0, end=10)
+        check_timeline(parse_timeline(" ".join(tokens[:6]) + "\n" + " ".join(tokens[6:]), "a.txt", fps=30), start=0, end=10)
     except InputError as error:
         assert "\n" not in str(error)
 
@@ -186,16 +186,16 @@ def test_frames_without_a_rate_are_refused():
 
 def test_a_key_inside_a_span_and_touching_spans_are_fine():
     text = "0 3 walking\n3 6 dribble\n4 kick\n0 20\n6 8 transition"
-    assert problems(parse_timeline(text), start=0.0, end=20.0) == []
+    assert find_problems(parse_timeline(text), start=0.0, end=20.0) == []
 
 
 def test_user_words_are_words():
     assert "moonwalk" in complaint("0 1 moonwalk")
-    validate(parse_timeline("0 1 moonwalk"), known_words=["moonwalk"])
+    check_timeline(parse_timeline("0 1 moonwalk"), known_labels=["moonwalk"])
 
 
 def test_all_problems_are_told_in_order():
-    found = problems(parse_timeline("5 6 fooo\n0 1 baar\n"), where="t")
+    found = find_problems(parse_timeline("5 6 fooo\n0 1 baar\n"), where="t")
     assert [str(problem).split(":")[1] for problem in found] == ["2", "1"]
 
 
@@ -222,7 +222,7 @@ def test_words_that_must_not_be_stand_behind_a_dash():
     timeline = parse_timeline("0 20 -Dribble\n3.2 6 running -sprinting\n4 kick -left")
     assert timeline.spans == (Span(0, 20, avoid=("dribble",)), Span(3.2, 6, ("running",), avoid=("sprinting",)))
     assert timeline.keys == (KeyMoment(4, ("kick",), avoid=("left",)),)
-    assert problems(timeline, start=0.0, end=20.0) == []
+    assert find_problems(timeline, start=0.0, end=20.0) == []
     assert format_timeline(timeline) == "0 20 -dribble\n3.2 6 running -sprinting\n4 kick -left\n"
 
 
@@ -231,7 +231,7 @@ def test_words_that_must_not_be_stand_behind_a_dash():
 
 def test_words_hold_from_start_up_to_end():
     timeline = parse_timeline("0 2 walking\n2 3 transition\n3 4 right dribble\n4 5")
-    assert words_per_frame(timeline, np.arange(11) * 0.5) == [
+    assert labels_per_frame(timeline, np.arange(11) * 0.5) == [
         *[frozenset({"walking"})] * 4,
         *[None] * 2,
         *[frozenset({"right", "dribble"})] * 2,
@@ -241,16 +241,16 @@ def test_words_hold_from_start_up_to_end():
 
 def test_words_are_avoided_from_start_up_to_end_but_for_those_that_are_asked():
     timeline = parse_timeline("0 4 -dribble -kick\n1 2 dribble\n2 3 walking -back")
-    assert avoided_per_frame(timeline, np.arange(5.0)) == [
+    assert avoided_labels_per_frame(timeline, np.arange(5.0)) == [
         {"dribble", "kick"}, {"kick"}, {"dribble", "kick", "back"}, {"dribble", "kick"}, {"dribble", "kick"},
     ]
-    assert avoided_per_frame(parse_timeline("0 4 walking"), np.arange(5.0)) == [frozenset()] * 5
+    assert avoided_labels_per_frame(parse_timeline("0 4 walking"), np.arange(5.0)) == [frozenset()] * 5
 
 
 def test_automatic_gaits_fill_what_is_left_open():
     times = np.arange(101) * 0.1
     automatic = [("walking",) if t < 5 else ("running",) for t in times]
-    filled = fill(parse_timeline("2 4 dribble\n6 7\n9 10 transition\n3 kick"), times, automatic)
+    filled = fill_timeline(parse_timeline("2 4 dribble\n6 7\n9 10 transition\n3 kick"), times, automatic)
     assert [(span.start, span.end, span.words) for span in filled.spans] == [
         (0.0, 2.0, ("walking",)),
         (2.0, 4.0, ("dribble",)),
@@ -271,36 +271,36 @@ def test_filling_leaves_no_frame_without_words(pieces, gaits):
     times = np.linspace(0.0, 10.0, len(gaits))
     asked = Timeline(tuple(Span(a, a + length, ("dribble",) if worded else ()) for a, length, worded in pieces))
     automatic = [(gait,) for gait in gaits]
-    filled = fill(asked, times, automatic)
-    for before, after, gait in zip(words_per_frame(asked, times), words_per_frame(filled, times), gaits):
+    filled = fill_timeline(asked, times, automatic)
+    for before, after, gait in zip(labels_per_frame(asked, times), labels_per_frame(filled, times), gaits):
         assert after == (before or {gait})
-    assert fill(filled, times, automatic) == filled
+    assert fill_timeline(filled, times, automatic) == filled
 
 
 # --- gaits
 
 
 def test_thresholds_lie_a_quarter_up_and_standing_ends_where_a_body_would_glide():
-    np.testing.assert_allclose(gait_thresholds([1.0, 3.0, 5.0]), [1.5, 3.5])
-    np.testing.assert_allclose(gait_thresholds([0.1, 0.5, 2.9]), [0.3, 1.1])
-    assert len(gait_thresholds([1.0])) == 0
+    np.testing.assert_allclose(compute_gait_thresholds([1.0, 3.0, 5.0]), [1.5, 3.5])
+    np.testing.assert_allclose(compute_gait_thresholds([0.1, 0.5, 2.9]), [0.3, 1.1])
+    assert len(compute_gait_thresholds([1.0])) == 0
     for wrong in ([2.0, 1.0], [1.0, np.nan]):
         with pytest.raises(InputError):
-            gait_thresholds(wrong)
+            compute_gait_thresholds(wrong)
 
 
 def test_recorded_thresholds_lie_where_the_labels_change():
     rng = np.random.default_rng(1)
     speed = np.concatenate([rng.uniform(0.0, 0.2, 300), rng.uniform(0.7, 2.0, 300), rng.uniform(2.0, 4.0, 300)])
-    found = recorded_thresholds(np.array([0.1, 1.3, 2.9]), speed, np.repeat([0, 1, 2], 300))
+    found = estimate_gait_thresholds(np.array([0.1, 1.3, 2.9]), speed, np.repeat([0, 1, 2], 300))
     assert found[0] == 0.3 and abs(found[1] - 2.0) < 0.03
-    gaits = automatic_gaits(np.full(60, 1.9), 30, [0.1, 1.3, 2.9], found)
+    gaits = choose_gaits(np.full(60, 1.9), 30, [0.1, 1.3, 2.9], found)
     assert set(gaits) == {1}
 
 
 def test_steady_speeds_get_their_own_gait():
     speeds = np.array([0.1, 1.4, 2.8, 4.5, 6.5])
-    gaits = automatic_gaits(np.repeat(speeds, 60), 30, speeds, gait_thresholds(speeds))
+    gaits = choose_gaits(np.repeat(speeds, 60), 30, speeds, compute_gait_thresholds(speeds))
     assert gaits.tolist() == np.repeat(np.arange(5), 60).tolist()
     assert LOCOMOTION[gaits[0]] == "standing"
 
@@ -310,8 +310,8 @@ def test_a_speed_at_the_boundary_does_not_flicker():
     speeds = np.array([0.1, 1.3, 2.9])
     noise = np.convolve(rng.normal(size=1200), np.hanning(15), "same")
     speed = 1.7 + 0.15 * noise / noise.std()
-    plain = np.count_nonzero(np.diff(np.searchsorted(gait_thresholds(speeds), speed)))
-    steady = np.count_nonzero(np.diff(automatic_gaits(speed, 30, speeds, gait_thresholds(speeds))))
+    plain = np.count_nonzero(np.diff(np.searchsorted(compute_gait_thresholds(speeds), speed)))
+    steady = np.count_nonzero(np.diff(choose_gaits(speed, 30, speeds, compute_gait_thresholds(speeds))))
     assert plain > 60 and steady < plain / 8
 
 
@@ -319,7 +319,7 @@ def test_a_speed_at_the_boundary_does_not_flicker():
 @given(st.lists(st.floats(0, 12), max_size=80), st.integers(1, 5))
 def test_gaits_are_in_range_and_last(speed, count):
     speeds = np.linspace(0.2, 8.0, count)
-    gaits = automatic_gaits(np.array(speed), 10, speeds, gait_thresholds(speeds), minimum=0.4)
+    gaits = choose_gaits(np.array(speed), 10, speeds, compute_gait_thresholds(speeds), minimum=0.4)
     assert len(gaits) == len(speed) and np.all((gaits >= 0) & (gaits < count))
     edges = np.flatnonzero(np.diff(gaits)) + 1
     assert not len(edges) or np.diff([0, *edges, len(gaits)]).min() >= 4
@@ -408,16 +408,16 @@ def test_the_recordings_annotations_are_read_whole():
 def test_the_scenarios_are_valid_and_what_the_recordings_lack_is_named(number):
     file = DATA / "tracking" / "scenarios" / f"scenario{number}_annotations.txt"
     timeline = read_timeline(file)
-    validate(timeline, start=0.0, end=27.0, where=str(file))
+    check_timeline(timeline, start=0.0, end=27.0, where=str(file))
     assert parse_timeline(format_timeline(timeline)) == timeline
     clips = read_annotation_csv(DATA / "mocap" / "annotations.csv").values()
     held = [words for clip in clips for a in clip if a.key is not None for words in (a.words, swap_sides(a.words))]
-    lacking = missing_keys(timeline, held)
+    lacking = find_missing_keys(timeline, held)
     assert all(not set(key.words).isdisjoint({"receive", "slide", "header"}) for key, _ in lacking)
     assert all(len(offers) == 3 for _, offers in lacking)
 
 
 def test_words_are_told_as_one_says_them():
-    assert spoken({"low", "right", "front", "standing", "kick"}) == ("kick", "right", "standing", "low", "front")
-    assert spoken({"front", "walking"}) == ("walking", "front")
-    assert set(spoken({"mine", "header"})) == {"mine", "header"}
+    assert sort_labels({"low", "right", "front", "standing", "kick"}) == ("kick", "right", "standing", "low", "front")
+    assert sort_labels({"front", "walking"}) == ("walking", "front")
+    assert set(sort_labels({"mine", "header"})) == {"mine", "header"}

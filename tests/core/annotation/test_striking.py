@@ -3,20 +3,20 @@
 import numpy as np
 import pytest
 
-from beyond_mocap.annotation.ball_contact import contact_gap, met_within, striking_part
-from beyond_mocap.motion.humanoid import identify
-from beyond_mocap.motion.motion import pose_kinematics
+from beyond_mocap.annotation.ball_contact import measure_contact_gap, find_contact_window, find_striking_part
+from beyond_mocap.motion.humanoid import identify_joints
+from beyond_mocap.motion.motion import compute_pose
 from beyond_mocap.motion.quaternion import identity
-from beyond_mocap.motion.retargeting.adult import adult_skeleton
+from beyond_mocap.motion.retargeting.adult import build_adult_skeleton
 
-SKELETON = adult_skeleton()
-BODY = identify(SKELETON)
-JOINTS, TURNS = pose_kinematics(SKELETON, np.array([0.0, 0.0, 0.95]), identity(len(SKELETON)))
+SKELETON = build_adult_skeleton()
+BODY = identify_joints(SKELETON)
+JOINTS, TURNS = compute_pose(SKELETON, np.array([0.0, 0.0, 0.95]), identity(len(SKELETON)))
 TIPS = JOINTS[list(SKELETON.end_parents)] + SKELETON.end_offsets
 
 
 def gap(words, ball):
-    return contact_gap(SKELETON, JOINTS, TURNS, words.split(), np.asarray(ball))
+    return measure_contact_gap(SKELETON, JOINTS, TURNS, words.split(), np.asarray(ball))
 
 
 @pytest.mark.parametrize(
@@ -32,7 +32,7 @@ def gap(words, ball):
     ],
 )
 def test_words_name_the_part(words, part):
-    assert striking_part(words.split()) == part
+    assert find_striking_part(words.split()) == part
 
 
 @pytest.mark.parametrize("distance", [-0.02, 0.0, 0.005, 0.3])
@@ -70,4 +70,4 @@ def test_either_hand_serves_a_dive_whose_side_is_where_it_goes():
                      ("kick slide", False)]
 )
 def test_only_a_dive_by_hand_may_meet_the_ball_after_its_key(words, later):
-    assert (met_within(words.split()) > 0.0) == later
+    assert (find_contact_window(words.split()) > 0.0) == later

@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from beyond_mocap.appearance.body import MATERIALS, deformed, low_poly_body
+from beyond_mocap.appearance.body import MATERIALS, deform_body, build_body
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.motion import quaternion
-from beyond_mocap.motion.motion import forward_kinematics, pose_kinematics
-from beyond_mocap.motion.retargeting.adult import adult_skeleton
-from beyond_mocap.motion.retargeting.neutral import neutral_stance
-from beyond_mocap.synthetic.gait import gait
+from beyond_mocap.motion.motion import forward_kinematics, compute_pose
+from beyond_mocap.motion.retargeting.adult import build_adult_skeleton
+from beyond_mocap.motion.retargeting.neutral import build_neutral_stance
+from beyond_mocap.synthetic.gait import build_gait
 
 MOCAP = pathlib.Path(__file__).parents[3] / "../shared/data/mocap"
 
@@ -46,41 +46,41 @@ def parts(faces) -> list[list]:
 
 
 def test_closed_volumes_that_face_outwards():
-    body = low_poly_body(adult_skeleton())
+    body = build_body(build_adult_skeleton())
     edges = Counter((face[i], face[(i + 1) % len(face)]) for face in body.faces for i in range(len(face)))
     assert set(edges.values()) == {1} and all(edges[b, a] == 1 for a, b in edges)
-    neutral = neutral_stance(adult_skeleton())
-    standing = deformed(body, neutral.skeleton, neutral.positions, neutral.rotations)
+    neutral = build_neutral_stance(build_adult_skeleton())
+    standing = deform_body(body, neutral.skeleton, neutral.positions, neutral.rotations)
     assert all(volume(standing, piece) > 0 for piece in parts(body.faces))
     assert 0.06 < volume(standing, body.faces) < 0.11  # 60 to 110 litres with overlaps
 
 
 def test_weights_sum_to_one_and_all_materials_are_used():
-    body = low_poly_body(adult_skeleton())
+    body = build_body(build_adult_skeleton())
     assert np.allclose(body.weights.sum(axis=1), 1.0) and np.all(body.weights >= 0.0)
     assert set(body.material) == set(range(len(MATERIALS)))
     assert len(body.material) == len(body.faces) and len(body.vertices) < 3000
 
 
 def test_as_tall_as_asked_and_on_the_ground():
-    skeleton = adult_skeleton()
-    neutral = neutral_stance(skeleton)
-    standing = deformed(low_poly_body(skeleton), skeleton, neutral.positions, neutral.rotations)
+    skeleton = build_adult_skeleton()
+    neutral = build_neutral_stance(skeleton)
+    standing = deform_body(build_body(skeleton), skeleton, neutral.positions, neutral.rotations)
     assert standing[:, 2].min() == pytest.approx(0.0, abs=0.01)
     assert 1.76 < standing[:, 2].max() < 1.86
     assert np.ptp(standing[:, 1]) < 0.6
 
 
 def test_moves_rigidly_with_the_root():
-    motion = gait(3.0, 1.0)
-    body = low_poly_body(motion.skeleton)
+    motion = build_gait(3.0, 1.0)
+    body = build_body(motion.skeleton)
     places, world = forward_kinematics(motion)
-    turn = quaternion.about_up(np.full(len(motion), 1.1))
+    turn = quaternion.from_up_angle(np.full(len(motion), 1.1))
     local = motion.rotations.copy()
     local[:, 0] = quaternion.multiply(turn, local[:, 0])
-    turned = pose_kinematics(motion.skeleton, quaternion.rotate(turn, motion.root_positions), local)
-    expected = quaternion.rotate(turn[:, None], deformed(body, motion.skeleton, places, world))
-    assert np.allclose(deformed(body, motion.skeleton, *turned), expected, atol=1e-9)
+    turned = compute_pose(motion.skeleton, quaternion.rotate(turn, motion.root_positions), local)
+    expected = quaternion.rotate(turn[:, None], deform_body(body, motion.skeleton, places, world))
+    assert np.allclose(deform_body(body, motion.skeleton, *turned), expected, atol=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -91,14 +91,14 @@ def test_moves_rigidly_with_the_root():
 def test_fits_recorded_skeletons(clip):
     if not (MOCAP / clip).exists():
         pytest.skip(f"needs {MOCAP / clip}")
-    motion = bvh.read(MOCAP / clip, 0.05644 if "cmu10" in clip else None).motion
-    body = low_poly_body(motion.skeleton)
-    neutral = neutral_stance(motion.skeleton)
-    standing = deformed(body, motion.skeleton, neutral.positions, neutral.rotations)
+    motion = bvh.read_bvh(MOCAP / clip, 0.05644 if "cmu10" in clip else None).motion
+    body = build_body(motion.skeleton)
+    neutral = build_neutral_stance(motion.skeleton)
+    standing = deform_body(body, motion.skeleton, neutral.positions, neutral.rotations)
     # 1.3 to 2.1 m tall, wider across than 0.3 m, and no vertex torn away from its joint
     assert 1.3 < np.ptp(standing[:, 2]) < 2.1 and 0.3 < np.ptp(standing[:, 1]) < 0.9
     places, world = forward_kinematics(motion.frames(0, 1))
-    posed = deformed(body, motion.skeleton, places, world)[0]
+    posed = deform_body(body, motion.skeleton, places, world)[0]
     leader = np.take_along_axis(body.joints, np.argmax(body.weights, axis=1)[:, None], axis=1)[:, 0]
     near = np.linalg.norm(posed - places[0][leader], axis=1)
     assert np.all(np.isfinite(posed)) and near.max() < 0.6
@@ -106,10 +106,10 @@ def test_fits_recorded_skeletons(clip):
 
 def bowed(degrees: float):
     """A walk of the adult skeleton whose head is bowed by `degrees` in every frame."""
-    motion = gait(1.3, 3.0, 30.0, adult_skeleton())
+    motion = build_gait(1.3, 3.0, 30.0, build_adult_skeleton())
     head = motion.skeleton.index("Head")
     rotations = motion.rotations.copy()
-    turn = quaternion.about_axis(np.array([0.0, 1.0, 0.0]), np.radians(degrees))
+    turn = quaternion.from_axis_angle(np.array([0.0, 1.0, 0.0]), np.radians(degrees))
     rotations[:, head] = quaternion.multiply(rotations[:, head], np.tile(turn, (len(motion), 1)))
     return replace(motion, rotations=rotations)
 
@@ -120,7 +120,7 @@ def face_pitch(body, motion) -> float:
     mine = (body.joints[:, 0] == head) & (body.weights[:, 0] == 1.0)
     places, world = forward_kinematics(motion)
     shown = [
-        deformed(one, motion.skeleton, places[0], world[0])[mine] for one in (body, low_poly_body(motion.skeleton))
+        deform_body(one, motion.skeleton, places[0], world[0])[mine] for one in (body, build_body(motion.skeleton))
     ]
     drawn, rest = (points - points.mean(axis=0) for points in shown)
     u, _, v = np.linalg.svd(drawn.T @ rest)
@@ -132,4 +132,4 @@ def face_pitch(body, motion) -> float:
 def test_a_face_that_looks_down_in_the_example_is_drawn_so(degrees, least, most):
     """Kicks look down: the head's rest tells. Where the example looks up by its rest pose, the rest pose is bowed."""
     motion = bowed(degrees)
-    assert least <= abs(face_pitch(low_poly_body(motion.skeleton, example=motion), motion)) <= most
+    assert least <= abs(face_pitch(build_body(motion.skeleton, example=motion), motion)) <= most

@@ -5,16 +5,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from beyond_mocap.appearance.picture import COLOURS, pose_picture
+from beyond_mocap.appearance.picture import COLOURS, render_pose
 from beyond_mocap.files.bvh import bvh
-from beyond_mocap.motion.motion import place
+from beyond_mocap.motion.motion import place_motion
 
 SAMPLE = Path(__file__).resolve().parents[3] / "sample_blend" / "library"
 
 
 @pytest.fixture(scope="module")
 def motion():
-    return bvh.read(SAMPLE / "standing_1.bvh").motion
+    return bvh.read_bvh(SAMPLE / "standing_1.bvh").motion
 
 
 def like(picture, part):
@@ -25,16 +25,16 @@ def like(picture, part):
 
 
 def test_a_standing_body_has_its_feet_below_its_shirt(motion):
-    picture = pose_picture(motion, 30)
+    picture = render_pose(motion, 30)
     assert picture.shape == (256, 256, 4) and picture.min() >= 0.0 and picture.max() <= 1.0
     assert like(picture, "socks").mean() < like(picture, "shirt").mean()
     assert 0.03 < np.mean(picture[..., 3] > 0.9) < 0.5 and picture[-3:, :, 3].max() == 0.0
 
 
 def test_it_is_the_same_wherever_the_body_is(motion):
-    one, other = pose_picture(motion, 30), pose_picture(place(motion, 2.3, (40.0, -7.0, 0.0)), 30)
+    one, other = render_pose(motion, 30), render_pose(place_motion(motion, 2.3, (40.0, -7.0, 0.0)), 30)
     assert np.mean(np.abs(one[..., 3] - other[..., 3])) < 0.05
 
 
 def test_any_size(motion):
-    assert pose_picture(motion, 0, 64).shape == (64, 64, 4)
+    assert render_pose(motion, 0, 64).shape == (64, 64, 4)

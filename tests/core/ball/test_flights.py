@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from beyond_mocap.ball.batch import courses
+from beyond_mocap.ball.batch import simulate_trajectories
 from beyond_mocap.ball.physics import FOOTBALL
-from beyond_mocap.ball.tracked.fit import coarse_courses, fit_launches, gathered
-from beyond_mocap.ball.tracked.solve import solve
+from beyond_mocap.ball.tracked.fit import simulate_coarse_trajectories, fit_launches, collect_stretches
+from beyond_mocap.ball.tracked.solve import solve_samples
 
 STEP = 0.04
 
@@ -15,7 +15,7 @@ def planted(velocities, seconds, spins, noise=0.03, seed=1):
     """(times, positions, spans, truth): launches one after the other from the origin, with pauses."""
     random = np.random.default_rng(seed)
     grid = np.arange(int(seconds / STEP) + 1) * STEP
-    places, _ = courses(np.array([0.0, 0.0, 0.11]), velocities, spins, FOOTBALL, grid)
+    places, _ = simulate_trajectories(np.array([0.0, 0.0, 0.11]), velocities, spins, FOOTBALL, grid)
     times = np.concatenate([k * (seconds + 1.0) + grid for k in range(len(places))])
     positions = places.reshape(-1, 3) + random.normal(0.0, noise, (len(times), 3))
     spans = []
@@ -35,7 +35,7 @@ def test_planted_launches_come_back(heights):
             for vector in span[2:]:
                 vector[2] = np.nan
     every = np.ones(len(times), bool)
-    found = fit_launches(gathered(times, positions, every, every, spans))
+    found = fit_launches(collect_stretches(times, positions, every, every, spans))
     assert np.abs(found.velocity[:, :2] - velocities[:, :2]).max() < 0.6
     assert np.abs(found.velocity[:, 2] - velocities[:, 2]).max() < (0.5 if heights else 2.5)
 
@@ -44,8 +44,8 @@ def test_coarse_steps_go_where_the_physics_goes():
     random = np.random.default_rng(0)
     velocity = np.column_stack([random.normal(0.0, 9.0, (300, 2)), random.uniform(0.0, 9.0, 300)])
     place, spin = np.tile([0.0, 0.0, 0.11], (300, 1)), random.normal(0.0, 15.0, (300, 3))
-    rough, _ = coarse_courses(place, velocity, spin, FOOTBALL, STEP, 25)
-    fine, _ = courses(place, velocity, spin, FOOTBALL, np.arange(26) * STEP)
+    rough, _ = simulate_coarse_trajectories(place, velocity, spin, FOOTBALL, STEP, 25)
+    fine, _ = simulate_trajectories(place, velocity, spin, FOOTBALL, np.arange(26) * STEP)
     off = np.linalg.norm(rough[:, -1] - fine[:, -1], axis=1)
     assert np.median(off) < 0.08
     assert np.percentile(off, 95) < 0.3
@@ -54,14 +54,14 @@ def test_coarse_steps_go_where_the_physics_goes():
 def test_a_pass_in_the_air_is_a_flight_with_its_bounce():
     velocities = np.array([[16.0, 3.0, 7.0]])
     grid = np.arange(56) * STEP
-    places, _ = courses(np.array([0.0, 0.0, 0.11]), velocities, np.zeros(3), FOOTBALL, grid)
+    places, _ = simulate_trajectories(np.array([0.0, 0.0, 0.11]), velocities, np.zeros(3), FOOTBALL, grid)
     way = places[0]
     still = 25
     ball = np.vstack([np.tile(way[0], (still, 1)), way, np.tile(way[-1] * [1, 1, 0] + [0, 0, 0.11], (still, 1))])
     ball += np.random.default_rng(2).normal(0.0, 0.03, ball.shape)
     times = np.arange(len(ball)) * STEP
     positions = np.stack([np.tile([-0.3, 0.0], (len(ball), 1)), np.tile(way[-1, :2] + [0.4, 0.0], (len(ball), 1))])
-    solved = solve(times, ball, positions, ["home_1", "home_2"])
+    solved = solve_samples(times, ball, positions, ["home_1", "home_2"])
     flights = [piece for piece in solved.pieces if piece.kind == "flight"]
     assert len(flights) == 1
     assert len(flights[0].bounces) >= 1

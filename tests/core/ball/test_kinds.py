@@ -5,15 +5,15 @@ import csv
 import numpy as np
 import pytest
 
-from beyond_mocap.ball.tracked.kinds import ball_ends, keeper_kind, keepers, kind_of, leaves_line, part_of
-from beyond_mocap.ball.tracked.solve import SolvedTouch, solve
+from beyond_mocap.ball.tracked.kinds import find_ball_ends, choose_keeper_kind, find_keepers, choose_touch_kind, is_from_touch_line, choose_part
+from beyond_mocap.ball.tracked.solve import SolvedTouch, solve_samples
 from beyond_mocap.ball.tracked.touches import choose_players
 from beyond_mocap.files.tables import TOUCH_COLUMNS, write_touches
 
 
 @pytest.mark.parametrize("height, part", [(0.11, "foot"), (0.8, "foot"), (1.2, "chest"), (1.9, "head"), (None, "foot")])
 def test_parts_by_height(height, part):
-    assert part_of(height) == part
+    assert choose_part(height) == part
 
 
 @pytest.mark.parametrize("before, after, next_, earlier, kind", [
@@ -23,7 +23,7 @@ def test_parts_by_height(height, part):
     ((16.0, 0.0), (11.0, 5.0), False, False, "deflection"),
 ])  # fmt: skip
 def test_words_by_what_the_ball_does(before, after, next_, earlier, kind):
-    assert kind_of("foot", np.array([*before, 0.0]), np.array([*after, 0.0]), next_, earlier) == kind
+    assert choose_touch_kind("foot", np.array([*before, 0.0]), np.array([*after, 0.0]), next_, earlier) == kind
 
 
 def test_goal_and_out_are_told_apart():
@@ -31,33 +31,33 @@ def test_goal_and_out_are_told_apart():
     def way(start, velocity):
         return np.array(start) + times[:, None] * np.array(velocity)
 
-    goal = ball_ends(times, way([45.0, 1.0, 0.3], [12.0, 0.0, 0.0]), 105.0, 68.0)
+    goal = find_ball_ends(times, way([45.0, 1.0, 0.3], [12.0, 0.0, 0.0]), 105.0, 68.0)
     assert [end.kind for end in goal] == ["goal"]
     assert abs(goal[0].time - (52.5 + 0.11 - 45.0) / 12.0) < 1e-6
-    assert [end.kind for end in ball_ends(times, way([45.0, 1.0, 3.0], [12.0, 0.0, 0.0]), 105.0, 68.0)] == ["goal line"]
-    assert [end.kind for end in ball_ends(times, way([0.0, 30.0, 0.3], [1.0, 3.0, 0.0]), 105.0, 68.0)] == ["touch line"]
-    assert ball_ends(times, way([0.0, 0.0, 0.3], [1.0, 3.0, 0.0]), 105.0, 68.0) == []
+    assert [end.kind for end in find_ball_ends(times, way([45.0, 1.0, 3.0], [12.0, 0.0, 0.0]), 105.0, 68.0)] == ["goal line"]
+    assert [end.kind for end in find_ball_ends(times, way([0.0, 30.0, 0.3], [1.0, 3.0, 0.0]), 105.0, 68.0)] == ["touch line"]
+    assert find_ball_ends(times, way([0.0, 0.0, 0.3], [1.0, 3.0, 0.0]), 105.0, 68.0) == []
 
 
 def test_a_keeper_saves_shots_and_holds_what_is_high():
     shot, lob = np.array([20.0, 0.5, 1.0]), np.array([3.0, 0.0, -2.0])
-    assert keeper_kind(np.array([50.0, 1.0, 0.8]), shot, 52.5, True) == ("hand", "save")
-    assert keeper_kind(np.array([50.0, 1.0, 0.12]), shot, 52.5, True) == ("foot", "save")
-    assert keeper_kind(np.array([45.0, 1.0, 1.6]), lob, 52.5, True) == ("hand", "hand")
-    assert keeper_kind(np.array([20.0, 1.0, 1.6]), lob, 52.5, True) is None
-    assert keeper_kind(np.array([45.0, 1.0, 0.12]), lob, 52.5, True) is None
+    assert choose_keeper_kind(np.array([50.0, 1.0, 0.8]), shot, 52.5, True) == ("hand", "save")
+    assert choose_keeper_kind(np.array([50.0, 1.0, 0.12]), shot, 52.5, True) == ("foot", "save")
+    assert choose_keeper_kind(np.array([45.0, 1.0, 1.6]), lob, 52.5, True) == ("hand", "hand")
+    assert choose_keeper_kind(np.array([20.0, 1.0, 1.6]), lob, 52.5, True) is None
+    assert choose_keeper_kind(np.array([45.0, 1.0, 0.12]), lob, 52.5, True) is None
 
 
 def test_keepers_are_those_who_stand_deepest():
     home = np.array([[-48.0, 0.0], [-20.0, 5.0], [-10.0, -5.0], [5.0, 0.0]])
     positions = np.repeat(np.concatenate([home, -home])[:, None], 9, axis=1)
-    assert keepers(positions, ["home"] * 4 + ["away"] * 4) == {"home": 0, "away": 4}
+    assert find_keepers(positions, ["home"] * 4 + ["away"] * 4) == {"home": 0, "away": 4}
 
 
 def test_a_ball_leaves_the_line_inward():
-    assert leaves_line(np.array([10.0, 33.8, 2.0]), np.array([5.0, -8.0, 2.0]), 68.0)
-    assert not leaves_line(np.array([10.0, 33.8, 2.0]), np.array([5.0, 8.0, 2.0]), 68.0)
-    assert not leaves_line(np.array([10.0, 20.0, 2.0]), np.array([5.0, -8.0, 2.0]), 68.0)
+    assert is_from_touch_line(np.array([10.0, 33.8, 2.0]), np.array([5.0, -8.0, 2.0]), 68.0)
+    assert not is_from_touch_line(np.array([10.0, 33.8, 2.0]), np.array([5.0, 8.0, 2.0]), 68.0)
+    assert not is_from_touch_line(np.array([10.0, 20.0, 2.0]), np.array([5.0, -8.0, 2.0]), 68.0)
 
 
 def test_the_ball_over_the_touch_line_comes_back_by_a_throw_in():
@@ -69,7 +69,7 @@ def test_the_ball_over_the_touch_line_comes_back_by_a_throw_in():
     ball = np.column_stack([np.interp(times, at, x), np.interp(times, at, y), height])
     ball += np.random.default_rng(0).normal(0.0, 0.02, ball.shape)
     places = np.array([[0.2, 19.8], [5.0, 34.4], [8.3, 23.7], [-5.2, 14.2]])
-    solved = solve(times, ball, np.repeat(places[:, None], len(times), axis=1), [f"home_{n}" for n in range(4)])
+    solved = solve_samples(times, ball, np.repeat(places[:, None], len(times), axis=1), [f"home_{n}" for n in range(4)])
     assert [(end.kind, end.player) for end in solved.ends] == [("touch line", "home_0")]
     thrown = [touch for touch in solved.touches if touch.kind == "throw-in"]
     assert [(touch.player, touch.part) for touch in thrown] == [("home_1", "hand")]

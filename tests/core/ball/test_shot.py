@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from beyond_mocap.ball.flight import Launch, fly
+from beyond_mocap.ball.flight import Launch, simulate_flight
 from beyond_mocap.ball.physics import FOOTBALL, PAPER
-from beyond_mocap.ball.shot import Strikes, shoot, spins
+from beyond_mocap.ball.shot import Strikes, solve_shot, compute_spins
 from beyond_mocap.base.errors import InputError
 
 
@@ -22,42 +22,42 @@ def swing(count=9):
 @pytest.mark.parametrize("bounces", [0, 1])
 def test_the_ball_touches_the_part_and_arrives(bounces):
     strikes, target = swing(), np.array([12.0, 2.0, 0.5])
-    shot = shoot(strikes, target, PAPER, bounces=bounces)
-    row = shot.chosen
+    shot = solve_shot(strikes, target, PAPER, bounces=bounces)
+    row = shot.chosen_index
     line = strikes.end[row] - strikes.start[row]
     share = np.clip((shot.start - strikes.start[row]) @ line / (line @ line), 0.0, 1.0)
     assert np.linalg.norm(shot.start - strikes.start[row] - share * line) == pytest.approx(0.04 + 0.11, abs=0.005)
-    there = fly(Launch(0.0, shot.start, shot.velocity), PAPER, shot.seconds).at([shot.seconds])[0]
+    there = simulate_flight(Launch(0.0, shot.start, shot.velocity), PAPER, shot.seconds).at([shot.seconds])[0]
     assert np.linalg.norm(there - target) < 0.02
 
 
 def test_the_frame_is_the_one_with_the_fastest_part():
-    shot = shoot(swing(), (15.0, 0.0, 0.3), FOOTBALL, seconds=1.0)
-    assert abs(shot.frames[shot.chosen] - 104) <= 1
+    shot = solve_shot(swing(), (15.0, 0.0, 0.3), FOOTBALL, seconds=1.0)
+    assert abs(shot.frames[shot.chosen_index] - 104) <= 1
 
 
 def test_along_the_ground_it_leaves_level():
-    shot = shoot(swing(), (10.0, 0.0, 0.0), FOOTBALL, ground=True)
+    shot = solve_shot(swing(), (10.0, 0.0, 0.0), FOOTBALL, ground=True)
     assert shot.velocity[2] == 0.0 and shot.start[2] == pytest.approx(0.11)
 
 
 def test_a_launch_nearby_gives_the_same_shot():
     strikes = swing()
-    one = shoot(strikes, (12.0, 1.0, 0.4), FOOTBALL, seconds=1.2, bounces=1)
-    other = shoot(strikes, (12.0, 1.0, 0.4), FOOTBALL, seconds=1.2, bounces=1, near=one.aimed)
+    one = solve_shot(strikes, (12.0, 1.0, 0.4), FOOTBALL, seconds=1.2, bounces=1)
+    other = solve_shot(strikes, (12.0, 1.0, 0.4), FOOTBALL, seconds=1.2, bounces=1, previous=one.launches)
     assert other.velocity == pytest.approx(one.velocity, abs=0.05)
 
 
 def test_out_of_reach_says_how_far():
     with pytest.raises(InputError, match=r"throw.*119\.\d m.*no launch|throw.*119\.\d m.*38 m/s"):
-        shoot(swing(), (120.0, 0.0, 0.3), FOOTBALL, seconds=1.0, fastest=38.0, what="throw")
+        solve_shot(swing(), (120.0, 0.0, 0.3), FOOTBALL, seconds=1.0, fastest=38.0, subject="throw")
 
 
 def test_a_target_at_the_foot_is_told():
     with pytest.raises(InputError, match="target"):
-        shoot(swing(), swing().end[4] + [0.1, 0.0, 0.1], FOOTBALL)
+        solve_shot(swing(), swing().end[4] + [0.1, 0.0, 0.1], FOOTBALL)
 
 
 def test_back_spin_lifts_and_spin_to_the_left_turns_left():
-    spin = spins(np.array([[3.0, 0.0, 1.0]]), (1.0, 2.0))[0]
+    spin = compute_spins(np.array([[3.0, 0.0, 1.0]]), (1.0, 2.0))[0]
     assert spin == pytest.approx([0.0, -2.0 * np.pi, 4.0 * np.pi])

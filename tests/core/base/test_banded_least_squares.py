@@ -56,7 +56,7 @@ def test_terms_with_a_goal_are_those_of_dense_algebra():
     random, count = np.random.default_rng(0), 7
     swing, goal = random.normal(size=count - 1), random.normal(size=count - 1)
     squares = BandedLeastSquares(count, 2, reach=1)
-    squares.add({0: -1.0, 2: 1.0, 3: swing}, np.full(count - 1, 2.0), goal)
+    squares.add_terms({0: -1.0, 2: 1.0, 3: swing}, np.full(count - 1, 2.0), goal)
     rows = np.zeros((count - 1, 2 * count))
     for frame in range(count - 1):
         rows[frame, [2 * frame, 2 * frame + 2, 2 * frame + 3]] = -1.0, 1.0, swing[frame]

@@ -7,8 +7,8 @@ import pytest
 
 from beyond_mocap.base.digest import byte_digest, hex_digest
 from beyond_mocap.base.easing import hermite, quintic_step, quintic_step_by_powers, smoothstep
-from beyond_mocap.base.time_series import gaussian_smooth, hann_smooth, interpolate, time_derivative
-from beyond_mocap.base.vectors import cross_level, distance_along, nearest_axis, skew_matrix, unit_vector, unit_vectors
+from beyond_mocap.base.time_series import gaussian_smooth, hann_smooth, interpolate_columns, time_derivative
+from beyond_mocap.base.vectors import cross_on_ground, distances_along, find_nearest_axis, skew_matrix, unit_vector, unit_vectors
 
 
 def test_zero_vectors_stay_zero_or_become_what_is_asked():
@@ -24,8 +24,8 @@ def test_zero_vectors_stay_zero_or_become_what_is_asked():
 def test_products_agree_with_numpy():
     a, b = np.random.default_rng(0).normal(size=(2, 5, 3))
     assert np.allclose((skew_matrix(a) @ b[..., None])[..., 0], np.cross(a, b))
-    assert np.allclose(cross_level(a, b), np.cross(a, b * [1, 1, 0])[:, 2])
-    assert np.array_equal(nearest_axis(np.array([0.2, -0.9, 0.3])), [0.0, -1.0, 0.0])
+    assert np.allclose(cross_on_ground(a, b), np.cross(a, b * [1, 1, 0])[:, 2])
+    assert np.array_equal(find_nearest_axis(np.array([0.2, -0.9, 0.3])), [0.0, -1.0, 0.0])
 
 
 @pytest.mark.parametrize("step", [smoothstep, quintic_step, quintic_step_by_powers])
@@ -50,11 +50,11 @@ def test_hermite_is_the_cubic_itself():
 
 def test_values_over_time():
     line = np.array([[0.0, 0.0], [3.0, 4.0], [3.0, 5.0]])
-    assert np.array_equal(distance_along(line), [0.0, 5.0, 6.0])
+    assert np.array_equal(distances_along(line), [0.0, 5.0, 6.0])
     assert np.array_equal(time_derivative(line, 2.0)[1], [3.0, 5.0]) and not time_derivative(line[:1], 2.0).any()
-    held = interpolate(np.array([-1.0, 0.5]), np.arange(3.0), line)
+    held = interpolate_columns(np.array([-1.0, 0.5]), np.arange(3.0), line)
     assert np.array_equal(held, [[0.0, 0.0], [1.5, 2.0]])
-    assert np.isnan(interpolate(np.array([-1.0, 0.5]), np.arange(3.0), line, np.nan)[:, 0]).tolist() == [True, False]
+    assert np.isnan(interpolate_columns(np.array([-1.0, 0.5]), np.arange(3.0), line, np.nan)[:, 0]).tolist() == [True, False]
     flat = np.full((9, 2), 7.0)
     assert gaussian_smooth(flat, 2.0) == pytest.approx(flat) and hann_smooth(flat[:, 0], 3) == pytest.approx(flat[:, 0])
 

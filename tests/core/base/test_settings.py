@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from beyond_mocap.base.errors import InputError
-from beyond_mocap.base.settings import rows_of
-from beyond_mocap.motion.track import Track, sample
+from beyond_mocap.base.settings import list_settings
+from beyond_mocap.motion.track import Track, sample_track
 from beyond_mocap.synthesis.plan import Plan
-from beyond_mocap.synthesis.search.path_costs import Weights, balanced
+from beyond_mocap.synthesis.search.path_costs import Weights, balance_weights
 from beyond_mocap.synthesis.synthesize import synthesize
 
 
@@ -30,8 +30,8 @@ def noisy(track_of) -> Track:
 
 
 def test_the_paper_s_alpha_changes_no_weight_and_more_of_it_favours_words():
-    assert balanced(0.2) == Weights() == balanced(Plan.alpha)
-    words, smooth = balanced(1.0), balanced(0.0)
+    assert balance_weights(0.2) == Weights() == balance_weights(Plan.alpha)
+    words, smooth = balance_weights(1.0), balance_weights(0.0)
     assert words.words > Weights().words and words.pose == words.switch == 0.0
     assert smooth.words == 0.0 and smooth.pose > Weights().pose and smooth.speed == words.speed == Weights().speed
 
@@ -57,7 +57,7 @@ def test_delta_leaves_distance_wrong(take_of, track_of):
 
 
 def test_a_longer_track_window_is_calmer(take_of, noisy):
-    rough, calm = (sample(noisy, 30.0, window).speed for window in (0.4, 2.0))
+    rough, calm = (sample_track(noisy, 30.0, window).speed for window in (0.4, 2.0))
     assert np.abs(np.diff(calm)).mean() < 0.5 * np.abs(np.diff(rough)).mean()
     a, b = (take_of(track=noisy, track_window=window) for window in (0.4, 2.0))
     assert not np.array_equal(a.motion.root_positions, b.motion.root_positions)
@@ -88,7 +88,7 @@ def test_a_shorter_root_window_keeps_less_sway(take_of, track_of):
     assert off[0] < 0.7 * off[1]
 
 
-LIMITED = [row for row in (*rows_of("synthesis"), *rows_of("player")) if row.least is not None]
+LIMITED = [row for row in (*list_settings("synthesis"), *list_settings("player")) if row.least is not None]
 
 
 @pytest.mark.parametrize(

@@ -8,13 +8,13 @@ from pathlib import Path
 import pytest
 from pages import SETTINGS_PAGE, settings_page
 
-from beyond_mocap.ball.physics import THROWN
+from beyond_mocap.ball.physics import THROWN_BALLS
 from beyond_mocap.base import settings
 from beyond_mocap.base.errors import InputError
-from beyond_mocap.base.settings import TABLES, setting
+from beyond_mocap.base.settings import TABLES, find_setting
 from beyond_mocap.base.settings.options import option_values
 from beyond_mocap.base.settings.setting import Setting, check_limits
-from beyond_mocap.cli.main import parser
+from beyond_mocap.cli.main import build_parser
 from beyond_mocap.path_editing.path_frame import FRAMES
 from beyond_mocap.synthesis.plan import Plan
 
@@ -63,7 +63,7 @@ def lines_of(top):
 
 def test_the_options_of_0_1_are_still_there():
     """tests/data/options-0.1.txt is never made again."""
-    now = set(lines_of(parser()))
+    now = set(lines_of(build_parser()))
     then = OPTIONS.read_text("utf-8").splitlines()
     assert len(then) > 200
     assert [line for line in then if line not in now] == []
@@ -73,7 +73,7 @@ def test_the_options_of_0_1_are_still_there():
 def with_sharpness(monkeypatch):
     """A setting more, in the table alone."""
     monkeypatch.setitem(TABLES, "synthesis", (*TABLES["synthesis"], SHARPNESS))
-    return dict(verbs_of(parser()))["synthesize"]
+    return dict(verbs_of(build_parser()))["synthesize"]
 
 
 FILES = ["--library", "L", "--track", "T", "--annotations", "A", "--out", "O"]
@@ -90,7 +90,7 @@ def test_a_row_is_an_option_with_its_default_and_limits(with_sharpness):
     with pytest.raises(InputError, match="'1.5' is not 0 to 1 turns"):
         with_sharpness.parse_args([*FILES, "--sharpness", "1.5"])
     with pytest.raises(InputError, match="^sharpness: "):
-        check_limits(Corners(2.0), settings.rows_of("synthesis"))
+        check_limits(Corners(2.0), settings.list_settings("synthesis"))
 
 
 def test_a_row_is_on_the_page_of_settings(with_sharpness):
@@ -116,6 +116,6 @@ def test_every_row_makes_sense():
 
 def test_what_the_table_names_is_what_the_core_knows():
     """The base cannot import them."""
-    assert setting("markers", "ball").choice_names == tuple(THROWN)
-    assert setting("path_editing", "frame").choice_names == FRAMES
+    assert find_setting("markers", "ball").choice_names == tuple(THROWN_BALLS)
+    assert find_setting("path_editing", "frame").choice_names == FRAMES
     assert {row.name for row in TABLES["synthesis"]} <= set(Plan.__dataclass_fields__)

@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 
 from beyond_mocap.annotation import read_timeline
-from beyond_mocap.cli.main import _interrupts, main
-from beyond_mocap.cli.outputs import Told
+from beyond_mocap.cli.main import _InterruptHandler, main
+from beyond_mocap.cli.outputs import ProgressReporter
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.files.tables import read_ball
-from beyond_mocap.library.made import KICKED, MADE_FOLDER
-from beyond_mocap.motion.humanoid import stature
+from beyond_mocap.library.made import KICK_PREFIX, SYNTHETIC_FOLDER
+from beyond_mocap.motion.humanoid import estimate_stature
 from beyond_mocap.synthesis.provenance import read_provenance
 
 TOP = Path(__file__).resolve().parents[3]
@@ -119,7 +119,7 @@ def test_everything_asked_for_is_written_and_can_be_read(synthesize, run, match,
     )
     assert status == 0 and "out.bvh: 151 frames, 6.0 s" in out
     assert sorted(files_in(tmp_path)) == ["b.csv", "out.bvh", "p.csv", "r.json"]
-    motion = bvh.read(tmp_path / "out.bvh", 0.01).motion
+    motion = bvh.read_bvh(tmp_path / "out.bvh", 0.01).motion
     provenance, ball = read_provenance(tmp_path / "p.csv"), read_ball(tmp_path / "b.csv")
     assert len(motion) == len(provenance) == len(ball.times) == 151 and motion.fps == pytest.approx(25.0)
     assert "kick.bvh" in provenance.clip
@@ -202,7 +202,7 @@ def test_mirror(run, clips_folder, tmp_path):
     once, twice = tmp_path / "once.bvh", tmp_path / "twice.bvh"
     assert run("mirror", clips_folder / "walk.bvh", once)[0] == 0
     assert run("mirror", once, twice)[0] == 0
-    motions = [bvh.read(path, 0.01).motion for path in (clips_folder / "walk.bvh", once, twice)]
+    motions = [bvh.read_bvh(path, 0.01).motion for path in (clips_folder / "walk.bvh", once, twice)]
     assert np.allclose(motions[0].root_positions, motions[2].root_positions, atol=1e-4)
     assert np.allclose(motions[0].root_positions * [1, -1, 1], motions[1].root_positions, atol=1e-4)
     assert run("mirror", once, once)[0] == 0
@@ -483,11 +483,11 @@ def test_ctrl_c_or_an_end_asked_for_stops_and_leaves_nothing(clips_folder, libra
 
 
 def test_the_second_ctrl_c_breaks_off_what_does_not_listen():
-    told = Told(False)
+    told = ProgressReporter(False)
     before = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)
-    with _interrupts(told), pytest.raises(KeyboardInterrupt):
+    with _InterruptHandler(told), pytest.raises(KeyboardInterrupt):
         signal.raise_signal(signal.SIGINT)
-        assert told.cancelled()
+        assert told.is_cancelled()
         signal.raise_signal(signal.SIGINT)
     assert (signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)) == before
 
@@ -499,7 +499,7 @@ def test_signals_that_python_did_not_set_are_left_as_the_system_has_them(monkeyp
     put = signal.signal
     with monkeypatch.context() as patched:
         patched.setattr(signal, "signal", lambda kind, handler: put(kind, handler) and None)
-        with _interrupts(Told(False)):
+        with _InterruptHandler(ProgressReporter(False)):
             assert signal.getsignal(signal.SIGTERM) not in before.values()
     after = [signal.getsignal(kind) for kind in before]
     for kind, handler in before.items():
@@ -535,8 +535,8 @@ def test_real_recordings(run, tmp_path_factory, scenario):
         assert [(key["time_s"], key["labels"]) for key in report["keys"]] == [(k.time, list(k.words)) for k in asked]
         for key in report["keys"]:
             if {"kick", "foot"} & set(key["labels"]):
-                name = key["clip"].removeprefix(MADE_FOLDER)  # by path, a kick on the run is made where it is asked for
-                assert name.startswith(("10_0", KICKED)[: 1 + (method == "path")])
+                name = key["clip"].removeprefix(SYNTHETIC_FOLDER)  # by path, a kick on the run is made where it is asked for
+                assert name.startswith(("10_0", KICK_PREFIX)[: 1 + (method == "path")])
                 assert abs(key["time_error_s"]) <= 0.5 / 30 + 1e-6
             else:  # nothing in the library is near a header, a slide or a ball on the chest
                 assert key["used_instead"] and key["time_error_s"] is None
@@ -552,7 +552,7 @@ def test_pins_height_foot_and_style_are_a_players_own(synthesize, tmp_path):
     assert status == 0 and any("99 s: the pin of left_hand is outside" in line for line in error)
     report = json.loads((tmp_path / "r.json").read_text())
     assert [pin["part"] for pin in report["pins"]] == ["gaze", "left_hand"] and report["pins"][0]["miss"] < 0.05
-    assert stature(bvh.read(tmp_path / "out.bvh", 0.01).motion.skeleton) == pytest.approx(2.0, abs=1e-3)
+    assert estimate_stature(bvh.read_bvh(tmp_path / "out.bvh", 0.01).motion.skeleton) == pytest.approx(2.0, abs=1e-3)
     assert_told(synthesize(height=0.1), 2, "--height", "0.5 to 3 metres")
     (tmp_path / "pins.csv").write_text("time_s,part,x_m,y_m,z_m\n2,nose,30,0,1.5\n")
     assert_told(synthesize(pins=tmp_path / "pins.csv"), 2, "pins.csv:2", "'nose'")

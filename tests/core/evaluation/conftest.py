@@ -7,14 +7,14 @@ import pytest
 
 from beyond_mocap.annotation import Timeline
 from beyond_mocap.files.bvh import bvh
-from beyond_mocap.library.build import build
+from beyond_mocap.library.build import build_library
 from beyond_mocap.library.library import Library
-from beyond_mocap.motion.motion import Motion, at_frames, concatenate, place
-from beyond_mocap.motion.track import Track, zero_phase_hann
+from beyond_mocap.motion.motion import Motion, sample_frames, concatenate_motions, place_motion
+from beyond_mocap.motion.track import Track, smooth_zero_phase_hann
 from beyond_mocap.motion.track.ball_path import BallPath
-from beyond_mocap.synthesis.quality.played import played_from_take
+from beyond_mocap.synthesis.quality.played import playback_from_take
 from beyond_mocap.synthesis.take import KeyResult, Take
-from beyond_mocap.synthetic.gait import gait
+from beyond_mocap.synthetic.gait import build_gait
 
 FPS = 30.0
 SOURCE_FPS = 60.0
@@ -31,9 +31,9 @@ CLIPS = {
 def library(tmp_path_factory) -> Library:
     folder = tmp_path_factory.mktemp("library")
     for seed, (name, (speed, words)) in enumerate(CLIPS.items()):
-        bvh.write(folder / name, gait(speed, 12.0, SOURCE_FPS, seed=seed))
+        bvh.write_bvh(folder / name, build_gait(speed, 12.0, SOURCE_FPS, seed=seed))
         (folder / name).with_suffix(".txt").write_text(words)
-    return build(folder)
+    return build_library(folder)
 
 
 class Part(NamedTuple):
@@ -51,48 +51,48 @@ def cut(library):
     """cut((path, first, count[, rate[, mirrored]]), ..., asked=(KeyMoment, ...), timeline=None, ball=None) -> Take: the
     parts, each begun where the last ended."""
 
-    def make(*parts, asked=(), timeline=None, ball=None, start_time=10.0) -> Take:
+    def build_take(*parts, requested=(), timeline=None, ball=None, start_time=10.0) -> Take:
         pieces, end = [], None
         for part in (Part(*part) for part in parts):
-            motion, frames = _piece(library, part)
+            motion, frames = _build_piece(library, part)
             if end is not None:
-                motion = place(motion, 0.0, (*(end - motion.root_positions[0])[:2], 0.0))
+                motion = place_motion(motion, 0.0, (*(end - motion.root_positions[0])[:2], 0.0))
             end = 2 * motion.root_positions[-1] - motion.root_positions[-2]
             pieces.append((part, motion, frames))
-        return _take(library, pieces, asked, timeline, ball, start_time)
+        return _build_take(library, pieces, requested, timeline, ball, start_time)
 
-    return make
+    return build_take
 
 
-def clip_of(library, part):
+def find_clip(library, part):
     return next(clip for clip in library.clips if (clip.path, clip.mirrored) == (part.path, part.mirrored))
 
 
-def _piece(library, part):
-    clip = clip_of(library, part)
+def _build_piece(library, part):
+    clip = find_clip(library, part)
     frames = part.first + np.arange(part.count) * part.rate * clip.motion.fps / FPS
-    root, rotations = at_frames(clip.motion, frames)
+    root, rotations = sample_frames(clip.motion, frames)
     return Motion(clip.motion.skeleton, root, rotations, FPS), frames
 
 
-def _take(library, pieces, asked, timeline, ball, start_time) -> Take:
+def _build_take(library, pieces, requested, timeline, ball, start_time) -> Take:
     paths = tuple(sorted({part.path for part, _, _ in pieces}))
     frames = np.concatenate([frames for _, _, frames in pieces])
     counts = [len(frames) for _, _, frames in pieces]
-    clips = [clip_of(library, part) for part, _, frames in pieces for _ in range(len(frames))]
+    clips = [find_clip(library, part) for part, _, frames in pieces for _ in range(len(frames))]
     contacts = np.array([clip.contacts[int(np.rint(frame))] for clip, frame in zip(clips, frames)])
-    keys = tuple(_result(key, pieces, frames, start_time) for key in asked)
+    keys = tuple(_build_result(key, pieces, frames, start_time) for key in requested)
     return Take(
-        motion=concatenate([motion for _, motion, _ in pieces]),
+        motion=concatenate_motions([motion for _, motion, _ in pieces]),
         start_time=start_time,
         clips=paths,
         clip=np.array([paths.index(clip.path) for clip in clips]),
         clip_frame=frames,
         mirrored=np.array([clip.mirrored for clip in clips]),
-        words=tuple(tuple(sorted(clip.words_at(frame))) for clip, frame in zip(clips, frames)),
+        words=tuple(tuple(sorted(clip.labels_at(frame))) for clip, frame in zip(clips, frames)),
         contacts=contacts,
         seams=np.cumsum(counts)[:-1],
-        timeline=timeline or Timeline(keys=tuple(asked)),
+        timeline=timeline or Timeline(keys=tuple(requested)),
         keys=keys,
         ball=ball,
         method="blocks",
@@ -100,9 +100,9 @@ def _take(library, pieces, asked, timeline, ball, start_time) -> Take:
     )
 
 
-def _result(key, pieces, frames, start_time) -> KeyResult:
+def _build_result(key, pieces, frames, start_time) -> KeyResult:
     frame = float(np.argmin(np.abs(frames - KEY_FRAME)))
-    return KeyResult(asked=key, frame=frame, clip=pieces[0][0].path, clip_frame=KEY_FRAME, mirrored=False,
+    return KeyResult(requested=key, frame=frame, clip=pieces[0][0].path, clip_frame=KEY_FRAME, mirrored=False,
                      words=("jogging", "kick", "right"))
 
 
@@ -110,22 +110,22 @@ def _result(key, pieces, frames, start_time) -> KeyResult:
 def track_of():
     """track_of(take, shift=(0, 0), ball=None) -> Track: samples at 25 Hz of the take's pelvis behind a 1.5 s window,
     moved."""
-    def make(take, shift=(0.0, 0.0), ball=None) -> Track:
-        played = played_from_take(take)
-        path = zero_phase_hann(played.pelvis, FPS, 1.5)
+    def build_track(take, shift=(0.0, 0.0), ball=None) -> Track:
+        played = playback_from_take(take)
+        path = smooth_zero_phase_hann(played.pelvis, FPS, 1.5)
         times = np.arange(played.times[0], played.times[-1] + 1e-9, 0.04)
         positions = np.stack([np.interp(times, played.times, path[:, axis]) for axis in (0, 1)], axis=-1)
         return Track(times, positions + shift, ball=None if ball is None else np.broadcast_to(ball, (len(times), 3)))
 
-    return make
+    return build_track
 
 
 @pytest.fixture(scope="session")
 def still_ball():
     """still_ball(take, place) -> BallPath: a ball that lies at `place` (3,) m in every frame of the take."""
 
-    def make(take, place) -> BallPath:
+    def build_ball_path(take, place) -> BallPath:
         times = take.start_time + np.arange(len(take.motion)) / take.motion.fps
         return BallPath(times, np.broadcast_to(np.asarray(place, float), (len(times), 3)), np.ones(len(times), bool))
 
-    return make
+    return build_ball_path

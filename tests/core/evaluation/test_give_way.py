@@ -7,16 +7,16 @@ import pytest
 
 from beyond_mocap.annotation import KeyMoment, Span, Timeline
 from beyond_mocap.evaluation.report import evaluate
-from beyond_mocap.library.made import MADE_FOLDER
+from beyond_mocap.library.made import SYNTHETIC_FOLDER
 from beyond_mocap.motion.track import Track
-from beyond_mocap.synthesis.quality.give_way import give_way, jolts, stretches
-from beyond_mocap.synthesis.quality.played import played_from_take
+from beyond_mocap.synthesis.quality.give_way import report_unmet_constraints, report_jolts, format_stretches
+from beyond_mocap.synthesis.quality.played import playback_from_take
 
 
 @pytest.fixture()
 def told(library):
     """told(take, **more) -> the lines about a take from the made library."""
-    return lambda take, **more: give_way(played_from_take(take), library=library, **more)
+    return lambda take, **more: report_unmet_constraints(playback_from_take(take), library=library, **more)
 
 
 @pytest.fixture()
@@ -39,7 +39,7 @@ def test_stretches_are_joined_and_the_longest_named(spans, text):
     flags = np.zeros(300, bool)
     for low, high in spans:
         flags[low:high] = True
-    assert stretches(np.arange(300) / 30.0, flags) == text
+    assert format_stretches(np.arange(300) / 30.0, flags) == text
 
 
 def test_a_planted_warp_is_told_with_its_seconds(cut, told):
@@ -71,7 +71,7 @@ def test_a_track_faster_than_the_library_is_told_but_not_where_running_is_made(j
     fast = Track(times, np.stack([8.0 * (times - 10.0), 0 * times], axis=-1))
     (line,) = [line for line in told(jog, track=fast) if "faster than the library" in line]
     assert line.startswith("10.0-18.0 s: the track reaches 8.0 m/s")
-    made = replace(jog, clips=(f"{MADE_FOLDER}steady_8.bvh",))
+    made = replace(jog, clips=(f"{SYNTHETIC_FOLDER}steady_8.bvh",))
     lines = told(made, track=fast)
     assert not any("faster than the library" in line for line in lines)
     assert any(line.startswith("10.0-18.0 s (8.0 s in all): synthetic running") for line in lines)
@@ -111,7 +111,7 @@ def test_hard_seams_are_told_in_the_report(cut, track_of, library):
     rough = cut(("jog.bvh", 0, 120), ("walk.bvh", 13, 120))
     told = [line for line in evaluate(rough, track_of(rough), library)["warnings"] if "jolt" in line]
     assert len(told) == 1 and told[0].startswith("13.9-14.1 s: ")
-    assert jolts(np.arange(100.0), np.array([10]), np.array([1.29])) is None
+    assert report_jolts(np.arange(100.0), np.array([10]), np.array([1.29])) is None
 
 
 def test_every_line_carries_its_seconds(cut, told, library, track_of):

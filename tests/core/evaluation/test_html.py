@@ -11,14 +11,14 @@ import pytest
 from beyond_mocap.annotation import KeyMoment, Span, Timeline
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.cli import main as command
-from beyond_mocap.evaluation.html import html_report, worst_frames
+from beyond_mocap.evaluation.html import build_html_report, find_worst_frames
 from beyond_mocap.evaluation.reference import View
 from beyond_mocap.evaluation.report import evaluate, evaluate_played
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.motion.motion import Motion
 from beyond_mocap.synthesis.provenance import write_provenance
-from beyond_mocap.synthesis.quality.played import played_from_tables, played_from_take
-from beyond_mocap.synthesis.quality.targets import KEY_TARGETS, TARGETS, Target, target_of
+from beyond_mocap.synthesis.quality.played import playback_from_tables, playback_from_take
+from beyond_mocap.synthesis.quality.targets import KEY_TARGETS, TARGETS, Target, find_target
 
 pytest.importorskip("matplotlib")
 
@@ -36,8 +36,8 @@ def page(take, track_of, library, still_ball):
     take = replace(take, ball=still_ball(take, (12.0, 0.3, 0.11)))
     track = track_of(take, ball=(12.0, 0.3, 0.11))
     report = evaluate(take, track, library)
-    return html_report(
-        played_from_take(take), report, track=track, timeline=take.timeline, library=library, title="one & only"
+    return build_html_report(
+        playback_from_take(take), report, track=track, timeline=take.timeline, library=library, title="one & only"
     )
 
 
@@ -94,43 +94,43 @@ def test_figures_stand_beside_their_targets(page, take, track_of, library):
 
 def test_names_are_escaped(take, track_of, library):
     bad = '<script>alert("&")</script>$x^2'
-    played = replace(played_from_take(take), clips=tuple(f"{bad}{k}.bvh" for k in range(len(take.clips))))
+    played = replace(playback_from_take(take), clips=tuple(f"{bad}{k}.bvh" for k in range(len(take.clips))))
     words = tuple((bad,) for _ in played.words)
     played = replace(played, words=words, keys=())
     timeline = Timeline((), (KeyMoment(14.5, (bad.lower(),)),))
     report = evaluate_played(played, timeline=timeline)
     report["warnings"] = [bad]
-    page = html_report(played, report, timeline=timeline, title=bad)
+    page = build_html_report(played, report, timeline=timeline, title=bad)
     assert "<script" not in page.lower()
     assert page.count("&lt;script&gt;alert(&quot;&amp;&quot;)&lt;/script&gt;") >= 4
 
 
 def test_a_bare_motion_has_a_page_too(take, tmp_path):
-    played = played_from_tables(take.motion)
-    text = "".join(Tags(html_report(played, evaluate_played(played))).text)
+    played = playback_from_tables(take.motion)
+    text = "".join(Tags(build_html_report(played, evaluate_played(played))).text)
     assert "unknown without provenance" in text and "All figures" in text
 
 
 @pytest.mark.parametrize("count", [1, 2, 5])
 def test_very_short_motions(take, count):
-    played = played_from_tables(take.motion.frames(0, count))
-    assert "All figures" in html_report(played, evaluate_played(played))
+    played = playback_from_tables(take.motion.frames(0, count))
+    assert "All figures" in build_html_report(played, evaluate_played(played))
 
 
 def test_the_worst_second_is_found(take):
     root = take.motion.root_positions.copy()
     root[150] += [0.0, 0.0, 1.0]
     jolted = replace(take, motion=Motion(take.motion.skeleton, root, take.motion.rotations, FPS))
-    worst = worst_frames(View(played_from_take(jolted), None, None, None))
+    worst = find_worst_frames(View(playback_from_take(jolted), None, None, None))
     assert abs(worst[0][0] - 150) <= 2 and "jolt" in worst[0][1]
     frames = [frame for frame, _ in worst]
     assert all(abs(a - b) >= FPS for i, a in enumerate(frames) for b in frames[:i])
 
 
 def test_the_page_is_the_same_every_time(take):
-    played = played_from_take(take)
+    played = playback_from_take(take)
     report = evaluate_played(played)
-    assert html_report(played, report) == html_report(played, report)
+    assert build_html_report(played, report) == build_html_report(played, report)
 
 
 @pytest.mark.parametrize(
@@ -145,27 +145,27 @@ def test_the_page_is_the_same_every_time(take):
     ],
 )
 def test_targets(target, flat, value, met):
-    assert target.met(value, flat) is met
+    assert target.is_met(value, flat) is met
 
 
 def test_half_a_frame_is_the_target_of_a_key_s_time():
-    assert target_of("keys 2.time_error_s", 30.0).met(0.0166, {})
-    assert not target_of("keys 2.time_error_s", 30.0).met(-0.0168, {})
-    assert target_of("keys 2.contact_gap_m", 30.0).most == 0.005
-    assert target_of("frames", 30.0) is None
+    assert find_target("keys 2.time_error_s", 30.0).is_met(0.0166, {})
+    assert not find_target("keys 2.time_error_s", 30.0).is_met(-0.0168, {})
+    assert find_target("keys 2.contact_gap_m", 30.0).most == 0.005
+    assert find_target("frames", 30.0) is None
 
 
 def test_without_matplotlib_one_line_says_what_to_do(take, monkeypatch):
     monkeypatch.setitem(sys.modules, "matplotlib", None)
-    played = played_from_take(take)
+    played = playback_from_take(take)
     with pytest.raises(InputError, match="matplotlib is not installed.*pip install") as told:
-        html_report(played, {"keys": []})
+        build_html_report(played, {"keys": []})
     assert "\n" not in str(told.value)
 
 
 def test_evaluate_writes_the_page(take, tmp_path, monkeypatch, capsys):
     motion, provenance, report, page = (tmp_path / name for name in ("m.bvh", "p.csv", "r.json", "r.html"))
-    bvh.write(motion, take.motion)
+    bvh.write_bvh(motion, take.motion)
     write_provenance(provenance, take)
     options = ["evaluate", str(motion), "--provenance", str(provenance), "--report", str(report), "--html"]
     assert command.main([*options, str(page)]) == 0

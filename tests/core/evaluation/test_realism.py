@@ -6,14 +6,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from beyond_mocap.evaluation import realism
-from beyond_mocap.motion.humanoid import identify
-from beyond_mocap.motion.motion import Motion, forward_kinematics, place
+from beyond_mocap.motion.humanoid import identify_joints
+from beyond_mocap.motion.motion import Motion, forward_kinematics, place_motion
 from beyond_mocap.motion.quaternion import from_rotation_vector
-from beyond_mocap.motion.retargeting.adult import adult_skeleton
+from beyond_mocap.motion.retargeting.adult import build_adult_skeleton
 
 FPS = 30.0
-SKELETON = adult_skeleton()
-BODY = identify(SKELETON)
+SKELETON = build_adult_skeleton()
+BODY = identify_joints(SKELETON)
 
 
 def swinging(count=90, speed=1.5, amount=0.4, seed=0):
@@ -29,12 +29,12 @@ def swinging(count=90, speed=1.5, amount=0.4, seed=0):
 
 
 def features(motion):
-    return realism.pose_features(SKELETON, forward_kinematics(motion)[0], FPS, BODY.hips)
+    return realism.build_pose_features(SKELETON, forward_kinematics(motion)[0], FPS, BODY.hips)
 
 
 def test_place_and_heading_on_the_pitch_do_not_matter():
     motion = swinging()
-    np.testing.assert_allclose(features(place(motion, 2.1, (30.0, -7.0, 0.0))), features(motion), atol=2e-5)
+    np.testing.assert_allclose(features(place_motion(motion, 2.1, (30.0, -7.0, 0.0))), features(motion), atol=2e-5)
 
 
 def test_speed_does_matter():
@@ -46,9 +46,9 @@ def test_speed_does_matter():
 
 def test_a_copy_is_near_and_a_contortion_is_far():
     library = features(swinging(seed=1))
-    copied = realism.nearest_distance(features(swinging(seed=1))[10:40], library)
+    copied = realism.measure_nearest_distance(features(swinging(seed=1))[10:40], library)
     assert copied.max() < 2e-3
-    assert realism.nearest_distance(features(swinging(seed=1, amount=1.5))[10:40], library).min() > 0.02
+    assert realism.measure_nearest_distance(features(swinging(seed=1, amount=1.5))[10:40], library).min() > 0.02
 
 
 @settings(max_examples=20, deadline=None)
@@ -59,33 +59,33 @@ def test_nearest_distance_is_the_smallest_of_all(seed):
     owner = random.integers(0, 3, 30)
     mine = random.integers(0, 3, 7)
     every = np.linalg.norm(a[:, None] - b, axis=-1)
-    np.testing.assert_allclose(realism.nearest_distance(a, b), every.min(axis=1), atol=1e-3)
+    np.testing.assert_allclose(realism.measure_nearest_distance(a, b), every.min(axis=1), atol=1e-3)
     every[mine[:, None] == owner] = np.inf
-    np.testing.assert_allclose(realism.nearest_distance(a, b, mine, owner), every.min(axis=1), atol=1e-3)
+    np.testing.assert_allclose(realism.measure_nearest_distance(a, b, mine, owner), every.min(axis=1), atol=1e-3)
 
 
 def test_the_mirrored_pose_of_a_mirrored_pose_is_the_pose():
     own = features(swinging())
-    twin = realism.mirrored_features(own, BODY)
+    twin = realism.mirror_features(own, BODY)
     assert np.abs(twin - own).max() > 0.01
-    np.testing.assert_allclose(realism.mirrored_features(twin, BODY), own, atol=1e-6)
+    np.testing.assert_allclose(realism.mirror_features(twin, BODY), own, atol=1e-6)
 
 
 def test_unreal_compares_at_the_speed():
-    real = realism.real_p95(np.concatenate([np.full(50, 0.1), np.full(50, 0.3)]), np.repeat([0.5, 3.5], 50))
-    flags = realism.unreal(np.array([0.2, 0.2, 0.4]), np.array([0.5, 3.5, 6.0]), real)
+    real = realism.compute_class_p95(np.concatenate([np.full(50, 0.1), np.full(50, 0.3)]), np.repeat([0.5, 3.5], 50))
+    flags = realism.find_unreal_frames(np.array([0.2, 0.2, 0.4]), np.array([0.5, 3.5, 6.0]), real)
     np.testing.assert_array_equal(flags, [True, False, True])
 
 
 def test_smoothness_peaks_at_a_cut():
     places = [forward_kinematics(swinging(seed=seed))[0] for seed in (1, 2)]
-    cut = realism.smoothness(SKELETON, np.concatenate([places[0][:40], places[1][40:80]]), FPS)
-    uncut = realism.smoothness(SKELETON, places[0], FPS)
+    cut = realism.measure_smoothness(SKELETON, np.concatenate([places[0][:40], places[1][40:80]]), FPS)
+    uncut = realism.measure_smoothness(SKELETON, places[0], FPS)
     assert len(cut) == 79 and 37 <= np.argmax(cut) <= 41 and cut.max() > 3 * uncut.max()
-    assert realism.smoothness(SKELETON, np.repeat(places[0][:1], 5, axis=0), FPS) == pytest.approx(np.zeros(4))
+    assert realism.measure_smoothness(SKELETON, np.repeat(places[0][:1], 5, axis=0), FPS) == pytest.approx(np.zeros(4))
 
 
 def test_smoothness_is_real_at_its_speed():
     curve = np.concatenate([np.linspace(0.0, 1.0, 101), [np.nan], np.linspace(2.0, 3.0, 101)])
-    real = realism.real_p95(curve, np.repeat([0.5, 0.5, 3.5], [101, 1, 101]))
+    real = realism.compute_class_p95(curve, np.repeat([0.5, 0.5, 3.5], [101, 1, 101]))
     assert real == pytest.approx([0.95, 0.95, 2.95, 2.95, 2.95])

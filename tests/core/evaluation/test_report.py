@@ -8,18 +8,18 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from beyond_mocap.annotation import KeyMoment, Span, Timeline, words_per_frame
+from beyond_mocap.annotation import KeyMoment, Span, Timeline, labels_per_frame
 from beyond_mocap.base.errors import InputError
-from beyond_mocap.evaluation.figures import filled_timeline
-from beyond_mocap.evaluation.report import evaluate, evaluate_played, flat, table
+from beyond_mocap.evaluation.figures import fill_automatic_spans
+from beyond_mocap.evaluation.report import evaluate, evaluate_played, flatten_report, format_table
 from beyond_mocap.files import tables
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.library.library import Gait
-from beyond_mocap.library.made import MADE_FOLDER
-from beyond_mocap.motion.motion import at_frames
+from beyond_mocap.library.made import SYNTHETIC_FOLDER
+from beyond_mocap.motion.motion import sample_frames
 from beyond_mocap.motion.track import Track
-from beyond_mocap.synthesis.provenance import provenance_of, read_provenance, write_provenance
-from beyond_mocap.synthesis.quality.played import played_from_tables, played_from_take
+from beyond_mocap.synthesis.provenance import build_provenance, read_provenance, write_provenance
+from beyond_mocap.synthesis.quality.played import playback_from_tables, playback_from_take
 
 FPS = 30.0
 KEY_FRAME = 300
@@ -178,7 +178,7 @@ def test_a_key_that_no_clip_plays_says_what_is_shown(cut, track_of, library):
 
 def test_the_gap_to_the_ball_as_written_out(cut, track_of, still_ball, library):
     take = cut(("jog.bvh", 150, 200), asked=(KeyMoment(12.5, ("kick", "right")),))
-    played = played_from_take(take)
+    played = playback_from_take(take)
     foot, toe = played.feet[75, 1]
     side = np.cross(toe - foot, [0.0, 0.0, 1.0])
     place = 0.5 * (foot + toe) + side / np.linalg.norm(side) * (0.05 + 0.11 + 0.02)
@@ -208,16 +208,16 @@ def test_automatic_locomotion_is_asked_by_speed(cut, track_of, library):
     assert evaluate(take, track_of(take), library)["annotation_similarity"]["all"] == -1.0
 
 
-@pytest.mark.parametrize("shows, word", [("jog.bvh", "walking"), (MADE_FOLDER + "slow_3.0.bvh", "jogging")])
+@pytest.mark.parametrize("shows, word", [("jog.bvh", "walking"), (SYNTHETIC_FOLDER + "slow_3.0.bvh", "jogging")])
 def test_automatic_words_come_from_made_clips_too_where_one_is_shown(shows, word):
     """At 2.4 m/s the recordings' walk is asked, but a jog that was made is nearer."""
     walk, jog = Gait("walking", ("walking", "front"), 1.4), Gait("jogging", ("jogging", "front"), 2.6)
     more = SimpleNamespace(fps=FPS, gaits=(walk, jog), gait_thresholds=np.array([2.0]), clips=())
-    library = SimpleNamespace(fps=FPS, gaits=(walk,), gait_thresholds=np.zeros(0), clips=(), extended=more)
+    library = SimpleNamespace(fps=FPS, gaits=(walk,), gait_thresholds=np.zeros(0), clips=(), with_synthetic_clips=more)
     times = np.arange(0.0, 4.0, 0.04)
     track = Track(times, np.column_stack([2.4 * times, np.zeros_like(times)]))
     view = SimpleNamespace(library=library, track=track, timeline=Timeline(), played=SimpleNamespace(clips=(shows,)))
-    asked = words_per_frame(filled_timeline(view), np.array([1.0, 2.0, 3.0]))
+    asked = labels_per_frame(fill_automatic_spans(view), np.array([1.0, 2.0, 3.0]))
     assert all(word in found for found in asked)
 
 
@@ -225,11 +225,11 @@ def test_files_score_as_the_take_in_memory(cut, track_of, still_ball, library, t
     key = KeyMoment(12.5, ("kick", "right"))
     take = cut(("jog.bvh", 150, 120), ("run.bvh", 40, 120), asked=(key,))
     take = replace(take, ball=still_ball(take, (3.0, 0.0, 0.11)))
-    bvh.write(tmp_path / "m.bvh", take.motion)
+    bvh.write_bvh(tmp_path / "m.bvh", take.motion)
     write_provenance(tmp_path / "p.csv", take)
     tables.write_ball(tmp_path / "b.csv", take.ball)
-    motion, provenance = bvh.read(tmp_path / "m.bvh", 0.01).motion, read_provenance(tmp_path / "p.csv")
-    played = played_from_tables(motion, provenance, tables.read_ball(tmp_path / "b.csv"))
+    motion, provenance = bvh.read_bvh(tmp_path / "m.bvh", 0.01).motion, read_provenance(tmp_path / "p.csv")
+    played = playback_from_tables(motion, provenance, tables.read_ball(tmp_path / "b.csv"))
     track = track_of(take)
     read = evaluate_played(played, track=track, timeline=take.timeline, library=library)
     made = evaluate(take, track, library)
@@ -256,7 +256,7 @@ def _same(a, b):
 
 
 def test_a_motion_alone_still_has_what_needs_nothing_else(uncut):
-    report = evaluate_played(played_from_tables(uncut.motion))
+    report = evaluate_played(playback_from_tables(uncut.motion))
     assert report["root_error_m"]["mean"] is None and report["keys"] == []
     assert report["skate"]["gmd_ratio"] is not None and report["skate"]["source_gmd_ratio"] is None
     assert report["warp_rate"]["max"] is None and report["loop_share"] is None
@@ -272,7 +272,7 @@ def test_a_library_of_one_clip_has_no_other_to_compare_poses_with(uncut, track_o
 
 def test_a_standing_body_stays_still(cut, track_of, library):
     take = cut(("stand.bvh", 0, 200))
-    root, rotations = at_frames(take.motion, np.zeros(200))
+    root, rotations = sample_frames(take.motion, np.zeros(200))
     frozen = replace(take, motion=replace(take.motion, root_positions=root, rotations=rotations))
     report = evaluate(frozen, track_of(frozen), library)
     assert report["root_error_m"]["max"] < 1e-6
@@ -283,18 +283,18 @@ def test_a_standing_body_stays_still(cut, track_of, library):
 
 
 def test_wrong_provenance_and_wrong_skeleton_are_told(uncut, library):
-    provenance = provenance_of(uncut)
+    provenance = build_provenance(uncut)
     with pytest.raises(InputError, match="300 rows"):
-        played_from_tables(uncut.motion.frames(0, 10), provenance)
+        playback_from_tables(uncut.motion.frames(0, 10), provenance)
     offsets = uncut.motion.skeleton.offsets * np.linspace(1.0, 1.3, len(uncut.motion.skeleton))[:, None]
     taller = replace(uncut.motion, skeleton=replace(uncut.motion.skeleton, offsets=offsets))
     with pytest.raises(InputError, match="its skeleton differs"):
-        evaluate_played(played_from_tables(taller, provenance), library=library)
+        evaluate_played(playback_from_tables(taller, provenance), library=library)
 
 
 def test_table_puts_reports_side_by_side(uncut, track_of, library):
     report = evaluate(replace(uncut, timeline=Timeline(keys=(KeyMoment(14.5, ("kick",)),))), track_of(uncut), library)
-    lines = table({"path": report, "blocks": {**report, "seed": 7, "loop_share": None}}).splitlines()
+    lines = format_table({"path": report, "blocks": {**report, "seed": 7, "loop_share": None}}).splitlines()
     assert lines[0] == "| figure | path | blocks |"
     assert "| seed | 0 | 7 |" in lines and "| loop_share | 0 | - |" in lines
     assert any(line.startswith("| root_error_m.mean |") for line in lines)
@@ -304,7 +304,7 @@ def test_table_puts_reports_side_by_side(uncut, track_of, library):
 
 def test_a_report_that_is_nested_too_deep_is_told():
     deep = json.loads('{"a":' * 900 + "1" + "}" * 900)
-    for made in (flat, lambda report: table({"one": report})):
+    for made in (flatten_report, lambda report: format_table({"one": report})):
         with pytest.raises(InputError, match="report: nested more than 30 levels deep"):
             made(deep)
-    assert flat({"a": {"b": [{"c": 1}, {"c": 2}]}}) == {"a.b 1.c": 1, "a.b 2.c": 2}
+    assert flatten_report({"a": {"b": [{"c": 1}, {"c": 2}]}}) == {"a.b 1.c": 1, "a.b 2.c": 2}

@@ -5,18 +5,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.ball_touches import Reading, ReadTouch, read_touches, scored, scored_by_events
+from benchmarks.ball_touches import TouchAnnotation, AnnotatedTouch, read_touches, score_touches, score_with_offset
 from beyond_mocap.base.errors import InputError
 
-READ = Reading(
+READ = TouchAnnotation(
     ((10.0, 20.0), (40.0, 50.0)),
-    (ReadTouch(12.0, ("a",)), ReadTouch(13.0, ("a", "b")), ReadTouch(15.0), ReadTouch(45.0, ("c",))),
-    (ReadTouch(17.0, ("a",), 18.0),),
+    (AnnotatedTouch(12.0, ("a",)), AnnotatedTouch(13.0, ("a", "b")), AnnotatedTouch(15.0), AnnotatedTouch(45.0, ("c",))),
+    (AnnotatedTouch(17.0, ("a",), 18.0),),
 )
 
 
 def test_a_touch_is_right_within_the_tolerance_and_by_the_right_player():
-    score = scored([12.09, 13.0, 15.11, 44.95], ["a", "b", "x", "d"], READ)
+    score = score_touches([12.09, 13.0, 15.11, 44.95], ["a", "b", "x", "d"], READ)
     assert score.right == ((0, 0), (1, 1))
     assert score.missed == (2, 3)
     assert score.false == (2, 3)
@@ -26,31 +26,31 @@ def test_a_touch_is_right_within_the_tolerance_and_by_the_right_player():
 
 def test_each_serves_once_and_most_are_paired():
     """The nearest pair alone (12.0 with 11.98) would leave the second read touch without one."""
-    read = Reading(((0.0, 20.0),), (ReadTouch(12.0, ("a",)), ReadTouch(11.93, ("a",))))
-    score = scored([11.98, 12.08], ["a", "a"], read)
+    read = TouchAnnotation(((0.0, 20.0),), (AnnotatedTouch(12.0, ("a",)), AnnotatedTouch(11.93, ("a",))))
+    score = score_touches([11.98, 12.08], ["a", "a"], read)
     assert sorted(score.right) == [(0, 1), (1, 0)]
-    assert scored([11.98, 11.99, 12.0], ["a"] * 3, read).precision == pytest.approx(2 / 3)
+    assert score_touches([11.98, 11.99, 12.0], ["a"] * 3, read).precision == pytest.approx(2 / 3)
 
 
 def test_doubts_count_neither_way_but_only_for_their_players_and_stretches_end():
-    score = scored([17.5, 17.6, 30.0, 18.05], ["a", "b", "a", "a"], READ)
+    score = score_touches([17.5, 17.6, 30.0, 18.05], ["a", "b", "a", "a"], READ)
     assert (score.doubtful, score.false) == ((0, 3), (1,))
     assert score.recall == 0.0
     assert READ.seconds == 20.0
 
 
 def test_nothing_found_or_read_is_no_fault():
-    assert scored([], [], READ).f1 == 0.0
-    empty = scored([12.0], ["a"], Reading(((10.0, 20.0),), ()))
+    assert score_touches([], [], READ).f1 == 0.0
+    empty = score_touches([12.0], ["a"], TouchAnnotation(((10.0, 20.0),), ()))
     assert (empty.false, empty.f1) == ((0,), 0.0)
 
 
 def test_one_offset_of_a_whole_file_is_found():
     rng = np.random.default_rng(1)
     times = np.cumsum(rng.uniform(0.6, 3.0, 60)) + 10.0
-    read = Reading(((0.0, 300.0),), tuple(ReadTouch(t, (f"p{i % 7}",)) for i, t in enumerate(times)))
+    read = TouchAnnotation(((0.0, 300.0),), tuple(AnnotatedTouch(t, (f"p{i % 7}",)) for i, t in enumerate(times)))
     found = times + 2.37 + rng.normal(0.0, 0.02, 60)
-    score = scored_by_events(found, [f"p{i % 7}" for i in range(60)], read)
+    score = score_with_offset(found, [f"p{i % 7}" for i in range(60)], read)
     assert score.offset == pytest.approx(2.37, abs=0.06)
     assert score.f1 == 1.0
 

@@ -12,9 +12,9 @@ from scipy.spatial.transform import Rotation
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.files.bvh import bvh, bvh_text
 from beyond_mocap.files.bvh.bvh_write import BvhForm
-from beyond_mocap.motion.humanoid import heading
-from beyond_mocap.motion.motion import end_positions, forward_kinematics
-from beyond_mocap.synthetic.gait import gait
+from beyond_mocap.motion.humanoid import compute_heading
+from beyond_mocap.motion.motion import compute_end_positions, forward_kinematics
+from beyond_mocap.synthetic.gait import build_gait
 
 MOCAP = pathlib.Path(__file__).parents[3] / "../shared/data/mocap"
 ROOT = "Xposition Yposition Zposition Zrotation Xrotation Yrotation".split()
@@ -110,7 +110,7 @@ def ours(vector) -> np.ndarray:
 def test_joints_are_where_the_format_says(tmp_path, order, every):
     root = body(order, every)
     rows = rows_for(root)
-    clip = bvh.read(save(tmp_path, document(root, rows)))
+    clip = bvh.read_bvh(save(tmp_path, document(root, rows)))
     positions, _ = forward_kinematics(clip.motion)
     for row, frame in zip(rows, positions):
         for name, place in root.places(iter(row)).items():
@@ -122,20 +122,20 @@ def test_channel_subsets_come_and_go(tmp_path, channels):
     root = body()
     root.children[0].children[0].channels = channels.split()
     rows = rows_for(root, spread=170.0)
-    clip = bvh.read(save(tmp_path, document(root, rows)))
-    assert bvh.write(tmp_path / "b.bvh", clip.motion, clip.form) == ()
-    again = bvh_text.parse(tmp_path / "b.bvh")
+    clip = bvh.read_bvh(save(tmp_path, document(root, rows)))
+    assert bvh.write_bvh(tmp_path / "b.bvh", clip.motion, clip.form) == ()
+    again = bvh_text.read_bvh_text(tmp_path / "b.bvh")
     assert again.channels == tuple(tuple(node.channels) for node in root.walk())
-    back = bvh.read(tmp_path / "b.bvh")
+    back = bvh.read_bvh(tmp_path / "b.bvh")
     assert np.abs(forward_kinematics(back.motion)[0] - forward_kinematics(clip.motion)[0]).max() < 1e-6
 
 
 def test_a_rotation_that_does_not_fit_its_channels_gets_all_and_is_told(tmp_path):
-    clip = bvh.read(save(tmp_path, document(body(), rows_for(body()))))
+    clip = bvh.read_bvh(save(tmp_path, document(body(), rows_for(body()))))
     form = BvhForm({**clip.form.channels, "LeftLeg": ("Xrotation",)})
-    notes = bvh.write(tmp_path / "b.bvh", clip.motion, form)
+    notes = bvh.write_bvh(tmp_path / "b.bvh", clip.motion, form)
     assert len(notes) == 1 and "LeftLeg" in notes[0]
-    back = bvh.read(tmp_path / "b.bvh")
+    back = bvh.read_bvh(tmp_path / "b.bvh")
     assert back.form.channels["LeftLeg"] == ("Xrotation", "Zrotation", "Yrotation")
     assert np.abs(forward_kinematics(back.motion)[0] - forward_kinematics(clip.motion)[0]).max() < 1e-6
 
@@ -149,44 +149,44 @@ def test_angles_come_back_unless_the_middle_one_is_at_the_pole(tmp_path, order):
     rows[:, middle] = random.uniform(-89.99, 89.99, (60, len(middle)))
     rows[:4, middle] = [[89.99], [-89.99], [0.0], [90.0]]
     path = save(tmp_path, document(root, rows))
-    clip = bvh.read(path, 0.01)
-    bvh.write(tmp_path / "b.bvh", clip.motion, clip.form)
-    back = bvh_text.parse(tmp_path / "b.bvh").values
-    difference = (back - bvh_text.parse(path).values + 180.0) % 360.0 - 180.0
+    clip = bvh.read_bvh(path, 0.01)
+    bvh.write_bvh(tmp_path / "b.bvh", clip.motion, clip.form)
+    back = bvh_text.read_bvh_text(tmp_path / "b.bvh").values
+    difference = (back - bvh_text.read_bvh_text(path).values + 180.0) % 360.0 - 180.0
     assert np.abs(difference[np.arange(60) != 3]).max() < 2e-6
-    turned = np.abs(np.sum(bvh.read(tmp_path / "b.bvh", 0.01).motion.rotations * clip.motion.rotations, axis=-1))
+    turned = np.abs(np.sum(bvh.read_bvh(tmp_path / "b.bvh", 0.01).motion.rotations * clip.motion.rotations, axis=-1))
     assert np.all(2 * np.arccos(np.minimum(turned, 1.0)) < 1e-6)
 
 
 def test_writing_keeps_names_order_channels_and_rate(tmp_path):
     root = body("YXZ", ROOT[:3])
     path = save(tmp_path, document(root, rows_for(root), "0.0333667"))
-    clip = bvh.read(path)
+    clip = bvh.read_bvh(path)
     assert clip.motion.fps == pytest.approx(30000 / 1001, abs=1e-12)
-    bvh.write(tmp_path / "b.bvh", clip.motion, clip.form)
-    before, after = bvh_text.parse(path), bvh_text.parse(tmp_path / "b.bvh")
+    bvh.write_bvh(tmp_path / "b.bvh", clip.motion, clip.form)
+    before, after = bvh_text.read_bvh_text(path), bvh_text.read_bvh_text(tmp_path / "b.bvh")
     assert (after.names, after.parents, after.channels) == (before.names, before.parents, before.channels)
     assert np.allclose(after.offsets[1:], before.offsets[1:], atol=1e-6)
     assert np.allclose(after.end_offsets, before.end_offsets, atol=1e-6)
-    assert bvh.read(tmp_path / "b.bvh").motion.fps == clip.motion.fps
+    assert bvh.read_bvh(tmp_path / "b.bvh").motion.fps == clip.motion.fps
 
 
 def test_without_a_form_the_root_has_six_channels_and_others_three(tmp_path):
-    motion = gait(1.4, 0.5)
-    bvh.write(tmp_path / "a.bvh", motion)
-    text = bvh_text.parse(tmp_path / "a.bvh")
+    motion = build_gait(1.4, 0.5)
+    bvh.write_bvh(tmp_path / "a.bvh", motion)
+    text = bvh_text.read_bvh_text(tmp_path / "a.bvh")
     assert text.channels[0] == tuple(ROOT) and set(text.channels[1:]) == {tuple(ROOT[3:])}
-    back = bvh.read(tmp_path / "a.bvh")
+    back = bvh.read_bvh(tmp_path / "a.bvh")
     assert set(back.motion.skeleton.names) == set(motion.skeleton.names)
     assert np.abs(named(back.motion, motion.skeleton) - forward_kinematics(motion)[0]).max() < 1e-6
-    tips = [np.sort(end_positions(m)[..., 2], axis=1) for m in (motion, back.motion)]
+    tips = [np.sort(compute_end_positions(m)[..., 2], axis=1) for m in (motion, back.motion)]
     assert np.abs(tips[0] - tips[1]).max() < 1e-6
     # centimetres, Y up, pitch y = -Z
     assert np.allclose(text.values[:, :3], motion.root_positions[:, (0, 2, 1)] * (100, 100, -100), atol=1e-5)
 
 
 def test_a_skeleton_in_any_order_is_nested_and_read_back_alike(tmp_path):
-    motion = gait(1.4, 0.2)
+    motion = build_gait(1.4, 0.2)
     old = motion.skeleton
     depth = [len([1 for _ in iter(_climb(old, i))]) for i in range(len(old))]
     order = sorted(range(len(old)), key=lambda i: (depth[i], i))  # breadth first
@@ -195,8 +195,8 @@ def test_a_skeleton_in_any_order_is_nested_and_read_back_alike(tmp_path):
         [old.names[i] for i in order], [-1] + [place[old.parents[i]] for i in order[1:]], old.offsets[order]
     )
     mixed = type(motion)(skeleton, motion.root_positions, motion.rotations[:, order], motion.fps)
-    bvh.write(tmp_path / "a.bvh", mixed)
-    back = bvh.read(tmp_path / "a.bvh").motion
+    bvh.write_bvh(tmp_path / "a.bvh", mixed)
+    back = bvh.read_bvh(tmp_path / "a.bvh").motion
     assert np.abs(named(back, skeleton) - forward_kinematics(mixed)[0]).max() < 1e-6
 
 
@@ -218,7 +218,7 @@ def test_unit_and_up_axis_are_seen_in_the_body(tmp_path, unit, up):
     root = body(unit=unit, turn=turn)
     rows = np.tile(rows_for(root, spread=3.0)[:, :1] * 0, (1, 3 + 3 * len(list(root.walk()))))
     rows[:, 2 if up == "Z" else 1] = 0.95 / unit
-    clip = bvh.read(save(tmp_path, document(root, rows)))
+    clip = bvh.read_bvh(save(tmp_path, document(root, rows)))
     assert clip.form.unit == unit and clip.form.up == up
     assert any("unit" in note and f"{up} up" in note for note in clip.notes)
     assert clip.motion.root_positions[0] == pytest.approx([0, 0, 0.95])
@@ -229,13 +229,13 @@ def test_unit_and_up_axis_are_seen_in_the_body(tmp_path, unit, up):
 def test_an_odd_unit_gives_legs_of_an_adult_and_a_given_one_is_kept(tmp_path):
     root = body(unit=0.004)
     path = save(tmp_path, document(root, rows_for(root, height=240.0, spread=1.0)))
-    clip = bvh.read(path)
+    clip = bvh.read_bvh(path)
     leg = [clip.motion.skeleton.index(name) for name in ("LeftLeg", "LeftFoot")]
     assert np.linalg.norm(clip.motion.skeleton.offsets[leg], axis=1).sum() == pytest.approx(0.88)
-    assert bvh.read(path, 0.004).form.unit == 0.004
+    assert bvh.read_bvh(path, 0.004).form.unit == 0.004
     for wrong in (0.0, -1.0, float("nan")):
         with pytest.raises(InputError, match="unit"):
-            bvh.read(path, wrong)
+            bvh.read_bvh(path, wrong)
 
 
 @pytest.mark.parametrize(
@@ -251,7 +251,7 @@ def test_an_odd_unit_gives_legs_of_an_adult_and_a_given_one_is_kept(tmp_path):
     ],
 )
 def test_rates_snap_to_whole_and_ntsc_ones(tmp_path, frame_time, fps):
-    clip = bvh.read(save(tmp_path, document(body(), rows_for(body()), frame_time)))
+    clip = bvh.read_bvh(save(tmp_path, document(body(), rows_for(body()), frame_time)))
     assert clip.motion.fps == pytest.approx(fps, abs=1e-12)
 
 
@@ -261,15 +261,15 @@ def test_a_standing_root_above_the_hips_is_folded_and_put_back(tmp_path):
     rows[:, :6] = (100.0, 0.0, -50.0, 0.0, 0.0, 30.0)
     rows[:, 6:9] = np.linspace([0, 95, 0], [0, 96, 80], len(rows))
     path = save(tmp_path, document(root, rows))
-    clip = bvh.read(path)
+    clip = bvh.read_bvh(path)
     assert (
-        clip.motion.skeleton.names[0] == "Hips" and clip.form.above[0].name == "World" and not clip.form.above[0].moves
+        clip.motion.skeleton.names[0] == "Hips" and clip.form.above[0].name == "World" and not clip.form.above[0].is_moving
     )
     assert any("World" in note and "static" in note for note in clip.notes)
     hips = root.places(iter(rows[2]))["Hips"]
     assert np.allclose(clip.motion.root_positions[2], ours(hips) * 0.01, atol=1e-9)
-    bvh.write(tmp_path / "b.bvh", clip.motion, clip.form)
-    assert np.allclose(bvh_text.parse(tmp_path / "b.bvh").values, rows, atol=1e-5)
+    bvh.write_bvh(tmp_path / "b.bvh", clip.motion, clip.form)
+    assert np.allclose(bvh_text.read_bvh_text(tmp_path / "b.bvh").values, rows, atol=1e-5)
 
 
 def test_a_moving_root_above_the_hips_follows_the_body(tmp_path):
@@ -277,16 +277,16 @@ def test_a_moving_root_above_the_hips_follows_the_body(tmp_path):
     rows = rows_for(root, spread=5.0)
     rows[:, :6] = np.linspace([0, 0, 0, 0, 0, 0], [100, 0, 50, 0, 0, 40], len(rows))
     rows[:, 6:9] = (1.0, 94.0, 2.0)
-    clip = bvh.read(save(tmp_path, document(root, rows)))
-    assert clip.form.above[0].moves
-    bvh.write(tmp_path / "b.bvh", clip.motion, clip.form)
-    back = bvh.read(tmp_path / "b.bvh")
+    clip = bvh.read_bvh(save(tmp_path, document(root, rows)))
+    assert clip.form.above[0].is_moving
+    bvh.write_bvh(tmp_path / "b.bvh", clip.motion, clip.form)
+    back = bvh.read_bvh(tmp_path / "b.bvh")
     assert back.form.above[0].name == "SimulationBone" and back.form.channels == clip.form.channels
     assert np.abs(forward_kinematics(back.motion)[0] - forward_kinematics(clip.motion)[0]).max() < 1e-6
-    values = bvh_text.parse(tmp_path / "b.bvh").values
+    values = bvh_text.read_bvh_text(tmp_path / "b.bvh").values
     assert np.allclose(values[:, [0, 2]], clip.motion.root_positions[:, :2] * (100, -100), atol=1e-5)
     assert np.allclose(values[:, [1, 3, 4]], 0.0, atol=1e-6)
-    turned = np.unwrap(np.radians(values[:, 5])) - heading(clip.motion)
+    turned = np.unwrap(np.radians(values[:, 5])) - compute_heading(clip.motion)
     assert np.ptp(turned) < 1e-6
 
 
@@ -297,10 +297,10 @@ def test_a_moving_root_right_above_hips_without_positions_carries_them(tmp_path)
     root = Node("Reference", (0, 0, 0), ROOT, hips)
     rows = rows_for(root, spread=5.0, height=0.0)
     path = save(tmp_path, document(root, rows))
-    clip = bvh.read(path)
-    assert bvh.write(tmp_path / "b.bvh", clip.motion, clip.form) == ()
-    back = bvh.read(tmp_path / "b.bvh")
-    assert bvh_text.parse(tmp_path / "b.bvh").channels == bvh_text.parse(path).channels
+    clip = bvh.read_bvh(path)
+    assert bvh.write_bvh(tmp_path / "b.bvh", clip.motion, clip.form) == ()
+    back = bvh.read_bvh(tmp_path / "b.bvh")
+    assert bvh_text.read_bvh_text(tmp_path / "b.bvh").channels == bvh_text.read_bvh_text(path).channels
     assert np.abs(forward_kinematics(back.motion)[0] - forward_kinematics(clip.motion)[0]).max() < 1e-6
 
 
@@ -308,7 +308,7 @@ def test_joints_beside_the_hips_are_left_out_and_told(tmp_path):
     root = Node("World", (0, 0, 0), ROOT, body(), Node("IkFoot", (1, 0, 0), ROOT[3:]))
     rows = rows_for(root, height=0.0)
     rows[:, :6], rows[:, 7] = 0.0, 95.0
-    clip = bvh.read(save(tmp_path, document(root, rows)))
+    clip = bvh.read_bvh(save(tmp_path, document(root, rows)))
     assert "IkFoot" not in clip.motion.skeleton.names and any("IkFoot" in note for note in clip.notes)
 
 
@@ -317,16 +317,16 @@ def test_a_bone_that_changes_length_takes_its_mean_and_is_told(tmp_path):
     rows = rows_for(root)
     column = 6 + 6 + 1  # LeftLeg's Yposition
     rows[:, column] = np.linspace(-41.0, -43.0, len(rows))
-    clip = bvh.read(save(tmp_path, document(root, rows)))
+    clip = bvh.read_bvh(save(tmp_path, document(root, rows)))
     assert clip.motion.skeleton.offsets[clip.motion.skeleton.index("LeftLeg")] == pytest.approx([0, 0, -0.42])
     assert any("LeftLeg 10 mm" in note for note in clip.notes)
     rows[:, column] = np.linspace(-41.95, -42.05, len(rows))
-    assert not any("LeftLeg" in note for note in bvh.read(save(tmp_path, document(root, rows))).notes)
+    assert not any("LeftLeg" in note for note in bvh.read_bvh(save(tmp_path, document(root, rows))).notes)
 
 
 def test_a_body_that_is_no_humanoid_is_read_as_it_is(tmp_path):
     root = Node("Ball", (0, 0, 0), ROOT, Node("Valve", (0, 11, 0), [], ends=[(0, 1, 0), (1, 0, 0)]))
-    clip = bvh.read(save(tmp_path, document(root, rows_for(root, height=11.0))))
+    clip = bvh.read_bvh(save(tmp_path, document(root, rows_for(root, height=11.0))))
     assert clip.motion.skeleton.names == ("Ball", "Valve") and clip.motion.skeleton.end_parents == (1, 1)
     assert "assumed" in clip.notes[0]
 
@@ -334,17 +334,17 @@ def test_a_body_that_is_no_humanoid_is_read_as_it_is(tmp_path):
 @pytest.mark.parametrize("ends", ["\r\n", "\r", "\n\n"], ids=["windows", "old mac", "blank lines"])
 def test_line_ends_make_no_difference(tmp_path, ends):
     rows = rows_for(body())
-    plain, other = (bvh.read(save(tmp_path, document(body(), rows, ends=e))) for e in ("\n", ends))
+    plain, other = (bvh.read_bvh(save(tmp_path, document(body(), rows, ends=e))) for e in ("\n", ends))
     assert np.array_equal(plain.motion.rotations, other.motion.rotations)
 
 
 def test_names_with_blanks_and_a_byte_order_mark(tmp_path):
     data = b"\xef\xbb\xbf" + document(body(), rows_for(body())).replace(b"JOINT Neck", "JOINT Bip01 Näck".encode())
-    assert "Bip01 Näck" in bvh.read(save(tmp_path, data)).motion.skeleton.names
+    assert "Bip01 Näck" in bvh.read_bvh(save(tmp_path, data)).motion.skeleton.names
 
 
 def test_two_joints_of_one_name_are_told_apart_and_told(tmp_path):
-    clip = bvh.read(save(tmp_path, document(body(), rows_for(body())).replace(b"JOINT Neck", b"JOINT Spine")))
+    clip = bvh.read_bvh(save(tmp_path, document(body(), rows_for(body())).replace(b"JOINT Neck", b"JOINT Spine")))
     assert "Spine_2" in clip.motion.skeleton.names and any("Spine_2" in note for note in clip.notes)
 
 
@@ -355,9 +355,9 @@ def test_two_thousand_joints_in_a_row(tmp_path):
     )
     rows = ("0 " * (3 * count) + "\n") * 2
     data = f"HIERARCHY\n{joints}{'}' * count}\nMOTION\nFrames: 2\nFrame Time: .01\n{rows}".encode()
-    clip = bvh.read(save(tmp_path, data))
+    clip = bvh.read_bvh(save(tmp_path, data))
     assert len(clip.motion.skeleton) == count
-    bvh.write(tmp_path / "b.bvh", clip.motion, clip.form)
+    bvh.write_bvh(tmp_path / "b.bvh", clip.motion, clip.form)
 
 
 GOOD = document(body(), rows_for(body(), 3))
@@ -402,7 +402,7 @@ BAD = {
 def test_bad_files_get_one_clear_line(tmp_path, case):
     data, says = BAD[case]
     with pytest.raises(InputError) as error:
-        bvh.read(save(tmp_path, data))
+        bvh.read_bvh(save(tmp_path, data))
     message = str(error.value)
     assert says in message and message.startswith(str(tmp_path)) and "\n" not in message
 
@@ -411,18 +411,18 @@ def test_the_line_of_a_bad_number_is_named(tmp_path):
     data = GOOD.replace(ROW, ROW.replace(FIRST, b"oops"))
     line = data.split(b"\n").index(ROW.replace(FIRST, b"oops")) + 1
     with pytest.raises(InputError, match=rf"a\.bvh:{line}: 'oops'"):
-        bvh.read(save(tmp_path, data))
+        bvh.read_bvh(save(tmp_path, data))
 
 
 def test_missing_files_folders_and_places_that_cannot_be_written(tmp_path):
     with pytest.raises(InputError, match="no such file"):
-        bvh.read(tmp_path / "none.bvh")
+        bvh.read_bvh(tmp_path / "none.bvh")
     with pytest.raises(InputError, match="a folder"):
-        bvh.read(tmp_path)
-    motion = gait(1.0, 0.2)
+        bvh.read_bvh(tmp_path)
+    motion = build_gait(1.0, 0.2)
     for place in (tmp_path, tmp_path / "none" / "a.bvh"):
         with pytest.raises(InputError, match="cannot be written"):
-            bvh.write(place, motion)
+            bvh.write_bvh(place, motion)
     assert list(tmp_path.parent.glob("*.part")) == [] and list(tmp_path.iterdir()) == []
 
 
@@ -438,7 +438,7 @@ def test_what_stood_at_the_place_stays_until_all_is_written(tmp_path, monkeypatc
 
     monkeypatch.setattr(bvh, "document", torn)
     with pytest.raises(InputError, match="no space left"):
-        bvh.write(path, gait(1.0, 0.2))
+        bvh.write_bvh(path, build_gait(1.0, 0.2))
     assert path.read_bytes() == b"precious" and list(tmp_path.iterdir()) == [path]
 
 
@@ -455,7 +455,7 @@ def test_damaged_files_are_read_or_refused(tmp_path_factory, data):
         )
         mangled[start:stop] = data.draw(filler)
     try:
-        clip = bvh.read(save(folder, bytes(mangled), "fuzz.bvh"))
+        clip = bvh.read_bvh(save(folder, bytes(mangled), "fuzz.bvh"))
     except InputError as error:
         assert "\n" not in str(error)
     else:
@@ -477,7 +477,7 @@ number = st.one_of(
 @given(st.integers(1, 4).flatmap(lambda n: st.lists(st.lists(number, min_size=n, max_size=n), min_size=1, max_size=5)))
 def test_numbers_are_those_of_python(rows):
     text = "\n".join(" ".join(row) for row in rows).encode()
-    values = bvh_text._rows(pathlib.Path("a.bvh"), b"\n" + text, len(rows[0]), 9)
+    values = bvh_text._parse_rows(pathlib.Path("a.bvh"), b"\n" + text, len(rows[0]), 9)
     expected = np.array([[float(word) for word in row] for row in rows]) + 0.0
     assert values.tobytes() == expected.tobytes()
 
@@ -485,7 +485,7 @@ def test_numbers_are_those_of_python(rows):
 @pytest.mark.parametrize("word", ["x", "2-3", ".-3", "--3", "1.2.3", "-", ".", "+", "1e", "1_0", "0x1", "nan", "1e300"])
 def test_what_is_no_number_is_named_with_its_line(word):
     with pytest.raises(InputError, match=re.escape(f"a.bvh:10: {word!r}; expected a number")):
-        bvh_text._rows(pathlib.Path("a.bvh"), f"\n1 2\n3 {word}\n".encode(), 2, 9)
+        bvh_text._parse_rows(pathlib.Path("a.bvh"), f"\n1 2\n3 {word}\n".encode(), 2, 9)
 
 
 @pytest.mark.skipif(not MOCAP.is_dir(), reason="recordings: no ../shared/data/mocap beside the clone")
@@ -509,14 +509,14 @@ def test_recordings_come_back(tmp_path, pattern, unit, fps):
     paths = sorted(MOCAP.glob(pattern))
     assert paths
     for path in paths:
-        clip = bvh.read(path)
+        clip = bvh.read_bvh(path)
         assert (clip.form.unit, clip.form.up, clip.motion.skeleton.names[0]) == (unit, "Y", "Hips")
         assert clip.motion.fps == (fps or clip.motion.fps)
-        bvh.write(tmp_path / "b.bvh", clip.motion, clip.form)
-        back = bvh.read(tmp_path / "b.bvh")
-        before, after = bvh_text.parse(path), bvh_text.parse(tmp_path / "b.bvh")
+        bvh.write_bvh(tmp_path / "b.bvh", clip.motion, clip.form)
+        back = bvh.read_bvh(tmp_path / "b.bvh")
+        before, after = bvh_text.read_bvh_text(path), bvh_text.read_bvh_text(tmp_path / "b.bvh")
         assert (before.names, before.channels) == (after.names, after.channels)
         assert np.abs(forward_kinematics(back.motion)[0] - forward_kinematics(clip.motion)[0]).max() < 1e-6
-        if not any(joint.moves for joint in clip.form.above):
+        if not any(joint.is_moving for joint in clip.form.above):
             angles = [c.endswith("rotation") for channels in before.channels for c in channels]
             assert np.abs((before.values - after.values + 180.0) % 360.0 - 180.0)[:, angles].max() < 2e-6

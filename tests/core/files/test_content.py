@@ -6,7 +6,7 @@ import pytest
 
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.files.bvh import bvh
-from beyond_mocap.files.content import content, utf8
+from beyond_mocap.files.content import read_bytes, read_utf8
 from beyond_mocap.files.obj import read_mesh
 from beyond_mocap.files.tables import read_ball
 from beyond_mocap.markers.files.c3d import read_c3d
@@ -15,7 +15,7 @@ from beyond_mocap.markers.files.model_json import read_model
 from beyond_mocap.markers.files.trc import read_trc
 from beyond_mocap.passes.scene_json import read_scene
 
-READERS = (bvh.read, read_ball, read_c3d, read_marker_set, read_model, read_mesh, read_scene, read_trc)
+READERS = (bvh.read_bvh, read_ball, read_c3d, read_marker_set, read_model, read_mesh, read_scene, read_trc)
 
 
 @pytest.mark.parametrize("read", READERS)
@@ -35,21 +35,21 @@ def test_a_file_that_may_not_be_read(tmp_path):
     (tmp_path / "a").write_text("a")
     (tmp_path / "a").chmod(0)
     with pytest.raises(InputError, match=r"cannot be read \(Permission denied\); expected a thing that is readable"):
-        content(tmp_path / "a", "a thing")
+        read_bytes(tmp_path / "a", "a thing")
 
 
 def test_what_is_too_large_is_not_read(tmp_path):
     (tmp_path / "a").write_bytes(b"12345")
-    assert content(tmp_path / "a", "a thing", 5) == b"12345"
+    assert read_bytes(tmp_path / "a", "a thing", 5) == b"12345"
     with pytest.raises(InputError, match="has 5 bytes; expected a thing of at most 4; choose another file"):
-        content(tmp_path / "a", "a thing", 4)
+        read_bytes(tmp_path / "a", "a thing", 4)
 
 
 def test_text_is_utf8_and_loses_the_mark_at_its_start(tmp_path):
     (tmp_path / "a").write_bytes("\ufeffJörg\r\n".encode())
-    assert utf8(tmp_path / "a", "a thing") == "Jörg\r\n"
+    assert read_utf8(tmp_path / "a", "a thing") == "Jörg\r\n"
     (tmp_path / "b").write_bytes("Jörg".encode("cp1252"))
     with pytest.raises(
         InputError, match="is not UTF-8 text; expected a thing; choose another file, or save it as UTF-8"
     ):
-        utf8(tmp_path / "b", "a thing")
+        read_utf8(tmp_path / "b", "a thing")

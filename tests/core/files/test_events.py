@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from beyond_mocap.annotation.event_words import KINDS
 from beyond_mocap.annotation.striking import BODY_PARTS
 from beyond_mocap.base.errors import InputError
-from beyond_mocap.files.event_data import Who, same_players
-from beyond_mocap.files.event_providers import guessed_event_provider, other_file
+from beyond_mocap.files.event_data import EventPlayer, assign_players
+from beyond_mocap.files.event_providers import detect_event_provider, find_second_file
 from beyond_mocap.files.events import read_events
 from beyond_mocap.motion.track.match_data import Match, MatchPlayer
 
@@ -85,7 +85,7 @@ def test_a_second_file_that_is_missing_is_asked_for(tmp_path):
 def test_a_second_file_is_known_by_its_form_too(tmp_path, name, meta):
     (tmp_path / f"one{name[-5:]}").write_bytes((files() / name).read_bytes()[:20000])
     (tmp_path / f"two{meta[-5:]}").write_bytes((files() / meta).read_bytes())
-    found = other_file(tmp_path / f"one{name[-5:]}", guessed_event_provider(tmp_path / f"one{name[-5:]}"), None)
+    found = find_second_file(tmp_path / f"one{name[-5:]}", detect_event_provider(tmp_path / f"one{name[-5:]}"), None)
     assert found == tmp_path / f"two{meta[-5:]}"
 
 
@@ -176,11 +176,11 @@ def test_metrica_s_table_of_events_is_read(tmp_path):
 
 def test_players_are_found_by_id_number_or_name_and_teams_may_be_swapped():
     match = made_match()
-    asked = [Who("h7"), Who("x", "away", 3), Who("y", "home", -1, "ana nunez"), Who("z", "home", 30, "Nobody")]
-    found, notes = same_players(asked, match)
+    asked = [EventPlayer("h7"), EventPlayer("x", "away", 3), EventPlayer("y", "home", -1, "ana nunez"), EventPlayer("z", "home", 30, "Nobody")]
+    found, notes = assign_players(asked, match)
     assert [found.get(who) for who in asked] == [("h7", "home"), ("a3", "away"), ("h7", "home"), None]
     assert "1 of 4 players" in notes[0]
-    swapped = [Who("1", "home", 3), Who("2", "away", 9)]
-    found, notes = same_players(swapped, match)
+    swapped = [EventPlayer("1", "home", 3), EventPlayer("2", "away", 9)]
+    found, notes = assign_players(swapped, match)
     assert [found[who][0] for who in swapped] == ["a3", "h9"] and "exchanged" in notes[0]
-    assert Who.spelled("away_11") == Who("away_11", "away", 11, "away_11")
+    assert EventPlayer.from_text("away_11") == EventPlayer("away_11", "away", 11, "away_11")

@@ -3,23 +3,23 @@
 import pytest
 
 from beyond_mocap.base.errors import InputError
-from beyond_mocap.library.build import build
+from beyond_mocap.library.build import build_library
 from beyond_mocap.library.keep_words import add_clip
-from beyond_mocap.synthetic.gait import gait
+from beyond_mocap.synthetic.gait import build_gait
 
 
 @pytest.fixture
 def walk():
-    return gait(1.4, 2.0, 60.0)
+    return build_gait(1.4, 2.0, 60.0)
 
 
 def test_the_library_reads_what_was_added(tmp_path, walk):
     add_clip(tmp_path, "walk", walk, ["walking"])
     lines = add_clip(tmp_path, "throw", walk, ["throwb", "high"], key_seconds=1.2)
-    library = build(tmp_path)
+    library = build_library(tmp_path)
     assert {clip.path for clip in library.clips} == {"walk.bvh", "throw.bvh"} and len(lines) == 1
     key = next(key for key in library.keys if not library.clips[key.clip].mirrored)
-    assert set(key.words) >= {"throwb", "high"} and (tmp_path / "throw.txt").read_text() == "72f throwb high\n"
+    assert set(key.labels) >= {"throwb", "high"} and (tmp_path / "throw.txt").read_text() == "72f throwb high\n"
 
 
 def test_words_of_its_own_are_told(tmp_path, walk):

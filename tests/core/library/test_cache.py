@@ -11,7 +11,7 @@ import pytest
 
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.library import cache
-from beyond_mocap.library.build import build
+from beyond_mocap.library.build import build_library
 from beyond_mocap.library.library import Library
 
 TOP = Path(__file__).resolve().parents[3]
@@ -23,7 +23,7 @@ def small(tmp_path_factory, clip_file):
     folder = tmp_path_factory.mktemp("small")
     clip_file(folder / "stand.bvh", 0.0, 1.5, "standing")
     clip_file(folder / "walk.bvh", 1.4, 1.5, "walking")
-    build(folder)
+    build_library(folder)
     return folder
 
 
@@ -35,7 +35,7 @@ def folder(small, tmp_path):
 def built(folder, **options):
     """The library, and whether it was worked out anew."""
     told = []
-    library = build(folder, progress=lambda fraction, text: told.append(text), **options)
+    library = build_library(folder, progress=lambda fraction, text: told.append(text), **options)
     return library, "Library ready" in told
 
 
@@ -48,14 +48,14 @@ def arrays_of(library: Library) -> dict[str, np.ndarray]:
         found.update({f"{length}.{name}": getattr(clusters, name) for name in ("start", "label", "medoid")})
     for number, clip in enumerate(library.clips):
         found[f"{number}.root"], found[f"{number}.rotations"] = clip.motion.root_positions, clip.motion.rotations
-        found[f"{number}.standing"] = clip.standing
+        found[f"{number}.standing"] = clip.heel_toe_contacts
     return found
 
 
 def the_rest(library: Library):
     clips = [(c.path, c.mirrored, c.motion.fps, c.annotations) for c in library.clips]
     skeleton = (library.skeleton.names, library.skeleton.parents, library.skeleton.end_parents)
-    words = (library.frames.vocabulary, library.words, library.keys)
+    words = (library.frames.vocabulary, library.labels, library.keys)
     return (clips, skeleton, words, library.fps, library.notes, list(library.clusters), library.folder,
             library.gaits, library.minutes)  # fmt: skip
 
@@ -142,7 +142,7 @@ def test_a_damaged_cache_is_written_anew(folder, damage):
 def test_no_single_wrong_byte_does_harm(small, tmp_path):
     """Flipped bytes all over the file, its directory above all: the cache is not used, or says the same."""
     content = (small / ".beyond_mocap" / "library.npz").read_bytes()
-    library = build(small)
+    library = build_library(small)
     key = _header(small)["key"]
     random = np.random.default_rng(3)
     places = [*random.integers(0, len(content), 40), *range(len(content) - 2500, len(content), 7)]
@@ -150,7 +150,7 @@ def test_no_single_wrong_byte_does_harm(small, tmp_path):
         (tmp_path / "library.npz").write_bytes(
             content[:place] + bytes([content[place] ^ (1 << place % 8)]) + content[place + 1 :]
         )
-        found = cache.load(tmp_path, key)
+        found = cache.load_library(tmp_path, key)
         if found is not None:
             left, right = arrays_of(library), arrays_of(Library(folder=str(small), **found))
             assert all(np.array_equal(left[name], right[name]) for name in left), place
@@ -262,12 +262,12 @@ def test_a_failed_build_leaves_no_cache(folder):
     shutil.rmtree(folder / ".beyond_mocap")
     (folder / "walk.bvh").write_bytes((folder / "walk.bvh").read_bytes()[:9000])
     with pytest.raises(InputError):
-        build(folder)
+        build_library(folder)
     assert not (folder / ".beyond_mocap").exists()
 
 
 def test_a_cache_that_cannot_be_written_is_told(folder, tmp_path):
     blocked = tmp_path / "file"
     blocked.write_text("in the way")
-    library = build(folder, cache_dir=blocked / "below", rebuild=True)
+    library = build_library(folder, cache_dir=blocked / "below", rebuild=True)
     assert any("cannot be written" in note for note in library.notes)

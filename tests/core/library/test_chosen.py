@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 
 from beyond_mocap.base.errors import InputError
-from beyond_mocap.base.settings.synthesis import gait_choices
-from beyond_mocap.library.automatic import with_chosen_gaits
+from beyond_mocap.base.settings.synthesis import parse_gait_clips
+from beyond_mocap.library.automatic import apply_chosen_gaits
 from beyond_mocap.synthesis.plan import Plan
 from beyond_mocap.synthesis.synthesize import synthesize
 
 
 @pytest.fixture(scope="module")
 def chosen(library):
-    return with_chosen_gaits(library, {"walking": "bows/turn.bvh", "jogging": "jog.bvh"})
+    return apply_chosen_gaits(library, {"walking": "bows/turn.bvh", "jogging": "jog.bvh"})
 
 
 def carrying(library, word):
@@ -21,14 +21,14 @@ def carrying(library, word):
 
 
 def test_without_a_choice_the_library_is_the_same(library):
-    assert with_chosen_gaits(library, {}) is library
+    assert apply_chosen_gaits(library, {}) is library
 
 
 def test_the_chosen_clip_says_the_gait(library, chosen):
     assert [g.words for g in library.gaits if g.word == "walking"] == [("walking",)]
     walking, jogging = chosen.gaits[1:3]
-    assert walking.words == ("walking", "left") and walking.speed == pytest.approx(1.4, abs=0.1)
-    assert jogging.words == ("jogging",) and jogging.speed == pytest.approx(2.8, abs=0.1)
+    assert walking.labels == ("walking", "left") and walking.speed == pytest.approx(1.4, abs=0.1)
+    assert jogging.labels == ("jogging",) and jogging.speed == pytest.approx(2.8, abs=0.1)
 
 
 def test_no_other_clip_carries_the_word_but_for_actions(library, chosen):
@@ -61,12 +61,12 @@ def test_a_take_walks_with_the_chosen_clip(library, track_of, method):
 ])
 def test_a_wrong_choice_is_told_in_one_line(library, gaits, parts):
     with pytest.raises(InputError) as told:
-        with_chosen_gaits(library, gaits)
+        apply_chosen_gaits(library, gaits)
     assert "\n" not in str(told.value) and all(part in str(told.value) for part in parts), str(told.value)
 
 
 def test_choices_as_text():
-    assert gait_choices(["walking = a/b.bvh", r"Jogging=c\d.bvh"]) == (("walking", "a/b.bvh"), ("jogging", "c/d.bvh"))
+    assert parse_gait_clips(["walking = a/b.bvh", r"Jogging=c\d.bvh"]) == (("walking", "a/b.bvh"), ("jogging", "c/d.bvh"))
     for wrong in (["walking"], ["=a.bvh"], ["walking="], ["walking=a", "walking=b"]):
         with pytest.raises(InputError):
-            gait_choices(wrong)
+            parse_gait_clips(wrong)

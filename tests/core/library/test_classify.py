@@ -8,19 +8,19 @@ import numpy as np
 import pytest
 
 from beyond_mocap.annotation import ClipAnnotation, read_annotation_csv
-from beyond_mocap.base.errors import Cancelled, InputError
+from beyond_mocap.base.errors import UserCancelledError, InputError
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.library.classify import classifier, kernel, train
-from beyond_mocap.library.classify.examples import Example, act_of
-from beyond_mocap.library.classify.signals import LENGTH, signals, windows
-from beyond_mocap.library.classify.train import trained
-from beyond_mocap.library.proposals import propose
+from beyond_mocap.library.classify.examples import Example, find_act
+from beyond_mocap.library.classify.signals import LENGTH, build_signals, build_windows
+from beyond_mocap.library.classify.train import train_classifier
+from beyond_mocap.library.proposals import propose_labels
 from beyond_mocap.motion.mirror import mirror
-from beyond_mocap.motion.motion import place, resample
-from beyond_mocap.motion.retargeting.adult import adult_skeleton
-from beyond_mocap.synthetic.gait import gait
-from beyond_mocap.synthetic.gestures import strike
-from beyond_mocap.synthetic.volleys import volley
+from beyond_mocap.motion.motion import place_motion, resample
+from beyond_mocap.motion.retargeting.adult import build_adult_skeleton
+from beyond_mocap.synthetic.gait import build_gait
+from beyond_mocap.synthetic.gestures import build_strike
+from beyond_mocap.synthetic.volleys import build_volley
 
 REAL = Path(__file__).resolve().parents[4] / "shared" / "data" / "mocap"
 LEARNED = {
@@ -33,18 +33,18 @@ def annotated(name, gesture, words):
     fps = gesture.motion.fps
     start, end, key = (round(seconds * fps) for seconds in (gesture.start, gesture.end, gesture.key))
     row = ClipAnnotation(max(start, 0), min(end, len(gesture.motion) - 1), key, tuple(words.split()))
-    return Example.of(name, gesture.motion, [row])
+    return Example.from_clip(name, gesture.motion, [row])
 
 
 def ten():
     """Nine strikes and a jog of one body."""
-    body, out = adult_skeleton(1.80), []
+    body, out = build_adult_skeleton(1.80), []
     for seed in (0, 1):
         for kind, words in LEARNED.items():
-            out.append(annotated(f"{kind} {seed}", volley(kind, body, seed=seed, speed=1.0 - 0.1 * seed), words))
-    out.append(annotated("kick", strike("kick low inside", body), "kick right low inside running front"))
-    jog = gait(2.8, 4.0, skeleton=body)
-    return [*out, Example.of("jog", jog, [ClipAnnotation(0, len(jog) - 1, None, ("jogging", "front"))])]
+            out.append(annotated(f"{kind} {seed}", build_volley(kind, body, seed=seed, speed=1.0 - 0.1 * seed), words))
+    out.append(annotated("kick", build_strike("kick low inside", body), "kick right low inside running front"))
+    jog = build_gait(2.8, 4.0, skeleton=body)
+    return [*out, Example.from_clip("jog", jog, [ClipAnnotation(0, len(jog) - 1, None, ("jogging", "front"))])]
 
 
 @pytest.fixture(scope="module")
@@ -54,17 +54,17 @@ def examples():
 
 @pytest.fixture(scope="module")
 def known(examples):
-    return trained(examples)
+    return train_classifier(examples)
 
 
 def moments(motion, known, least=0.5):
-    found = propose(motion, classifier=known)
+    found = propose_labels(motion, classifier=known)
     return [one for one in found if one.annotation.key is not None and one.confidence >= least]
 
 
 @pytest.mark.parametrize("kind", LEARNED)
 def test_acts_are_found_on_another_body(known, kind):
-    made = volley(kind, adult_skeleton(1.62), seed=7, speed=1.08)
+    made = build_volley(kind, build_adult_skeleton(1.62), seed=7, speed=1.08)
     (one,) = moments(made.motion, known)
     assert one.annotation.words[0] == LEARNED[kind].split()[0] and one.source == "learned"
     assert abs(one.annotation.key - made.key * made.motion.fps) <= 2.0
@@ -73,16 +73,16 @@ def test_acts_are_found_on_another_body(known, kind):
 
 
 def test_the_mirrored_act_has_the_other_side(known):
-    motion = volley("receive", adult_skeleton(1.7), seed=3).motion
+    motion = build_volley("receive", build_adult_skeleton(1.7), seed=3).motion
     (right,), (left,) = moments(motion, known), moments(mirror(motion), known)
     assert "right" in right.annotation.words and "left" in left.annotation.words
     assert right.annotation.key == left.annotation.key
 
 
 def test_where_and_at_which_rate_it_is_recorded_does_not_matter(known):
-    motion = volley("attack", adult_skeleton(1.7), fps=60.0, seed=4).motion
+    motion = build_volley("attack", build_adult_skeleton(1.7), fps=60.0, seed=4).motion
     (one,) = moments(motion, known)
-    (moved,) = moments(place(motion, 2.0, (30.0, -4.0, 0.0)), known)
+    (moved,) = moments(place_motion(motion, 2.0, (30.0, -4.0, 0.0)), known)
     (slower,) = moments(resample(motion, 30.0), known)
     assert moved.annotation == one.annotation
     assert abs(slower.annotation.key - one.annotation.key / 2.0) <= 1.0
@@ -90,23 +90,23 @@ def test_where_and_at_which_rate_it_is_recorded_does_not_matter(known):
 
 @pytest.mark.parametrize("speed", [0.0, 1.3, 5.5])
 def test_going_shows_no_act(known, speed):
-    assert moments(gait(speed, 4.0, skeleton=adult_skeleton(1.7), seed=2), known) == []
+    assert moments(build_gait(speed, 4.0, skeleton=build_adult_skeleton(1.7), seed=2), known) == []
 
 
 def test_what_it_does_not_know_is_left_to_the_rules(known):
-    motion = gait(2.8, 4.0, skeleton=adult_skeleton(1.7), seed=2)
-    assert propose(motion, classifier=known) == propose(motion)
+    motion = build_gait(2.8, 4.0, skeleton=build_adult_skeleton(1.7), seed=2)
+    assert propose_labels(motion, classifier=known) == propose_labels(motion)
 
 
 def test_the_same_examples_give_the_same_bits_and_a_file_keeps_them(examples, known, tmp_path):
-    again = trained(examples[:])
+    again = train_classifier(examples[:])
     for name, one in (("a.npz", known), ("b.npz", again)):
         classifier.write_classifier(tmp_path / name, one)
     assert (tmp_path / "a.npz").read_bytes() == (tmp_path / "b.npz").read_bytes()
-    motion = volley("head", adult_skeleton(1.7), seed=5).motion
+    motion = build_volley("head", build_adult_skeleton(1.7), seed=5).motion
     read = classifier.read_classifier(tmp_path / "a.npz")
-    assert propose(motion, classifier=read) == propose(motion, classifier=known)
-    assert read.told() == known.told() and read.told()[0] == "learned from 10 clips"
+    assert propose_labels(motion, classifier=read) == propose_labels(motion, classifier=known)
+    assert read.describe() == known.describe() and read.describe()[0] == "learned from 10 clips"
 
 
 def test_files_that_are_none_are_refused_in_one_line(known, tmp_path):
@@ -144,10 +144,10 @@ def test_numbers_that_no_training_gives_are_refused(known, tmp_path, change):
 
 
 def test_a_large_library_is_learned_from_a_part_of_its_windows(examples, monkeypatch):
-    monkeypatch.setattr(train, "_WINDOWS", 400)
-    known = trained(examples)
+    monkeypatch.setattr(train, "_MAX_WINDOWS", 400)
+    known = train_classifier(examples)
     assert known.space.basis.shape[1] == 80 and sum(2 * len(one.signals) for one in examples) > 800
-    (one,) = moments(volley("attack", adult_skeleton(1.62), seed=7).motion, known)
+    (one,) = moments(build_volley("attack", build_adult_skeleton(1.62), seed=7).motion, known)
     assert one.annotation.words[0] == "kick"
 
 
@@ -155,39 +155,39 @@ def test_one_clip_with_two_moments_is_enough(examples):
     one = examples[0]
     (row,) = one.rows
     again = replace(row, start=row.start + 1, end=row.end + 1, key=row.key + 1)
-    assert trained([replace(one, rows=(row, again))]).told() == ("learned from 1 clip", "receive: 2 moments")
+    assert train_classifier([replace(one, rows=(row, again))]).describe() == ("learned from 1 clip", "receive: 2 moments")
 
 
 def test_words_outside_their_clip_teach_nothing_and_are_told(examples):
     late = ClipAnnotation(9000, 9600, None, ("dribble",))
     with pytest.raises(InputError, match="outside its clips"):
-        trained([replace(examples[0], rows=(late,))])
+        train_classifier([replace(examples[0], rows=(late,))])
 
 
 def test_too_little_to_learn_from_is_told(examples):
     with pytest.raises(InputError, match="annotate more clips"):
-        trained(examples[-1:])
-    with pytest.raises(Cancelled):
-        trained(examples, cancelled=lambda: True)
+        train_classifier(examples[-1:])
+    with pytest.raises(UserCancelledError):
+        train_classifier(examples, cancelled=lambda: True)
 
 
 def test_short_recordings_bring_no_trouble(known):
-    motion = gait(0.0, 1.0, skeleton=adult_skeleton())
+    motion = build_gait(0.0, 1.0, skeleton=build_adult_skeleton())
     for count in (1, 2, 5):
-        assert all(one.annotation.end < count for one in propose(motion.frames(0, count), classifier=known))
+        assert all(one.annotation.end < count for one in propose_labels(motion.frames(0, count), classifier=known))
 
 
 def test_windows_of_the_mirrored_body_are_those_of_mirrored_signals():
-    motion = volley("attack", adult_skeleton(1.75), seed=1).motion
-    one, other = windows(signals(motion).mirrored), windows(signals(mirror(motion)))
-    assert one.shape == other.shape == (len(signals(motion)), LENGTH)
+    motion = build_volley("attack", build_adult_skeleton(1.75), seed=1).motion
+    one, other = build_windows(build_signals(motion).mirrored), build_windows(build_signals(mirror(motion)))
+    assert one.shape == other.shape == (len(build_signals(motion)), LENGTH)
     assert np.allclose(one, other, atol=1e-6)
 
 
 def test_an_act_is_what_is_done_not_how_one_goes():
     for words, act in (("kick right low", "kick"), ("jogging front", ""), ("dribble walking left", "dribble"),
                        ("header standing jump", "header"), ("turning left", "turning"), ("stroke right", "stroke")):
-        assert act_of(ClipAnnotation(0, 1, None, tuple(words.split()))) == act
+        assert find_act(ClipAnnotation(0, 1, None, tuple(words.split()))) == act
 
 
 def test_confidence_follows_examples_as_far_as_there_are_some():
@@ -205,17 +205,17 @@ def test_kicks_of_players_that_were_kept_back():
 
     def clips(player, every):
         for name in sorted(name for name in table if name.startswith(f"lmd/Player{player}/"))[::every]:
-            yield Example.of(name, bvh.read(REAL / name).motion, table[name])
+            yield Example.from_clip(name, bvh.read_bvh(REAL / name).motion, table[name])
 
     for rules, aim in ((True, 0.9), (False, 0.8)):
-        ruled = (lambda one: one.ruled) if rules else (lambda one: ())
-        known = trained([replace(one, ruled=ruled(one)) for one in list(clips(1, 3))[:10]])
+        ruled = (lambda one: one.rule_proposals) if rules else (lambda one: ())
+        known = train_classifier([replace(one, ruled=ruled(one)) for one in list(clips(1, 3))[:10]])
         hit = false = planted = 0
         for one in clips(4, 3):
-            motion = bvh.read(REAL / one.name).motion
-            found = [p.annotation.key for p in known.propose(motion, ruled(one))
+            motion = bvh.read_bvh(REAL / one.name).motion
+            found = [p.annotation.key for p in known.propose_labels(motion, ruled(one))
                      if p.annotation.words[0] == "kick" and p.confidence >= 0.5]
-            keys = [row.key for row in one.rows_of("kick", True)]
+            keys = [row.key for row in one.select_rows("kick", True)]
             near = sum(any(abs(key - other) <= 12 for other in found) for key in keys)
             hit, false, planted = hit + near, false + len(found) - near, planted + len(keys)
         assert planted >= 6 and 2.0 * hit / (hit + false + planted) >= aim

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from beyond_mocap.library.build import build
-from beyond_mocap.library.clusters import BLOCK_LENGTHS, CLUSTERS, block_starts, cluster_blocks
+from beyond_mocap.library.build import build_library
+from beyond_mocap.library.clusters import BLOCK_LENGTHS, CLUSTERS, find_block_starts, cluster_blocks
 
 
 @pytest.mark.parametrize("length", BLOCK_LENGTHS)
@@ -12,7 +12,7 @@ def test_blocks_lie_within_one_clip_and_none_is_forgotten(library, length):
     start = library.clusters[length].start
     assert np.array_equal(library.frames.clip[start], library.frames.clip[start + length - 1])
     assert len(start) == np.sum(np.maximum(library.frames.count - length + 1, 0))
-    assert np.array_equal(start, block_starts(library.frames, length))
+    assert np.array_equal(start, find_block_starts(library.frames, length))
 
 
 @pytest.mark.parametrize("length", BLOCK_LENGTHS)
@@ -50,6 +50,6 @@ def test_the_same_seed_gives_the_same_clusters(library):
 
 def test_clips_too_short_for_a_block_have_none(tmp_path, clip_file):
     clip_file(tmp_path / "walk.bvh", 1.4, 0.6)
-    library = build(tmp_path)
+    library = build_library(tmp_path)
     assert [len(library.clusters[length].start) for length in BLOCK_LENGTHS] == [0, 2 * 4, 2 * 12]
     assert len(library.clusters[32].medoid) == 0 and library.clusters[32].label_at(0) == -1

@@ -6,10 +6,10 @@ import shutil
 import pytest
 
 from beyond_mocap.base.errors import InputError
-from beyond_mocap.library.build import build
-from beyond_mocap.library.cache import place
-from beyond_mocap.library.listing import scanned
-from beyond_mocap.library.scan import Conversions, own_recordings, stamp_of
+from beyond_mocap.library.build import build_library
+from beyond_mocap.library.cache import find_cache_folder
+from beyond_mocap.library.listing import scan_clips
+from beyond_mocap.library.scan import Conversions, list_own_recordings, read_stamp
 
 
 @pytest.fixture
@@ -26,14 +26,14 @@ def foreign(clips_folder, tmp_path):
 
 
 def convert(folder, fbx, bvh):
-    conversions = Conversions(folder, place(folder, None)[0])
-    conversions.prepare(fbx).write_bytes(bvh)
-    conversions.keep(fbx, stamp_of(fbx))
+    conversions = Conversions(folder, find_cache_folder(folder, None)[0])
+    conversions.prepare_file(fbx).write_bytes(bvh)
+    conversions.record_conversion(fbx, read_stamp(fbx))
 
 
 def test_what_nobody_has_converted_is_left_out_and_told(foreign):
     folder, fbx, _ = foreign
-    library = build(folder)
+    library = build_library(folder)
     assert all(not clip.path.endswith(".fbx") for clip in library.clips)
     assert any("skipped" in note and fbx.name in note for note in library.notes)
 
@@ -41,7 +41,7 @@ def test_what_nobody_has_converted_is_left_out_and_told(foreign):
 def test_a_conversion_is_the_clip_with_the_words_beside_the_source(foreign):
     folder, fbx, bvh = foreign
     convert(folder, fbx, bvh)
-    for library in (build(folder), build(folder)):
+    for library in (build_library(folder), build_library(folder)):
         clip = next(clip for clip in library.clips if clip.path == fbx.relative_to(folder).as_posix())
         assert clip.annotations and not any("skipped" in note for note in library.notes)
 
@@ -49,9 +49,9 @@ def test_a_conversion_is_the_clip_with_the_words_beside_the_source(foreign):
 def test_a_changed_source_is_not_answered_by_its_old_conversion(foreign):
     folder, fbx, bvh = foreign
     convert(folder, fbx, bvh)
-    build(folder)
+    build_library(folder)
     fbx.write_bytes(b"changed")
-    library = build(folder)
+    library = build_library(folder)
     assert all(not clip.path.endswith(".fbx") for clip in library.clips)
     assert any("skipped" in note for note in library.notes)
 
@@ -60,25 +60,25 @@ def test_a_bvh_of_the_same_name_goes_first(foreign):
     folder, fbx, bvh = foreign
     fbx.with_suffix(".bvh").write_bytes(bvh)
     convert(folder, fbx, bvh)
-    assert all(not clip.path.endswith(".fbx") for clip in build(folder).clips)
-    for found in (own_recordings(folder), [folder / clip.path for clip in scanned(folder)]):
+    assert all(not clip.path.endswith(".fbx") for clip in build_library(folder).clips)
+    for found in (list_own_recordings(folder), [folder / clip.path for clip in scan_clips(folder)]):
         assert fbx.with_suffix(".bvh") in found and fbx not in found
 
 
 def test_only_foreign_clips_and_none_converted(tmp_path):
     (tmp_path / "a.glb").write_bytes(b"anything")
     with pytest.raises(InputError, match="only Blender reads"):
-        build(tmp_path)
+        build_library(tmp_path)
 
 
 def test_a_damaged_table_counts_as_nothing_converted(foreign):
     folder, fbx, bvh = foreign
     convert(folder, fbx, bvh)
-    table = place(folder, None)[0] / "converted" / "converted.json"
+    table = find_cache_folder(folder, None)[0] / "converted" / "converted.json"
     table.write_text("[1, 2")
-    assert not Conversions(folder, place(folder, None)[0]).stands(fbx)
+    assert not Conversions(folder, find_cache_folder(folder, None)[0]).is_current(fbx)
     table.write_text("[]")
-    assert not Conversions(folder, place(folder, None)[0]).stands(fbx)
+    assert not Conversions(folder, find_cache_folder(folder, None)[0]).is_current(fbx)
 
 
 def test_a_place_that_cannot_be_written_is_told(foreign, tmp_path):
@@ -86,5 +86,5 @@ def test_a_place_that_cannot_be_written_is_told(foreign, tmp_path):
     blocked = tmp_path / "blocked"
     blocked.write_text("a file")
     with pytest.raises(InputError, match="converted"):
-        Conversions(folder, blocked).prepare(fbx)
+        Conversions(folder, blocked).prepare_file(fbx)
     assert os.path.isfile(blocked)

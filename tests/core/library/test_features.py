@@ -8,35 +8,35 @@ from hypothesis import strategies as st
 from beyond_mocap.library.clip import Clip
 from beyond_mocap.library.features import (
     HORIZON,
-    describe_clips,
-    feature_joints,
-    principal_components,
-    raw_features,
-    sampled_positions,
+    build_frames,
+    select_feature_joints,
+    compute_principal_components,
+    compute_raw_features,
+    sample_positions,
 )
-from beyond_mocap.motion.humanoid import heading_from_positions
-from beyond_mocap.motion.motion import place
-from beyond_mocap.synthetic.gait import gait
+from beyond_mocap.motion.humanoid import compute_heading_from_positions
+from beyond_mocap.motion.motion import place_motion
+from beyond_mocap.synthetic.gait import build_gait
 
-WALK = gait(1.6, 3.0, 60.0, turn_rate=0.4)
+WALK = build_gait(1.6, 3.0, 60.0, turn_rate=0.4)
 
 
 def features(motion, fps=30.0):
-    _, positions = sampled_positions(motion, fps)
-    heading = np.unwrap(heading_from_positions(motion.skeleton, positions))
-    return raw_features(positions[:, feature_joints(motion.skeleton)], heading, fps)
+    _, positions = sample_positions(motion, fps)
+    heading = np.unwrap(compute_heading_from_positions(motion.skeleton, positions))
+    return compute_raw_features(positions[:, select_feature_joints(motion.skeleton)], heading, fps)
 
 
 @settings(max_examples=15, deadline=None)
 @given(st.floats(-4, 4), st.floats(-50, 50), st.floats(-50, 50))
 def test_turning_and_moving_a_recording_changes_nothing(angle, x, y):
-    assert np.allclose(features(WALK), features(place(WALK, angle, (x, y, 0.0))), atol=1e-9)
+    assert np.allclose(features(WALK), features(place_motion(WALK, angle, (x, y, 0.0))), atol=1e-9)
 
 
 def test_height_changes_the_height_alone():
-    change = features(place(WALK, 0.0, (0.0, 0.0, 0.3))) - features(WALK)
+    change = features(place_motion(WALK, 0.0, (0.0, 0.0, 0.3))) - features(WALK)
     moved = np.flatnonzero(np.abs(change[10]) > 1e-9)
-    joints = len(feature_joints(WALK.skeleton))
+    joints = len(select_feature_joints(WALK.skeleton))
     assert moved.tolist() == [3 * joint for joint in range(joints)]
     assert np.allclose(change[:, moved], 0.3 / np.sqrt(joints))
 
@@ -45,13 +45,13 @@ def test_distance_is_the_mean_over_joints_of_places_an_instant_later():
     """Two bodies that differ by 1 m/s at every joint alone are 0.12 s x 1 m/s apart."""
     places = np.zeros((40, 5, 3))
     places[:, :, 0] = np.arange(40)[:, None] / 30.0
-    still, moving = (raw_features(p, np.zeros(40), 30.0) for p in (places * 0.0, places))
+    still, moving = (compute_raw_features(p, np.zeros(40), 30.0) for p in (places * 0.0, places))
     assert np.allclose(np.linalg.norm(moving - still, axis=1), HORIZON * 1.0)
 
 
 def test_path_heading_and_speed_follow_the_recording():
-    moved = place(WALK, 1.1, (3.0, -2.0, 0.0))
-    a, b = (describe_clips([clip(m)]) for m in (WALK, moved))
+    moved = place_motion(WALK, 1.1, (3.0, -2.0, 0.0))
+    a, b = (build_frames([clip(m)]) for m in (WALK, moved))
     assert np.allclose(a.velocity, b.velocity, atol=1e-9) and np.allclose(b.heading - a.heading, 1.1, atol=1e-9)
     cosine, sine = np.cos(1.1), np.sin(1.1)
     turned = a.path @ np.array([[cosine, sine], [-sine, cosine]]) + [3.0, -2.0]
@@ -61,7 +61,7 @@ def test_path_heading_and_speed_follow_the_recording():
 
 def clip(motion):
     return Clip(path="made.bvh", mirrored=False, motion=motion, annotations=(),
-                standing=np.zeros((len(motion), 2, 2), bool))
+                heel_toe_contacts=np.zeros((len(motion), 2, 2), bool))
 
 
 def distances_within(features):
@@ -70,8 +70,8 @@ def distances_within(features):
 
 @pytest.mark.parametrize("fps", [24.0, 30.0, 60.0, 100.0])
 def test_derivatives_do_not_depend_on_the_recording_s_rate(fps):
-    motion = gait(1.6, 3.0, fps, turn_rate=0.4)
-    source, positions = sampled_positions(motion, 30.0)
+    motion = build_gait(1.6, 3.0, fps, turn_rate=0.4)
+    source, positions = sample_positions(motion, 30.0)
     assert len(source) == len(positions) and np.all(source <= len(motion) - 1 + 1e-9)
     assert np.sqrt(np.mean((features(motion)[5:-5] - features(WALK)[5:-5]) ** 2)) < 0.01
 
@@ -87,7 +87,7 @@ def test_short_clips_have_features():
 def test_the_fewest_components_that_hold_the_energy(seed, rows, columns, energy):
     random = np.random.default_rng(seed)
     values = random.normal(size=(rows, columns)) * random.uniform(0.01, 3.0, columns)
-    mean, basis = principal_components(values, energy)
+    mean, basis = compute_principal_components(values, energy)
     centred = values - mean
     held = [np.sum((centred @ basis[:, :kept]) ** 2) / np.sum(centred**2) for kept in range(basis.shape[1] + 1)]
     assert np.allclose(basis.T @ basis, np.eye(basis.shape[1]), atol=1e-9)
@@ -95,7 +95,7 @@ def test_the_fewest_components_that_hold_the_energy(seed, rows, columns, energy)
 
 
 def test_values_without_variance_keep_one_component():
-    mean, basis = principal_components(np.ones((5, 3)))
+    mean, basis = compute_principal_components(np.ones((5, 3)))
     assert basis.shape == (3, 1) and np.allclose(mean, 1.0)
 
 
@@ -111,6 +111,6 @@ def test_the_library_s_features_hold_98_percent(library):
 
 
 def test_fingers_and_joints_on_their_parents_take_no_part():
-    joints = feature_joints(WALK.skeleton)
+    joints = select_feature_joints(WALK.skeleton)
     names = [WALK.skeleton.names[j] for j in joints]
     assert joints[0] == 0 and "LeftHand" in names and not any("Index" in name or "Thumb" in name for name in names)

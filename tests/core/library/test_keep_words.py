@@ -26,11 +26,11 @@ def clip(tmp_path):
 
 
 def keep(clip, rows=ROWS, **how):
-    return keep_words.keep(clip, clip.parents[1], rows, 120.0, **how)
+    return keep_words.write_labels(clip, clip.parents[1], rows, 120.0, **how)
 
 
 def read(clip):
-    return Annotations(clip.parents[1], [clip]).of(clip, 120.0)
+    return Annotations(clip.parents[1], [clip]).read_rows(clip, 120.0)
 
 
 def test_beside_the_clip(clip):
@@ -75,16 +75,16 @@ def test_a_table_elsewhere_that_says_nothing_of_the_clip_is_left_alone(clip):
 
 
 def test_there_and_back_through_seconds():
-    from beyond_mocap.annotation import clip_annotations
+    from beyond_mocap.annotation import build_clip_annotations
 
     for fps in (120.0, 59.94, 30.0):
-        assert clip_annotations(keep_words.as_timeline(ROWS, fps), fps) == ROWS
+        assert build_clip_annotations(keep_words.to_timeline(ROWS, fps), fps) == ROWS
 
 
 def test_rows_are_cut_to_the_clip():
     rows = (ClipAnnotation(-5, 40, None, ("walking",)), ClipAnnotation(90, 140, 135, ("kick",)),
             ClipAnnotation(80, 140, None, ("jogging",)))
-    assert keep_words.within(rows, 100) == (ClipAnnotation(0, 40, None, ("walking",)),
+    assert keep_words.limit_rows(rows, 100) == (ClipAnnotation(0, 40, None, ("walking",)),
                                             ClipAnnotation(80, 99, None, ("jogging",)))
 
 

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from beyond_mocap.annotation import ClipAnnotation, spoken
+from beyond_mocap.annotation import ClipAnnotation, sort_labels
 from beyond_mocap.library.clip import Clip
-from beyond_mocap.library.keys import Key, keys_of, nearest_serving, nearest_words, serving
-from beyond_mocap.synthetic.gait import gait
+from beyond_mocap.library.keys import Key, collect_keys, select_nearest_keys, list_nearest_labels, select_keys
+from beyond_mocap.synthetic.gait import build_gait
 
 
 def key(words, clip=0):
@@ -34,7 +34,7 @@ KICKS = (LOW, TOP, VOLLEY, LEFT)
     ],
 )
 def test_a_key_serves_when_it_carries_all_words(words, keys):
-    assert serving(KICKS, words.split()) == keys
+    assert select_keys(KICKS, words.split()) == keys
 
 
 @pytest.mark.parametrize(
@@ -49,8 +49,8 @@ def test_a_key_serves_when_it_carries_all_words(words, keys):
     ],
 )
 def test_the_nearest_shares_most_and_has_least_beyond(words, keys):
-    found = nearest_serving(KICKS, words.split())
-    assert set(keys) <= set(found) and len({len(set(words.split()) & k.words) for k in found}) == 1
+    found = select_nearest_keys(KICKS, words.split())
+    assert set(keys) <= set(found) and len({len(set(words.split()) & k.labels) for k in found}) == 1
 
 
 @pytest.mark.parametrize(
@@ -68,29 +68,29 @@ def test_the_nearest_shares_most_and_has_least_beyond(words, keys):
 )
 def test_a_kick_is_no_answer_to_another_action(words):
     """Sharing a side, a pace or a height is not sharing the movement."""
-    assert nearest_serving(KICKS, words.split()) == ()
+    assert select_nearest_keys(KICKS, words.split()) == ()
 
 
 def test_a_foot_on_the_ball_stands_for_a_foot_on_the_ball_only():
     trap, body = key("receive foot low inside right"), key("receive body")
-    assert nearest_serving((trap, body), ["kick", "right"]) == (trap,)
-    assert nearest_serving((body,), ["kick", "right"]) == ()
-    assert nearest_serving((trap, body), ["receive", "high"]) == (body,)
+    assert select_nearest_keys((trap, body), ["kick", "right"]) == (trap,)
+    assert select_nearest_keys((body,), ["kick", "right"]) == ()
+    assert select_nearest_keys((trap, body), ["receive", "high"]) == (body,)
 
 
 def test_own_words_of_the_user_name_an_action_too():
     own = key("rabona right")
-    assert nearest_serving((own, LOW), ["rabona", "left"]) == (own,)
-    assert nearest_serving((own,), ["moonwalk"]) == ()
+    assert select_nearest_keys((own, LOW), ["rabona", "left"]) == (own,)
+    assert select_nearest_keys((own,), ["moonwalk"]) == ()
 
 
 def test_an_empty_library_of_keys():
-    assert serving((), ["kick"]) == nearest_serving((), ["kick"]) == () and nearest_words((), ["kick"]) == ()
+    assert select_keys((), ["kick"]) == select_nearest_keys((), ["kick"]) == () and list_nearest_labels((), ["kick"]) == ()
 
 
 def test_nearest_words_are_offered_once_each():
-    offered = nearest_words((*KICKS, *KICKS), ["kick", "low", "left"], 3)
-    assert offered[0].split() == list(spoken(LEFT.words)) and len(set(offered)) == 3
+    offered = list_nearest_labels((*KICKS, *KICKS), ["kick", "low", "left"], 3)
+    assert offered[0].split() == list(sort_labels(LEFT.labels)) and len(set(offered)) == 3
 
 
 def test_the_side_of_another_row_is_not_the_kick_s():
@@ -100,11 +100,11 @@ def test_the_side_of_another_row_is_not_the_kick_s():
         ClipAnnotation(8, 20, None, ("turning", "left")),
         ClipAnnotation(0, 20, None, ("walking", "front")),
     )
-    motion = gait(1.4, 0.8, 30.0)
+    motion = build_gait(1.4, 0.8, 30.0)
     clip = Clip(path="made.bvh", mirrored=False, motion=motion, annotations=rows,
-                standing=np.zeros((len(motion), 2, 2), bool))
-    (found,) = keys_of((clip,))
-    assert found.words == {"kick", "right", "low", "turning", "walking", "front"}
+                heel_toe_contacts=np.zeros((len(motion), 2, 2), bool))
+    (found,) = collect_keys((clip,))
+    assert found.labels == {"kick", "right", "low", "turning", "walking", "front"}
 
 
 DIVES = (key("jump left high dive"), key("jump right high dive"))
@@ -121,16 +121,16 @@ DIVES = (key("jump left high dive"), key("jump right high dive"))
     ],
 )
 def test_a_dive_stands_for_a_dive_whatever_the_hands_do(words, keys):
-    assert nearest_serving((*KICKS, *DIVES), words.split()) == keys
+    assert select_nearest_keys((*KICKS, *DIVES), words.split()) == keys
 
 
 def test_without_a_dive_nothing_stands_for_one_and_the_nearest_words_are_named():
-    assert nearest_serving(KICKS, ["catchb", "dive", "left"]) == nearest_serving(KICKS, ["dive", "left"]) == ()
-    assert nearest_words(KICKS, ["dive", "left"])[0] == "kick left inside low"
+    assert select_nearest_keys(KICKS, ["catchb", "dive", "left"]) == select_nearest_keys(KICKS, ["dive", "left"]) == ()
+    assert list_nearest_labels(KICKS, ["dive", "left"])[0] == "kick left inside low"
 
 
 def test_who_asks_for_a_jump_gets_no_dive_where_there_is_another():
     jump = key("jump")
-    assert serving((*DIVES, jump), ["jump"]) == (jump,)
-    assert serving(DIVES, ["jump"]) == DIVES
-    assert serving((*DIVES, jump), ["dive"]) == DIVES
+    assert select_keys((*DIVES, jump), ["jump"]) == (jump,)
+    assert select_keys(DIVES, ["jump"]) == DIVES
+    assert select_keys((*DIVES, jump), ["dive"]) == DIVES

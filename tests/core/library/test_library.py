@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from beyond_mocap.base.errors import Cancelled, InputError
+from beyond_mocap.base.errors import UserCancelledError, InputError
 from beyond_mocap.files.bvh import bvh
-from beyond_mocap.library.build import build
-from beyond_mocap.library.features import words_matrix
-from beyond_mocap.motion.humanoid import identify
+from beyond_mocap.library.build import build_library
+from beyond_mocap.library.features import build_label_matrix
+from beyond_mocap.motion.humanoid import identify_joints
 from beyond_mocap.motion.motion import Motion, forward_kinematics
 from beyond_mocap.motion.skeleton import Skeleton
-from beyond_mocap.synthetic.gait import gait
+from beyond_mocap.synthetic.gait import build_gait
 
 CSV = "file,start_frame,end_frame,key_frame,labels\n"
 
@@ -31,7 +31,7 @@ def test_every_clip_stands_beside_its_mirror(library):
 
 def test_the_mirror_has_words_contacts_and_travel_of_the_other_side(library):
     for clip, twin in zip(library.clips[::2], library.clips[1::2]):
-        assert np.array_equal(clip.standing, twin.standing[:, ::-1])
+        assert np.array_equal(clip.heel_toe_contacts, twin.standing[:, ::-1])
         assert np.allclose(clip.motion.root_positions * [1, -1, 1], twin.motion.root_positions, atol=1e-9)
     assert clip_of(library, "bows/turn.bvh", True).annotations[0].words == ("walking", "right")
     assert clip_of(library, "kick.bvh", True).words_at(156) == {"kick", "low", "inside", "left"}
@@ -39,26 +39,26 @@ def test_the_mirror_has_words_contacts_and_travel_of_the_other_side(library):
 
 def test_clips_stand_on_the_floor(library):
     for clip in library.clips:
-        body = identify(clip.motion.skeleton)
+        body = identify_joints(clip.motion.skeleton)
         toes = forward_kinematics(clip.motion)[0][:, [body.left.toe_or_foot, body.right.toe_or_foot], 2]
         assert abs(np.percentile(toes, 2)) < 1e-6
 
 
 def test_a_clip_that_floats_is_brought_down(tmp_path, clip_file):
-    motion = gait(1.4, 2.0)
+    motion = build_gait(1.4, 2.0)
     for name, height in (("low", 0.0), ("high", 0.7)):
         clip_file(tmp_path / f"{name}.bvh")
-        bvh.write(
+        bvh.write_bvh(
             tmp_path / f"{name}.bvh",
             Motion(motion.skeleton, motion.root_positions + [0, 0, height], motion.rotations, 30.0),
         )
-    library = build(tmp_path, unit=0.01)
+    library = build_library(tmp_path, unit=0.01)
     high, low = clip_of(library, "high.bvh"), clip_of(library, "low.bvh")
     assert np.allclose(high.motion.root_positions, low.motion.root_positions, atol=1e-6)
 
 
 def test_gaits_have_the_planted_speeds(library):
-    assert [gait.word for gait in library.gaits] == ["standing", "walking", "jogging", "running"]
+    assert [gait.label for gait in library.gaits] == ["standing", "walking", "jogging", "running"]
     assert np.allclose([gait.speed for gait in library.gaits], [0.0, 1.4, 2.8, 5.0], atol=0.05)
 
 
@@ -73,15 +73,15 @@ def test_frames_say_where_they_come_from(library):
         assert np.allclose(
             frames.root[frames.clip == number], clip.motion.root_positions[source.astype(int)], atol=1e-9
         )
-    assert frames.left_in_clip[frames.first].tolist() == (frames.count - 1).tolist()
+    assert frames.remaining_in_clip[frames.first].tolist() == (frames.count - 1).tolist()
 
 
 def test_words_of_frames_are_those_of_the_clip(library):
     for number, clip in enumerate(library.clips):
         here = library.frames.clip == number
         for source, row in zip(library.frames.source[here], library.frames.words[here]):
-            assert frozenset(np.array(library.frames.vocabulary)[row]) == clip.words_at(source)
-    assert np.array_equal(words_matrix(library.clips[0], np.array([1e9]), ("walking", "left")), [[False, False]])
+            assert frozenset(np.array(library.frames.vocabulary)[row]) == clip.labels_at(source)
+    assert np.array_equal(build_label_matrix(library.clips[0], np.array([1e9]), ("walking", "left")), [[False, False]])
 
 
 def test_the_planted_kick_is_found_on_both_sides(library, kick_seconds):
@@ -112,15 +112,15 @@ def test_minutes_do_not_count_the_mirrors(library):
 
 def test_one_clip_is_a_library(tmp_path, clip_file):
     clip_file(tmp_path / "walk.bvh", 1.4, 2.0)
-    library = build(tmp_path)
-    assert len(library.clips) == 2 and [gait.word for gait in library.gaits] == ["walking"]
+    library = build_library(tmp_path)
+    assert len(library.clips) == 2 and [gait.label for gait in library.gaits] == ["walking"]
 
 
 def test_a_clip_of_one_frame_is_kept(tmp_path, clip_file):
     clip_file(tmp_path / "walk.bvh", 1.4, 1.0)
-    motion = gait(1.4, 1.0)
-    bvh.write(tmp_path / "still.bvh", Motion(motion.skeleton, motion.root_positions[:1], motion.rotations[:1], 30.0))
-    library = build(tmp_path)
+    motion = build_gait(1.4, 1.0)
+    bvh.write_bvh(tmp_path / "still.bvh", Motion(motion.skeleton, motion.root_positions[:1], motion.rotations[:1], 30.0))
+    library = build_library(tmp_path)
     assert library.frames.count.tolist() == [1, 1, 31, 31]
     assert np.all(np.isfinite(library.frames.features))
 
@@ -133,14 +133,14 @@ def scaled(skeleton: Skeleton, factor: float) -> Skeleton:
 
 def test_clips_of_different_skeletons_are_retargeted(tmp_path, clip_file):
     clip_file(tmp_path / "walk.bvh", 1.4, 2.0)
-    motion = gait(1.4, 1.0)
+    motion = build_gait(1.4, 1.0)
     clip_file(tmp_path / "child.bvh", 1.4, 1.0)
     small = Motion(scaled(motion.skeleton, 0.7), motion.root_positions * 0.7, motion.rotations, 30.0)
-    bvh.write(tmp_path / "child.bvh", small)
-    library = build(tmp_path, unit=0.01)
+    bvh.write_bvh(tmp_path / "child.bvh", small)
+    library = build_library(tmp_path, unit=0.01)
     assert all(clip.motion.skeleton is library.skeleton for clip in library.clips)
-    bvh.write(tmp_path / "child.bvh.full", motion)
-    full = bvh.read(tmp_path / "child.bvh.full", 0.01).motion
+    bvh.write_bvh(tmp_path / "child.bvh.full", motion)
+    full = bvh.read_bvh(tmp_path / "child.bvh.full", 0.01).motion
     assert np.allclose(library.skeleton.offsets, full.skeleton.offsets, atol=1e-4)
     child = clip_of(library, "child.bvh")
     places, wanted = forward_kinematics(child.motion)[0], forward_kinematics(full)[0]
@@ -148,7 +148,7 @@ def test_clips_of_different_skeletons_are_retargeted(tmp_path, clip_file):
     off = np.linalg.norm(places - wanted - [0.0, 0.0, level], axis=-1)
     assert off.mean() < 0.03 and off.max() < 0.1  # its second of walking shows another mean posture than the walk does
     assert any("1 clips of 1 other skeletons retargeted to the one with" in note for note in library.notes)
-    small_too = build(tmp_path, unit=0.01, skeleton=tmp_path / "child.bvh")
+    small_too = build_library(tmp_path, unit=0.01, skeleton=tmp_path / "child.bvh")
     assert np.allclose(small_too.skeleton.offsets, 0.7 * full.skeleton.offsets, atol=1e-4)
     assert [clip.path for clip in small_too.clips] == [clip.path for clip in library.clips]
 
@@ -156,28 +156,28 @@ def test_clips_of_different_skeletons_are_retargeted(tmp_path, clip_file):
 def test_a_clip_without_legs_is_told_with_its_file(tmp_path, clip_file):
     clip_file(tmp_path / "walk.bvh", 1.4, 2.0)
     stick = Skeleton(("root", "top"), (-1, 0), np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 1.0]]))
-    bvh.write(tmp_path / "stick.bvh", Motion(stick, np.zeros((4, 3)), np.tile((1.0, 0.0, 0.0, 0.0), (4, 2, 1)), 30.0))
+    bvh.write_bvh(tmp_path / "stick.bvh", Motion(stick, np.zeros((4, 3)), np.tile((1.0, 0.0, 0.0, 0.0), (4, 2, 1)), 30.0))
     with pytest.raises(InputError, match=r"stick\.bvh.*no joint found for left upper_leg") as told:
-        build(tmp_path)
+        build_library(tmp_path)
     one_line(told)
 
 
 def test_bones_that_differ_by_rounding_are_one_skeleton(tmp_path, clip_file):
     clip_file(tmp_path / "walk.bvh", 1.4, 2.0)
-    motion = gait(1.4, 1.0)
+    motion = build_gait(1.4, 1.0)
     clip_file(tmp_path / "same.bvh", 1.4, 1.0)
-    bvh.write(
+    bvh.write_bvh(
         tmp_path / "same.bvh", Motion(scaled(motion.skeleton, 1.001), motion.root_positions, motion.rotations, 30.0)
     )
-    library = build(tmp_path, unit=0.01)
+    library = build_library(tmp_path, unit=0.01)
     assert {id(clip.motion.skeleton) for clip in library.clips} == {id(library.skeleton)}
-    walk = bvh.read(tmp_path / "walk.bvh", 0.01).motion.skeleton
+    walk = bvh.read_bvh(tmp_path / "walk.bvh", 0.01).motion.skeleton
     assert np.array_equal(library.skeleton.offsets, walk.offsets)  # of the clip with most frames
 
 
 def test_without_locomotion_the_library_stands_but_has_no_gaits(tmp_path, clip_file):
     clip_file(tmp_path / "stand.bvh", 0.0, 2.0, "standing")
-    library = build(tmp_path)
+    library = build_library(tmp_path)
     with pytest.raises(InputError, match="no locomotion clip.*walking") as told:
         library.gaits
     assert str(tmp_path) in one_line(told)
@@ -186,24 +186,24 @@ def test_without_locomotion_the_library_stands_but_has_no_gaits(tmp_path, clip_f
 def test_without_annotations_nothing_is_built(tmp_path, clip_file):
     clip_file(tmp_path / "walk.bvh", words="")
     with pytest.raises(InputError, match="no annotation for any clip.*NAME.txt") as told:
-        build(tmp_path)
+        build_library(tmp_path)
     assert str(tmp_path) in one_line(told)
 
 
 def test_a_clip_without_words_may_stand_among_others(tmp_path, clip_file):
     clip_file(tmp_path / "walk.bvh")
     clip_file(tmp_path / "silent.bvh", 1.0, 2.0, "")
-    library = build(tmp_path)
+    library = build_library(tmp_path)
     assert clip_of(library, "silent.bvh").annotations == ()
 
 
 def test_rows_beyond_the_clip_are_cut_or_told(tmp_path, clip_file):
     clip_file(tmp_path / "walk.bvh", 1.4, 2.0)
     (tmp_path / "walk.txt").write_text("0 99 walking\n")
-    assert clip_of(build(tmp_path), "walk.bvh").annotations[0].end == 60
+    assert clip_of(build_library(tmp_path), "walk.bvh").annotations[0].end == 60
     (tmp_path / "walk.txt").write_text("0 2 walking\n2.5 3 jogging\n")
     with pytest.raises(InputError, match=r"walk.*frame 75.*0 to 60") as told:
-        build(tmp_path)
+        build_library(tmp_path)
     one_line(told)
 
 
@@ -212,7 +212,7 @@ def test_a_key_moment_beyond_the_clip_is_told(tmp_path, clip_file):
     (tmp_path / "walk.txt").unlink()
     (tmp_path / "annotations.csv").write_text(CSV + "walk.bvh,0,60,,walking\nwalk.bvh,30,99,80,kick right\n")
     with pytest.raises(InputError, match=r"walk.*80.*0 to 60") as told:
-        build(tmp_path)
+        build_library(tmp_path)
     one_line(told)
 
 
@@ -221,7 +221,7 @@ def test_a_broken_annotation_is_told_with_file_and_line(tmp_path, clip_file, tex
     clip_file(tmp_path / "walk.bvh")
     (tmp_path / "walk.txt").write_text(text)
     with pytest.raises(InputError, match=r"walk\.txt:[12]: ") as told:
-        build(tmp_path)
+        build_library(tmp_path)
     one_line(told)
 
 
@@ -229,19 +229,19 @@ def test_a_link_that_leads_nowhere_is_told(tmp_path, clip_file):
     clip_file(tmp_path / "walk.bvh")
     (tmp_path / "gone.bvh").symlink_to(tmp_path / "nowhere.bvh")
     with pytest.raises(InputError, match=r"gone\.bvh") as told:
-        build(tmp_path)
+        build_library(tmp_path)
     one_line(told)
 
 
 def test_building_can_be_stopped(clips_folder, tmp_path):
     calls = []
-    with pytest.raises(Cancelled):
-        build(clips_folder, rebuild=True, cache_dir=tmp_path, cancelled=lambda: len(calls) > 4 or calls.append(1))
+    with pytest.raises(UserCancelledError):
+        build_library(clips_folder, rebuild=True, cache_dir=tmp_path, cancelled=lambda: len(calls) > 4 or calls.append(1))
     assert list(tmp_path.iterdir()) == []
 
 
 def test_progress_never_goes_back(tmp_path, clip_file):
     clip_file(tmp_path / "walk.bvh")
     told = []
-    build(tmp_path, progress=lambda fraction, text: told.append(fraction))
+    build_library(tmp_path, progress=lambda fraction, text: told.append(fraction))
     assert told == sorted(told) and told[-1] == 1.0

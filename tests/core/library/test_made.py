@@ -10,16 +10,16 @@ import pytest
 
 from beyond_mocap.annotation import KeyMoment, Timeline
 from beyond_mocap.files.bvh import bvh
-from beyond_mocap.library.build import build
-from beyond_mocap.library.keys import Key, standing_in
-from beyond_mocap.library.made import BLENDED, FASTEST, KICKED, MADE_FOLDER, TAKEN, gaps
-from beyond_mocap.motion.humanoid import identify
+from beyond_mocap.library.build import build_library
+from beyond_mocap.library.keys import Key, select_substitutes
+from beyond_mocap.library.made import BLEND_PREFIX, MAX_SPEED, KICK_PREFIX, SYNTHETIC_FOLDER, RECEIVE_PREFIX, find_speed_gaps
+from beyond_mocap.motion.humanoid import identify_joints
 from beyond_mocap.motion.motion import forward_kinematics
 from beyond_mocap.motion.track import Track
 from beyond_mocap.synthesis.plan import Plan
-from beyond_mocap.synthesis.quality.movement import stance_travel, stances
+from beyond_mocap.synthesis.quality.movement import measure_stance_travel, list_stances
 from beyond_mocap.synthesis.synthesize import synthesize
-from beyond_mocap.synthetic.gestures import strike
+from beyond_mocap.synthetic.gestures import build_strike
 
 
 def straight(speed: float, seconds: float = 6.0) -> Track:
@@ -29,26 +29,26 @@ def straight(speed: float, seconds: float = 6.0) -> Track:
 
 @pytest.fixture(scope="module")
 def more(library):
-    return library.extended
+    return library.with_synthetic_clips
 
 
 def made(library, begins: str = ""):
-    return [clip for clip in library.clips if clip.path.startswith(MADE_FOLDER + begins) and not clip.mirrored]
+    return [clip for clip in library.clips if clip.path.startswith(SYNTHETIC_FOLDER + begins) and not clip.mirrored]
 
 
 def test_gaps_are_what_the_warp_does_not_reach():
     speed = np.repeat([1.2, 1.4, 4.0], 100)
-    (low, high), (above, top) = gaps(speed, 30.0)
+    (low, high), (above, top) = find_speed_gaps(speed, 30.0)
     assert low == pytest.approx(1.4 * 1.125, rel=0.04) and high == pytest.approx(4.0 * 0.875, rel=0.04)
-    assert above == pytest.approx(4.0 * 1.125, rel=0.04) and top == FASTEST
+    assert above == pytest.approx(4.0 * 1.125, rel=0.04) and top == MAX_SPEED
 
 
 def test_a_second_of_recording_is_not_enough_to_fill_a_gap():
-    assert len(gaps(np.r_[np.full(300, 1.5), np.full(30, 2.2), np.full(300, 3.0)], 30.0)) == 2
+    assert len(find_speed_gaps(np.r_[np.full(300, 1.5), np.full(30, 2.2), np.full(300, 3.0)], 30.0)) == 2
 
 
 def test_no_locomotion_no_gaps():
-    assert gaps(np.zeros(100), 30.0) == ()
+    assert find_speed_gaps(np.zeros(100), 30.0) == ()
 
 
 def test_made_clips_fill_the_gaps_up_to_a_sprint(library, more):
@@ -56,14 +56,14 @@ def test_made_clips_fill_the_gaps_up_to_a_sprint(library, more):
     for low, high in library.gaps:
         for wanted in np.linspace(low, min(high, 9.0), 9):
             assert np.sum(np.abs(np.log(speed / wanted)) < 0.12) > 10
-    assert made(more, BLENDED) and made(more, KICKED)
+    assert made(more, BLEND_PREFIX) and made(more, KICK_PREFIX)
 
 
 def test_made_clips_stand_on_the_ground_and_do_not_slide(more):
-    body = identify(more.skeleton)
+    body = identify_joints(more.skeleton)
     for clip in made(more):
         toes = forward_kinematics(clip.motion)[0][:, [body.left.toe, body.right.toe]]
-        stands = clip.standing[1:, :, 1] & clip.standing[:-1, :, 1]
+        stands = clip.heel_toe_contacts[1:, :, 1] & clip.heel_toe_contacts[:-1, :, 1]
         slide = np.linalg.norm(np.diff(toes[..., :2], axis=0), axis=-1)[stands] * clip.motion.fps
         assert slide.mean() < 0.08, clip.path
         assert abs(np.percentile(toes[..., 2], 2)) < 0.003 and toes[..., 2].min() > -0.02, clip.path
@@ -79,37 +79,37 @@ def test_the_recordings_come_first_and_unchanged(library, more):
 
 
 def test_kept_beside_the_cache_and_read_back_the_same(library, more):
-    place = library.kept[0]
+    place = library.cache_location[0]
     assert (place / "made.npz").is_file() and list((place / "made-gait").glob("*.bvh"))
-    again = build(library.folder, cache_dir=place).extended
+    again = build_library(library.folder, cache_dir=place).with_synthetic_clips
     assert np.array_equal(again.frames.features, more.frames.features)
-    assert all(np.array_equal(a.standing, b.standing) for a, b in zip(again.clips, more.clips))
+    assert all(np.array_equal(a.heel_toe_contacts, b.standing) for a, b in zip(again.clips, more.clips))
 
 
 def test_made_files_that_were_tidied_away_are_written_again(library, more):
-    place = library.kept[0]
+    place = library.cache_location[0]
     before = {file.name: file.read_bytes() for file in (place / "made-gait").glob("*.bvh")}
     next((place / "made-gait").glob("*.bvh")).unlink()
-    assert len(build(library.folder, cache_dir=place).extended.clips) == len(more.clips)
+    assert len(build_library(library.folder, cache_dir=place).with_synthetic_clips.clips) == len(more.clips)
     assert {file.name: file.read_bytes() for file in (place / "made-gait").glob("*.bvh")} == before
 
 
 def test_a_track_at_a_recorded_speed_uses_recordings_only(library):
     take = synthesize(library, Plan(track=straight(1.4)))
-    assert not any(name.startswith(MADE_FOLDER) for name in take.clips)
+    assert not any(name.startswith(SYNTHETIC_FOLDER) for name in take.clips)
 
 
 def test_a_track_between_two_recordings_is_played_by_a_blend(library):
     plan = Plan(track=straight(2.05))
     take = synthesize(library, plan)
-    assert any(name.startswith(MADE_FOLDER + BLENDED) for name in take.clips)
+    assert any(name.startswith(SYNTHETIC_FOLDER + BLEND_PREFIX) for name in take.clips)
     without = synthesize(library, replace(plan, made=False))
-    assert not any(name.startswith(MADE_FOLDER) for name in without.clips)
+    assert not any(name.startswith(SYNTHETIC_FOLDER) for name in without.clips)
 
 
 def test_a_track_beyond_the_recordings_is_played_by_made_running_and_told(library):
-    take = synthesize(library, Plan(track=straight(min(1.5 * library.fastest, 9.0))))
-    assert any(name.startswith(MADE_FOLDER) for name in take.clips)
+    take = synthesize(library, Plan(track=straight(min(1.5 * library.max_speed, 9.0))))
+    assert any(name.startswith(SYNTHETIC_FOLDER) for name in take.clips)
     assert any("synthetic" in warning for warning in take.warnings)
 
 
@@ -117,7 +117,7 @@ def test_a_kick_in_a_sprint_is_made(library):
     timeline = Timeline(keys=(KeyMoment(3.0, ("kick", "right")),))
     take = synthesize(library, Plan(track=straight(7.0), timeline=timeline))
     (key,) = take.keys
-    assert key.clip.startswith(MADE_FOLDER + KICKED)
+    assert key.clip.startswith(SYNTHETIC_FOLDER + KICK_PREFIX)
     assert {"kick", "right", "inside"} <= set(key.words) and key.used_instead is None
     assert key.frame == pytest.approx(3.0 * take.motion.fps, abs=0.51)
 
@@ -128,11 +128,11 @@ def with_a_receive(tmp_path_factory, clip_file):
     folder = tmp_path_factory.mktemp("receive")
     for name, speed, words in (("stand", 0.0, "standing"), ("walk", 1.4, "walking"), ("run", 4.8, "running")):
         clip_file(folder / f"{name}.bvh", speed, 4.0, words)
-    taken = strike("receive foot low inside")
-    bvh.write(folder / "take.bvh", taken.motion)
+    taken = build_strike("receive foot low inside")
+    bvh.write_bvh(folder / "take.bvh", taken.motion)
     words = "receive right foot low inside"
     (folder / "take.txt").write_text(f"{taken.start:.3f} {taken.end:.3f} {words}\n{taken.key:.3f} {words}\n")
-    return build(folder)
+    return build_library(folder)
 
 
 @pytest.mark.parametrize("speed, is_made", [(1.0, False), (3.5, True), (7.0, True)])
@@ -140,27 +140,27 @@ def test_a_ball_taken_on_the_run_is_made_and_no_foot_slides(with_a_receive, spee
     timeline = Timeline(keys=(KeyMoment(3.0, ("receive", "foot", "low")),))
     take = synthesize(with_a_receive, Plan(track=straight(speed), timeline=timeline))
     (key,) = take.keys
-    assert key.clip.startswith(MADE_FOLDER + TAKEN) == is_made and key.used_instead is None
+    assert key.clip.startswith(SYNTHETIC_FOLDER + RECEIVE_PREFIX) == is_made and key.used_instead is None
     assert key.frame == pytest.approx(3.0 * take.motion.fps, abs=0.51)
     assert any("synthetic reception on the run" in line for line in take.warnings) == is_made
-    body, places = identify(take.motion.skeleton), forward_kinematics(take.motion)[0]
+    body, places = identify_joints(take.motion.skeleton), forward_kinematics(take.motion)[0]
     toes = places[:, [body.left.toe, body.right.toe]]
-    assert stance_travel(toes, stances(take.contacts)).max(initial=0.0) < 0.15
+    assert measure_stance_travel(toes, list_stances(take.contacts)).max(initial=0.0) < 0.15
 
 
 def test_where_nobody_takes_a_ball_none_is_made(more):
-    assert not made(more, TAKEN)
+    assert not made(more, RECEIVE_PREFIX)
 
 
 def test_made_kicks_stand_in_for_the_same_foot_only():
     left, right = (Key(0, 1.0, 0.0, 2.0, frozenset({"kick", side, "standing", "low"})) for side in ("left", "right"))
     running = Key(1, 1.0, 0.0, 2.0, frozenset({"kick", "right", "low", "running"}))
-    assert standing_in((left,), (running,), ("kick",)) == ()
-    assert standing_in((left, right), (running,), ("kick", "low")) == (running,)
+    assert select_substitutes((left,), (running,), ("kick",)) == ()
+    assert select_substitutes((left, right), (running,), ("kick", "low")) == (running,)
 
 
 def test_made_kicks_do_not_stand_in_for_words_that_only_recorded_ones_have():
     high = Key(0, 1.0, 0.0, 2.0, frozenset({"kick", "right", "high"}))
     running = Key(1, 1.0, 0.0, 2.0, frozenset({"kick", "right", "low", "running"}))
-    assert standing_in((high,), (running,), ("kick", "high")) == ()
-    assert standing_in((high,), (running,), ("kick", "volley")) == (running,)
+    assert select_substitutes((high,), (running,), ("kick", "high")) == ()
+    assert select_substitutes((high,), (running,), ("kick", "volley")) == (running,)

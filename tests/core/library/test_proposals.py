@@ -5,20 +5,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from beyond_mocap.annotation import clip_annotations, parse_timeline, read_clip_annotations
+from beyond_mocap.annotation import build_clip_annotations, parse_timeline, read_clip_annotations
 from beyond_mocap.annotation.text import format_timeline
 from beyond_mocap.files.bvh import bvh
-from beyond_mocap.library.keep_words import as_timeline
-from beyond_mocap.library.proposals import GAITS, propose
+from beyond_mocap.library.keep_words import to_timeline
+from beyond_mocap.library.proposals import GAITS, propose_labels
 from beyond_mocap.motion.mirror import mirror
-from beyond_mocap.motion.motion import place, resample
+from beyond_mocap.motion.motion import place_motion, resample
 
 SAMPLE = Path(__file__).resolve().parents[3] / "sample_blend" / "library"
 REAL = Path(__file__).resolve().parents[4] / "shared" / "data" / "mocap"
 
 
 def clip(name):
-    return bvh.read(SAMPLE / f"{name}.bvh").motion
+    return bvh.read_bvh(SAMPLE / f"{name}.bvh").motion
 
 
 def written(name, fps):
@@ -26,7 +26,7 @@ def written(name, fps):
 
 
 def with_word(motion, word):
-    return [one for one in propose(motion) if word in one.annotation.words]
+    return [one for one in propose_labels(motion) if word in one.annotation.words]
 
 
 def test_a_kick_is_found_with_its_frame_and_side():
@@ -46,7 +46,7 @@ def test_mirrored_it_is_the_other_foot():
 
 def test_where_and_at_which_rate_it_is_recorded_does_not_matter():
     motion = clip("kick_low_top")
-    (kick,), (moved,) = with_word(motion, "kick"), with_word(place(motion, 2.0, (30.0, -4.0, 0.5)), "kick")
+    (kick,), (moved,) = with_word(motion, "kick"), with_word(place_motion(motion, 2.0, (30.0, -4.0, 0.5)), "kick")
     assert moved.annotation == kick.annotation
     (slower,) = with_word(resample(motion, 30.0), "kick")
     assert abs(slower.annotation.key - kick.annotation.key / 2.0) <= 1.0
@@ -64,7 +64,7 @@ def test_fast_strides_are_no_kicks(name):
 def test_gaits_and_directions_are_those_that_were_written(name):
     motion = clip(name)
     said, meant = np.full(len(motion), "", object), np.full(len(motion), "", object)
-    for words, rows in ((said, [one.annotation for one in propose(motion)]), (meant, written(name, motion.fps))):
+    for words, rows in ((said, [one.annotation for one in propose_labels(motion)]), (meant, written(name, motion.fps))):
         for row in rows:
             if row.words[0] in dict(GAITS):
                 words[row.start : row.end + 1] = " ".join(row.words)
@@ -85,23 +85,23 @@ def test_a_header_is_a_jump_in_which_the_head_strikes():
 
 
 def test_who_lies_and_gets_up():
-    found = propose(clip("getting_up"))
+    found = propose_labels(clip("getting_up"))
     assert any(one.annotation.words == ("ground",) for one in found)
     assert any(one.annotation.words == ("getting_up", "back") for one in found)
 
 
 def test_a_library_says_what_its_gaits_are_called():
     motion = clip("jogging_2_9")
-    assert [one.annotation.words for one in propose(motion)] == [("jogging", "front")]
-    other = propose(motion, (("still", 0.0), ("walking", 0.4), ("running", 2.0)))
+    assert [one.annotation.words for one in propose_labels(motion)] == [("jogging", "front")]
+    other = propose_labels(motion, (("still", 0.0), ("walking", 0.4), ("running", 2.0)))
     assert [one.annotation.words for one in other] == [("running", "front")]
 
 
 def test_they_can_be_edited_as_text():
     motion = clip("kick_low_top")
-    found = propose(motion)
-    timeline = as_timeline([one.annotation for one in found], motion.fps)
-    rows = clip_annotations(parse_timeline(format_timeline(timeline)), motion.fps)
+    found = propose_labels(motion)
+    timeline = to_timeline([one.annotation for one in found], motion.fps)
+    rows = build_clip_annotations(parse_timeline(format_timeline(timeline)), motion.fps)
     assert sorted((row.start, row.key) for row in rows if row.key) == sorted(
         (one.annotation.start, one.annotation.key) for one in found if one.annotation.key)
 
@@ -109,7 +109,7 @@ def test_they_can_be_edited_as_text():
 def test_short_and_still_clips_bring_no_trouble():
     motion = clip("standing_1")
     for count in (1, 2, 5):
-        assert all(one.annotation.end < count for one in propose(motion.frames(0, count)))
+        assert all(one.annotation.end < count for one in propose_labels(motion.frames(0, count)))
 
 
 @pytest.mark.skipif(not (REAL / "annotations.csv").is_file(), reason="no recordings to measure on beside the clone")
@@ -123,7 +123,7 @@ def test_kicks_of_real_recordings():
         kicks = [row for row in rows if "kick" in row.words and row.key is not None]
         if not name.startswith(("cmu10/10_", "lmd/Player1/")) or not kicks:
             continue
-        found = [one.annotation for one in propose(bvh.read(REAL / name).motion) if "kick" in one.annotation.words]
+        found = [one.annotation for one in propose_labels(bvh.read_bvh(REAL / name).motion) if "kick" in one.annotation.words]
         planted += len(kicks)
         for kick in kicks:
             best = min(found, key=lambda one: abs(one.key - kick.key), default=None)

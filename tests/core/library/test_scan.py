@@ -29,7 +29,7 @@ def names(folder):
 
 
 def words(folder, name, fps=30.0):
-    rows = Annotations(folder, find_clips(folder)).of(folder / name, fps)
+    rows = Annotations(folder, find_clips(folder)).read_rows(folder / name, fps)
     return [" ".join(row.words) for row in rows]
 
 
@@ -127,7 +127,7 @@ def test_tables_are_found_from_wherever_one_stands(folder, monkeypatch):
         monkeypatch.chdir(here)
         paths = find_clips(given)
         clip = next(path for path in paths if path.name == "b.bvh")
-        assert [row.words for row in Annotations(given, paths).of(clip, 30.0)] == [("above",)], (here, given)
+        assert [row.words for row in Annotations(given, paths).read_rows(clip, 30.0)] == [("above",)], (here, given)
 
 
 def test_clips_in_linked_folders_are_named_by_where_they_are_linked(folder, tmp_path):
@@ -153,5 +153,5 @@ def test_all_that_was_read_for_words_is_known_to_the_cache(folder):
     (folder.parent / "annotations.csv").write_text(HEADER + row("library/b.bvh", "walking"))
     (folder / "deep" / "a.txt").write_text("0 1 jogging\n")
     paths = find_clips(folder)
-    sources = {path.resolve() for path in Annotations(folder, paths).sources(paths)}
+    sources = {path.resolve() for path in Annotations(folder, paths).list_sources(paths)}
     assert sources == {(folder.parent / "annotations.csv").resolve(), (folder / "deep" / "a.txt").resolve()}

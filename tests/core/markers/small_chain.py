@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from beyond_mocap.markers.pose.chain import Chain, chain, poses
+from beyond_mocap.markers.pose.chain import Chain, build_chain, build_poses
 from beyond_mocap.motion import quaternion
 from beyond_mocap.motion.skeleton import Skeleton
 
@@ -14,21 +14,21 @@ SKELETON = Skeleton(
 HINGE, SADDLE = 3, 6
 
 
-def small_chain(seed=0, per_joint=3, stiffness=0.0, **limits) -> Chain:
+def build_small_chain(seed=0, per_joint=3, stiffness=0.0, **limits) -> Chain:
     """The chain; joint 3 turns about one axis, joint 6 about two."""
     rng = np.random.default_rng(seed)
     joint = np.repeat(np.arange(len(SKELETON)), per_joint)
     free = np.ones((len(SKELETON), 3), dtype=bool)
     free[HINGE, 1:], free[SADDLE, 2] = False, False
     orders = ("XZY", "YXZ", "ZXY", "ZXY", "XYZ", "YXZ", "YXZ")
-    return chain(
+    return build_chain(
         SKELETON, joint, rng.normal(0.0, 0.08, (len(joint), 3)), orders, free,
         stiffness=np.full(len(SKELETON), stiffness), **limits,
     )
 
 
-def random_poses(made: Chain, count: int, seed=1, size=0.7):
+def sample_poses(small_chain: Chain, count: int, seed=1, size=0.7):
     """Poses within the limits, about `size` radians from rest."""
     rng = np.random.default_rng(seed)
-    turns = quaternion.from_rotation_vector(rng.normal(0.0, size, (count, len(made.skeleton), 3)))
-    return poses(made, rng.normal(0.0, 1.0, (count, 3)), turns)
+    turns = quaternion.from_rotation_vector(rng.normal(0.0, size, (count, len(small_chain.skeleton), 3)))
+    return build_poses(small_chain, rng.normal(0.0, 1.0, (count, 3)), turns)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from beyond_mocap.markers.trial import MarkerTrial, evenly, frame_times
+from beyond_mocap.markers.trial import MarkerTrial, resample_evenly, estimate_frame_times
 
 LABELS = tuple(f"M{i}" for i in range(12))
 
@@ -21,25 +21,25 @@ def trial(times, fps, noise=0.0003):
 
 
 @pytest.mark.parametrize("fps, phase", [(360.0, 0.0), (360.0, 0.5), (240.0, 0.3), (300.0, 0.7)])
-def test_whole_milliseconds_are_found_and_mended(fps, phase):
+def test_whole_milliseconds_are_found_and_corrected(fps, phase):
     even = np.arange(600) / fps
     real = np.floor(even * 1000 + phase) / 1000
     recorded = trial(real, fps)
-    found = frame_times(recorded)
+    found = estimate_frame_times(recorded)
     assert np.allclose(np.diff(found), np.diff(real), atol=1e-9)
     shift = np.mean(real - even)  # what the clock is late on the whole cannot be known
     truth = places(even + shift)
     before = np.sqrt(np.mean((recorded.positions - truth) ** 2))
-    after = np.sqrt(np.mean((evenly(recorded).positions - truth) ** 2))
+    after = np.sqrt(np.mean((resample_evenly(recorded).positions - truth) ** 2))
     assert after < 0.4 * before
-    assert "whole milliseconds" in evenly(recorded).notes[-1]
+    assert "whole milliseconds" in resample_evenly(recorded).notes[-1]
 
 
 @pytest.mark.parametrize("fps", [360.0, 250.0, 100.0, 50.0])
 def test_even_frames_stay(fps):
     recorded = trial(np.arange(600) / fps, fps)
-    assert frame_times(recorded) is None
-    assert evenly(recorded) is recorded
+    assert estimate_frame_times(recorded) is None
+    assert resample_evenly(recorded) is recorded
 
 
 def test_what_is_not_seen_stays_so():
@@ -48,7 +48,7 @@ def test_what_is_not_seen_stays_so():
     positions = recorded.positions.copy()
     positions[100:180, 2] = np.nan
     positions[:, 5] = np.nan
-    mended = evenly(recorded.with_positions(positions))
+    mended = resample_evenly(recorded.with_positions(positions))
     assert mended.notes
     assert np.array_equal(np.isfinite(mended.positions), np.isfinite(positions))
 
@@ -56,4 +56,4 @@ def test_what_is_not_seen_stays_so():
 def test_a_body_that_stands_still_tells_nothing():
     rng = np.random.default_rng(0)
     recorded = MarkerTrial(labels=LABELS, positions=rng.normal(0.0, 0.0003, (400, 12, 3)) + 1.0, fps=360.0)
-    assert frame_times(recorded) is None
+    assert estimate_frame_times(recorded) is None

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from beyond_mocap.markers.model.marker_set import MarkerSet, named_as
+from beyond_mocap.markers.model.marker_set import MarkerSet, convert_labels
 from beyond_mocap.markers.trial import MarkerTrial
 
 SET = MarkerSet(
@@ -22,18 +22,18 @@ def trial_of(labels):
 
 
 def test_other_names_become_the_sets_own():
-    assert named_as(trial_of(("LWRIST", "RWR")), SET).labels == ("LWR", "RWR")
+    assert convert_labels(trial_of(("LWRIST", "RWR")), SET).labels == ("LWR", "RWR")
 
 
 @pytest.mark.parametrize("exchanged", [False, True])
 def test_unlabeled_markers_go_to_the_side_they_move_with(exchanged):
     trial = trial_of(("LWR", "RWR", "x52", "x53"))
     if exchanged:
-        trial = trial.renamed({"x52": "x53", "x53": "x52"})
-    out = named_as(trial, SET)
-    assert out.positions[0, out.index("LHAND"), 1] > 0 > out.positions[0, out.index("RHAND"), 1]
+        trial = trial.rename_labels({"x52": "x53", "x53": "x52"})
+    out = convert_labels(trial, SET)
+    assert out.positions[0, out.index_of("LHAND"), 1] > 0 > out.positions[0, out.index_of("RHAND"), 1]
 
 
 def test_what_has_a_name_keeps_it():
-    trial = trial_of(("LWR", "RWR", "RHAND", "LHAND")).renamed({"LHAND": "RHAND", "RHAND": "LHAND"})
-    assert named_as(trial, SET).labels == trial.labels
+    trial = trial_of(("LWR", "RWR", "RHAND", "LHAND")).rename_labels({"LHAND": "RHAND", "RHAND": "LHAND"})
+    assert convert_labels(trial, SET).labels == trial.labels

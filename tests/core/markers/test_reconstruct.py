@@ -6,16 +6,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from beyond_mocap.base.errors import Cancelled, InputError
+from beyond_mocap.base.errors import UserCancelledError, InputError
 from beyond_mocap.cli.main import main
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.markers.files.trc import write_trc
 from beyond_mocap.markers.model.model import BallMarker
 from beyond_mocap.markers.reconstruct import ReconstructSettings, reconstruct
 from beyond_mocap.motion.motion import forward_kinematics
-from beyond_mocap.synthetic.gait import gait
-from beyond_mocap.synthetic.ground_truth.planted_markers import PlantedBall, planted
-from beyond_mocap.synthetic.throws import throw
+from beyond_mocap.synthetic.gait import build_gait
+from beyond_mocap.synthetic.ground_truth.planted_markers import BallRequest, build_trial
+from beyond_mocap.synthetic.throws import build_throw
 
 FPS = 100.0
 
@@ -23,7 +23,7 @@ FPS = 100.0
 @pytest.fixture(scope="module")
 def known():
     """A walk of a second under Plug-in Gait's markers."""
-    return planted(gait(1.3, 1.0, FPS), "plug_in_gait", seed=3, softness=0.3, occlusion=0.02)
+    return build_trial(build_gait(1.3, 1.0, FPS), "plug_in_gait", seed=3, softness=0.3, occlusion=0.02)
 
 
 @pytest.fixture(scope="module")
@@ -78,11 +78,11 @@ def test_the_motion_stays_where_the_markers_are_unless_a_floor_is_asked_for(know
     moved = reconstruct(lifted, model=made.model, settings=ReconstructSettings(floor=True))
     lowered = out.trial.positions - [0.0, 0.0, out.floor]
     assert moved.grounded and np.allclose(moved.trial.positions, lowered, equal_nan=True)
-    assert np.allclose(moved.motion.root_positions, out.on_floor().root_positions)
+    assert np.allclose(moved.motion.root_positions, out.place_on_floor().root_positions)
     assert moved.report()["residual_mm"]["output_mean"] == pytest.approx(out.report()["residual_mm"]["output_mean"])
 
 
-def test_a_model_that_does_not_fit_is_told(known, made):
+def test_a_model_that_does_not_fit_is_reported(known, made):
     assert not any("on average" in line for line in made.warnings)
     places = np.array(made.model.places)
     places[made.model.markers.index("LFIN")] += [0.0, 0.0, 0.12]
@@ -92,7 +92,7 @@ def test_a_model_that_does_not_fit_is_told(known, made):
 
 
 def test_it_can_be_stopped(known):
-    with pytest.raises(Cancelled):
+    with pytest.raises(UserCancelledError):
         reconstruct(known.trial, known.static, cancelled=lambda: True)
 
 
@@ -104,7 +104,7 @@ def test_progress_rises_to_its_end(known, made, smoothness):
 
 
 def test_markers_of_no_set_and_a_model_of_another_are_refused(known, made):
-    strange = known.trial.renamed({label: f"q{i}" for i, label in enumerate(known.trial.labels)})
+    strange = known.trial.rename_labels({label: f"q{i}" for i, label in enumerate(known.trial.labels)})
     with pytest.raises(InputError, match="nearest"):
         reconstruct(strange)
     with pytest.raises(InputError, match="model"):
@@ -146,7 +146,7 @@ def test_the_verb_does_what_the_recipe_does(run, place, tmp_path, made):
     more = ("--report", report, "--save-model", model)
     status, said, _ = run(place / "walk.trc", "--static", place / "static.trc", "--out", out, *more)
     assert status == 0 and "frames" in said
-    motion = bvh.read(out).motion
+    motion = bvh.read_bvh(out).motion
     assert len(motion) == len(made.motion) and motion.fps == pytest.approx(FPS, rel=1e-3)
     mine, _ = forward_kinematics(motion)
     recipes, _ = forward_kinematics(made.motion)
@@ -154,7 +154,7 @@ def test_the_verb_does_what_the_recipe_does(run, place, tmp_path, made):
     assert np.abs(mine[:, order] - recipes).max() < 2e-3
     assert json.loads(report.read_text())["frames"] == len(motion)
     status, _, _ = run(place / "walk.trc", "--model", model, "--out", tmp_path / "again.bvh")
-    again, _ = forward_kinematics(bvh.read(tmp_path / "again.bvh").motion)
+    again, _ = forward_kinematics(bvh.read_bvh(tmp_path / "again.bvh").motion)
     assert status == 0 and np.abs(again - mine).max() < 5e-3
 
 
@@ -173,8 +173,8 @@ def test_a_motion_is_added_to_a_library_with_its_words(run, place, tmp_path, mad
 
 
 def test_how_a_ball_lies_in_the_hand_may_be_known():
-    made = throw((18.0, 0.0, 1.0), 24.0, fps=120.0)
-    thrown = planted(made.motion, "driveline", seed=2, softness=0.2, ball=PlantedBall(made.release))
+    made = build_throw((18.0, 0.0, 1.0), 24.0, fps=120.0)
+    thrown = build_trial(made.motion, "driveline", seed=2, softness=0.2, ball=BallRequest(made.release))
     first = reconstruct(thrown.trial, thrown.static, settings=ReconstructSettings(plant=False))
     hand, grip = first.model.skeleton.index("RightHand"), tuple(thrown.ball.grip)
     model = replace(first.model, ball=BallMarker(first.trial.labels[-1], hand, grip, 0.0366))
@@ -184,10 +184,10 @@ def test_how_a_ball_lies_in_the_hand_may_be_known():
     assert abs(again.release.speed / thrown.ball.speed - 1.0) < 0.02
 
 
-def test_a_trial_of_a_folder_goes_without_somebody_elses_static(run, tmp_path, known):
+def test_a_trial_of_a_folder_goes_without_another_persons_static(run, tmp_path, known):
     trials, out = tmp_path / "trials", tmp_path / "out"
     trials.mkdir()
-    few = known.trial.frames(0, 40)
+    few = known.trial.select_frames(0, 40)
     write_trc(known.static, trials / "static.trc")
     write_trc(few, trials / "own.trc")
     write_trc(few.with_positions(few.positions * 1.15), trials / "taller.trc")
@@ -203,7 +203,7 @@ def test_a_folder_is_made_as_a_whole(run, place, tmp_path, known):
     for session in ("monday", "tuesday"):
         (trials / session).mkdir(parents=True)
         write_trc(known.static, trials / session / "static.trc")
-        write_trc(known.trial.frames(0, 50), trials / session / "walk.trc")
+        write_trc(known.trial.select_frames(0, 50), trials / session / "walk.trc")
     (trials / "broken.trc").write_text("nothing")
     out, clips = tmp_path / "out", tmp_path / "clips"
     clips.mkdir()
@@ -214,7 +214,7 @@ def test_a_folder_is_made_as_a_whole(run, place, tmp_path, known):
     assert rows["broken"]["error"] and rows["monday/walk"]["static"] == "monday/static"
     assert {path.name for path in clips.iterdir()} == {"monday_walk.bvh", "monday_walk.txt", "tuesday_walk.bvh"}
     assert "not added" in rows["tuesday/walk"]["line"] and rows["tuesday/walk"]["bvh"]
-    skeletons = [bvh.read(out / session / "walk.bvh").motion.skeleton for session in ("monday", "tuesday")]
+    skeletons = [bvh.read_bvh(out / session / "walk.bvh").motion.skeleton for session in ("monday", "tuesday")]
     assert np.allclose(skeletons[0].offsets, skeletons[1].offsets, atol=1e-6)
 
 
@@ -232,6 +232,6 @@ def test_a_folder_is_made_as_a_whole(run, place, tmp_path, known):
     (("{place}", "--out", "{tmp}/o", "--marker-set", "mine"), "plug_in_gait"),
     (("{place}/walk.trc", "--out", "{tmp}/o.bvh", "--add-to", "{tmp}", "--words", "#3"), "words: '#3'"),
 ])
-def test_what_is_wrong_is_told_in_a_line(run, place, tmp_path, words, expected):
+def test_what_is_wrong_is_reported_in_a_line(run, place, tmp_path, words, expected):
     status, _, error = run(*[word.format(place=place, tmp=tmp_path) for word in words])
     assert status == 2 and len(error) == 1 and expected in error[0] and not list(tmp_path.iterdir())

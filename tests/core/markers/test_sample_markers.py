@@ -26,8 +26,8 @@ def test_sample_is_what_its_script_makes(tmp_path):
 def test_throw_is_read_as_it_was_planted():
     known = make_markers.thrown()
     trial = read_markers(SAMPLE / "markers" / "throw.c3d")
-    first = int(known.ball.asked.release * known.trial.fps) - 230
-    truth = known.trial.frames(first, first + len(trial))
+    first = int(known.ball.request.release * known.trial.fps) - 230
+    truth = known.trial.select_frames(first, first + len(trial))
     assert trial.labels == truth.labels
     np.testing.assert_array_equal(trial.seen, truth.seen)
     np.testing.assert_allclose(trial.positions, truth.positions, atol=1e-6)

@@ -36,14 +36,14 @@ def test_what_is_seen_and_when():
 
 def test_parts_of_a_trial():
     one = trial()
-    part = one.frames(1, 3)
+    part = one.select_frames(1, 3)
     assert (len(part), part.start) == (2, pytest.approx(2.1))
     assert [event.label for event in part.events] == ["early"]
-    two = one.only(["C", "A"])
+    two = one.select_markers(["C", "A"])
     assert two.labels == ("C", "A")
     np.testing.assert_array_equal(two.positions[:, 0], one.positions[:, 2])
     assert two.residuals.shape == (5, 2)
-    assert one.renamed({"A": "LASI"}).labels == ("LASI", "B", "C")
+    assert one.rename_labels({"A": "LASI"}).labels == ("LASI", "B", "C")
     assert one.with_positions(one.positions + 1).residuals is not None
     assert one.with_positions(one.positions[:2]).residuals is None
 
@@ -64,8 +64,8 @@ def test_what_is_wrong_is_said(changes, said):
         trial(**changes)
 
 
-def test_a_label_that_is_not_there_is_told_with_what_is():
+def test_a_label_that_is_not_there_is_reported_with_what_is():
     with pytest.raises(InputError, match="no marker 'D'.*one of A, B, C"):
-        trial().index("D")
+        trial().index_of("D")
     with pytest.raises(InputError, match="duplicate label 'B'"):
-        trial().renamed({"A": "B"})
+        trial().rename_labels({"A": "B"})

@@ -9,13 +9,13 @@ from beyond_mocap.base.errors import InputError
 from beyond_mocap.markers.trial_results import (
     Throw,
     TrialResult,
-    aligned_impacts,
+    align_impacts,
     compare_speeds,
-    dominant_sides,
-    near_mean,
+    find_dominant_sides,
+    select_near_mean,
     read_results,
 )
-from beyond_mocap.markers.trials_page import trials_report
+from beyond_mocap.markers.trials_page import build_trials_report
 
 pytest.importorskip("matplotlib")
 
@@ -48,7 +48,7 @@ def test_a_folder_of_throws_becomes_a_page(tmp_path):
                             rng.normal(90, 4), "left" if i % 8 == 1 else "right")
         for i in range(24)
     }  # fmt: skip
-    page = trials_report(written(tmp_path, reports))
+    page = build_trials_report(written(tmp_path, reports))
     assert page.count("data:image/png") == 5
     assert "24 throws with a measured speed" in page and "Wilcoxon, paired, two-sided" in page
     assert "<bob>" not in page and "&lt;bob&gt;" in page
@@ -56,14 +56,14 @@ def test_a_folder_of_throws_becomes_a_page(tmp_path):
 
 
 def test_one_trial_without_a_throw_is_enough(tmp_path):
-    page = trials_report(written(tmp_path, {"walk": report("", throws=False)}))
+    page = build_trials_report(written(tmp_path, {"walk": report("", throws=False)}))
     assert page.count("data:image/png") == 2 and "Where throws land" not in page
 
 
 def test_one_throw_without_impact_or_radar(tmp_path):
     one = report("ann", radar=None)
     one["release"]["impact_m"] = None
-    page = trials_report(written(tmp_path, {"a": one}))
+    page = build_trials_report(written(tmp_path, {"a": one}))
     assert "Where throws land" not in page and "29.0" in page
 
 
@@ -72,37 +72,37 @@ def test_errors_of_trials_are_in_the_table(tmp_path):
             {"trial": "b", "report": "", "error": "<no markers>"}]
     written(tmp_path, {"a": report("ann")})
     (tmp_path / "trials.json").write_text(json.dumps({"trials": rows}), "utf-8")
-    assert "&lt;no markers&gt;" in trials_report(tmp_path)
+    assert "&lt;no markers&gt;" in build_trials_report(tmp_path)
     assert [r.error for r in read_results(tmp_path)] == ["", "<no markers>"]
 
 
 @pytest.mark.parametrize("text", ['{"a":' * 900 + "1" + "}" * 900, "[" * 100000, "[]"])
-def test_reports_of_another_form_are_told_in_one_line(tmp_path, text):
+def test_reports_of_another_form_are_reported_in_one_line(tmp_path, text):
     (tmp_path / "a.report.json").write_text(text, "utf-8")
     with pytest.raises(InputError, match="a.report.json") as caught:
-        trials_report(tmp_path)
+        build_trials_report(tmp_path)
     assert "\n" not in str(caught.value)
 
 
 def test_a_folder_without_reports_is_said(tmp_path):
     with pytest.raises(InputError, match="no reports of trials"):
-        trials_report(tmp_path)
+        build_trials_report(tmp_path)
     (tmp_path / "a.report.json").write_text("{", "utf-8")
     with pytest.raises(InputError, match="a.report.json"):
-        trials_report(tmp_path)
+        build_trials_report(tmp_path)
 
 
 def throw_to(subject, angle, metres=20.0, side="right"):
     way = np.array([np.cos(angle), np.sin(angle)])
     hips = np.array([3.0, -1.0])
     thrown = Throw(speed=30.0, radar=None, side=side, hips=hips, impact=hips + metres * way,
-                   velocity=30.0 * np.append(way, 0.0), how="ball")
+                   velocity=30.0 * np.append(way, 0.0), method="ball")
     return TrialResult(name="t", subject=subject, throw=thrown)
 
 
 def test_impacts_are_aligned_to_each_subjects_throws():
     results = [throw_to("a", 1.0), throw_to("a", 1.1), throw_to("a", 0.9), throw_to("b", -2.0)]
-    points = aligned_impacts(results)
+    points = align_impacts(results)
     assert np.allclose(points[[0, 3]], [0.0, 20.0], atol=1e-9)
     assert np.allclose(points[1], [-20.0 * np.sin(0.1), 20.0 * np.cos(0.1)])  # further left
     assert np.allclose(points[2], [20.0 * np.sin(0.1), 20.0 * np.cos(0.1)])
@@ -110,15 +110,15 @@ def test_impacts_are_aligned_to_each_subjects_throws():
 
 def test_far_throws_are_culled():
     points = np.concatenate([np.random.default_rng(0).normal(0.0, 1.0, (40, 2)), [[30.0, 0.0], [np.nan, 0.0]]])
-    assert near_mean(points)[:40].all() and not near_mean(points)[40:].any()
+    assert select_near_mean(points)[:40].all() and not select_near_mean(points)[40:].any()
 
 
 def test_the_dominant_arm_is_the_one_that_throws_more():
     results = [throw_to("a", 0.0, side=side) for side in ("left", "left", "right")]
-    assert dominant_sides(results) == {"a": "left"}
+    assert find_dominant_sides(results) == {"a": "left"}
 
 
-def test_planted_differences_are_told():
+def test_planted_differences_are_reported():
     rng = np.random.default_rng(7)
     measured = rng.uniform(10.0, 30.0, 60)
     slow = compare_speeds(measured - 1.152 + rng.normal(0.0, 1.685, 60), measured)

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 from beyond_mocap.annotation import parse_timeline
-from beyond_mocap.match.make import make_match
-from beyond_mocap.match.order import MatchOrder
+from beyond_mocap.match.make import synthesize_match
+from beyond_mocap.match.order import MatchRequest
 from beyond_mocap.match.pieces import pool
-from beyond_mocap.match.pieces.units import units_of
-from beyond_mocap.match.pieces.windows import Piece, searched, spliced
+from beyond_mocap.match.pieces.units import build_units
+from beyond_mocap.match.pieces.windows import Piece, search_window, join_pieces
 from beyond_mocap.match.player_edit import PlayerEdit
 from beyond_mocap.motion.track import Track
 from beyond_mocap.synthesis.plan import Plan
@@ -48,30 +48,30 @@ def slow(seconds):
 '''
 
 
-def weaving(start: float, end: float) -> Track:
+def build_weaving_track(start: float, end: float) -> Track:
     """Samples at 25 Hz of a player who walks and jogs on a bent line, from second `start` to `end`."""
     times = np.arange(start, end + 1e-9, 0.04)
-    way = 2.0 * (times - start) + 2.0 * np.sin(0.6 * times)
-    return Track(times, np.column_stack([way, 4.0 * np.sin(0.08 * way)]), name="home_7")
+    distance = 2.0 * (times - start) + 2.0 * np.sin(0.6 * times)
+    return Track(times, np.column_stack([distance, 4.0 * np.sin(0.08 * distance)]), name="home_7")
 
 
 @pytest.fixture(scope="session")
 def weaving_plan() -> Plan:
     """25 s from 5 s on, with a kick at KICK_TIME."""
     timeline = parse_timeline(f"{KICK_TIME} kick right\n", fps=30.0)
-    return Plan(track=weaving(5.0, 30.0), timeline=timeline, nearest=True)
+    return Plan(track=build_weaving_track(5.0, 30.0), timeline=timeline, nearest=True)
 
 
 @pytest.fixture(scope="session")
 def weaving_pieces(library, weaving_plan) -> tuple[Piece, ...]:
     """What is found for its windows of 8 s."""
-    return tuple(searched(library, unit) for unit in units_of(weaving_plan, window=8.0, overlap=3.0))
+    return tuple(search_window(library, unit) for unit in build_units(weaving_plan, window=8.0, overlap=3.0))
 
 
 @pytest.fixture(scope="session")
 def weaving_player(library, weaving_plan, weaving_pieces) -> PlayerEdit:
     """The player that they make, laid out in windows of 8 s."""
-    return spliced(library, [weaving_plan], weaving_pieces, 8.0)[0]
+    return join_pieces(library, [weaving_plan], weaving_pieces, 8.0)[0]
 
 
 @pytest.fixture(scope="session")
@@ -85,7 +85,7 @@ def chores(tmp_path_factory):
     import planted_chores
 
     yield planted_chores
-    pool.ended()
+    pool.stop_workers()
     sys.path.remove(str(folder))
     os.environ.pop("PYTHONPATH") if before is None else os.environ.update(PYTHONPATH=before)
 
@@ -116,18 +116,18 @@ def cluster(chores, tmp_path):
 def order_to(sample_cache):
     """order_to(folder, **settings): three players of the small match for eight seconds, in windows of five."""
 
-    def order(folder, **settings):
-        return MatchOrder(**{
+    def build_order(folder, **settings):
+        return MatchRequest(**{
             "tracking": SMALL / "small.dat", "library": LIBRARY, "out": folder,
             "cache": sample_cache, "start": SECONDS[0], "end": SECONDS[1], "players": PLAYERS, "bvh": True,
             "window": 5.0, "overlap": 2.0, **settings,
         })  # fmt: skip
 
-    return order
+    return build_order
 
 
 @pytest.fixture(scope="session")
 def made(order_to, tmp_path_factory):
     """That match, made in this process: (folder, result)."""
     folder = tmp_path_factory.mktemp("made") / "match"
-    return folder, make_match(order_to(folder))
+    return folder, synthesize_match(order_to(folder))

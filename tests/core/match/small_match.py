@@ -10,7 +10,7 @@ PLAYERS = ("home_7", "home_10", "away_6")
 SECONDS = (3.0, 11.0)
 
 
-def kept_files(folder: Path) -> dict[str, bytes]:
+def read_reproducible_files(folder: Path) -> dict[str, bytes]:
     """What has to be the same bits however the match is made: all but how long that took."""
     out = {}
     for path in sorted(folder.rglob("*")):

@@ -4,23 +4,23 @@ import numpy as np
 import pytest
 
 from beyond_mocap.base.errors import InputError
-from beyond_mocap.match.crowd.capsules import nearest, touching
-from beyond_mocap.match.crowd.correction import ARMS, CURVES, FEET, ROOT, Correction, applied, carried, joined
-from beyond_mocap.match.crowd.crowd import overlap_depths
-from beyond_mocap.match.crowd.spacing import DISTANCE, STEADY, episodes, joined_spans, keeping, meetings, spaced
-from beyond_mocap.match.shown import looking
+from beyond_mocap.match.crowd.capsules import find_nearest_points, find_capsule_contacts
+from beyond_mocap.match.crowd.correction import ARMS, CURVES, FEET, ROOT, Correction, apply_correction, apply_curves, join_corrections
+from beyond_mocap.match.crowd.crowd import measure_overlap_depths
+from beyond_mocap.match.crowd.spacing import DISTANCE, TOUCH_FIRMNESS, find_episodes, join_spans, compute_firmness, find_meetings, compute_spacing
+from beyond_mocap.match.shown import add_gaze
 from beyond_mocap.motion import quaternion
-from beyond_mocap.motion.humanoid import identify
-from beyond_mocap.motion.motion import forward_kinematics, place
-from beyond_mocap.synthesis.quality.movement import jerk
-from beyond_mocap.synthetic.gait import gait
+from beyond_mocap.motion.humanoid import identify_joints
+from beyond_mocap.motion.motion import forward_kinematics, place_motion
+from beyond_mocap.synthesis.quality.movement import compute_jerk
+from beyond_mocap.synthetic.gait import build_gait
 
 FPS = 30.0
 
 
 @pytest.fixture(scope="module")
 def walk():
-    return gait(1.4, 4.0, FPS)
+    return build_gait(1.4, 4.0, FPS)
 
 
 def line(a, b):
@@ -33,7 +33,7 @@ def line(a, b):
     (((0, 0, 0), (1, 0, 0)), ((0.5, 0, 2), (0.5, 0, 2)), (0, 0, -2), (0.5, None)),
 ])
 def test_where_two_lines_are_nearest(one, other, away, shares):
-    off, at_one, at_other = nearest(line(*one), line(*other))
+    off, at_one, at_other = find_nearest_points(line(*one), line(*other))
     assert off[0] == pytest.approx(away, abs=1e-6) and at_one[0] == pytest.approx(shares[0])
     assert shares[1] is None or at_other[0] == pytest.approx(shares[1])
 
@@ -44,23 +44,23 @@ def test_nearest_agrees_with_looking_everywhere():
     share = np.linspace(0.0, 1.0, 201)
     points = [ends[:, :1] + share[None, :, None] * (ends[:, 1:] - ends[:, :1]) for ends in (one, other)]
     least = np.linalg.norm(points[0][:, :, None] - points[1][:, None], axis=-1).min(axis=(1, 2))
-    found = np.linalg.norm(nearest(one, other)[0], axis=1)
+    found = np.linalg.norm(find_nearest_points(one, other)[0], axis=1)
     assert np.all(found <= least + 1e-9) and np.all(found >= least - 0.03)
 
 
 def test_touching_tells_how_deep_and_which_way():
     one, other = np.array([[[[0, 0, 0], [0, 0, 1.0]]]] * 2), np.array([[[[0.25, 0, 0.5], [1, 0, 0.5]]]] * 2)
     other[1] += [0.2, 0.0, 0.0]
-    found = touching(one, other, (np.array([0.2]), np.array([0.1])))
+    found = find_capsule_contacts(one, other, (np.array([0.2]), np.array([0.1])))
     assert found.frame.tolist() == [0] and found.depth[0] == pytest.approx(0.05)
-    assert found.away[0] == pytest.approx([-1, 0, 0])
-    assert (found.at_one[0], found.at_other[0]) == pytest.approx((0.5, 0))
+    assert found.direction[0] == pytest.approx([-1, 0, 0])
+    assert (found.share_one[0], found.share_other[0]) == pytest.approx((0.5, 0))
 
 
 def test_overlap_of_bodies_side_by_side(walk):
     """The same walk beside itself: hands and shoulders meet first, and it is deeper the nearer they are."""
-    others = [place(walk, offset=(0.0, away, 0.0)) for away in (0.2, 0.4, 0.9)]
-    depth = [overlap_depths([walk, other], [0, 0])[0].max() for other in others]
+    others = [place_motion(walk, offset=(0.0, away, 0.0)) for away in (0.2, 0.4, 0.9)]
+    depth = [measure_overlap_depths([walk, other], [0, 0])[0].max() for other in others]
     assert depth[0] > depth[1] > depth[2] == 0.0
 
 
@@ -71,7 +71,7 @@ def test_episodes_join_what_overlaps_and_shares_a_body():
     places[1, 20:30, 0] = 0.1
     places[2, 32:40, 0] = 0.1
     places[3, 80:85, 0] = 10.1
-    found = episodes(places, 0.5, 5)
+    found = find_episodes(places, 0.5, 5)
     assert [(e.bodies, e.first, e.end, e.pairs) for e in found] == [
         ((0, 1, 2), 15, 45, ((0, 1), (0, 2))), ((1, 3), 75, 90, ((1, 3),)),
     ]
@@ -89,7 +89,7 @@ def test_episodes_that_share_a_body_at_one_time_are_one():
     """The last span joins the second pair to the first one's body long after that met its other: in between both
     episodes have that body, and would undo each other's work."""
     spans = [(0, 40, (0, 1)), (10, 90, (2, 3)), (80, 100, (1, 3)), (200, 220, (0, 2))]
-    found = joined_spans(spans)
+    found = join_spans(spans)
     assert [(one.first, one.end, one.bodies) for one in found] == [(0, 100, (0, 1, 2, 3)), (200, 220, (0, 2))]
     for number, one in enumerate(found):
         for other in found[number + 1 :]:
@@ -100,15 +100,15 @@ def test_episodes_that_share_a_body_at_one_time_are_one():
 def test_a_meeting_is_looked_at_with_all_who_are_there_then():
     """Bodies 1 and 2 meet while 2 has 3 and 3 has 4 beside him; 0 had met 1 before, and 5 and 6 are elsewhere."""
     met = [(0, 20, (0, 1)), (10, 80, (2, 3)), (25, 45, (3, 4)), (0, 90, (5, 6)), (30, 50, (1, 2))]
-    assert [(one.bodies, one.first, one.end, one.pairs) for one in meetings([(30, 50, (1, 2))], met)] == [
+    assert [(one.bodies, one.first, one.end, one.pairs) for one in find_meetings([(30, 50, (1, 2))], met)] == [
         ((1, 2, 3, 4), 30, 50, ((1, 2), (2, 3), (3, 4))),
     ]
-    assert meetings(met, met) == joined_spans(met)
+    assert find_meetings(met, met) == join_spans(met)
 
 
 def test_tracks_that_cross_are_spaced_by_the_least_smooth_shift():
     times, places = crossing()
-    shifts = spaced(times, places)
+    shifts = compute_spacing(times, places)
     apart = np.linalg.norm((places + shifts)[0] - (places + shifts)[1], axis=1)
     assert apart.min() > DISTANCE - 0.03
     assert not shifts[2].any() and not shifts[:, [0, -1]].any()
@@ -119,16 +119,16 @@ def test_tracks_that_cross_are_spaced_by_the_least_smooth_shift():
 def test_who_touches_the_ball_keeps_his_way():
     times, places = crossing()
     keep = np.ones(places.shape[:2])
-    keep[0] = STEADY
-    shifts = spaced(times, places, keep)
+    keep[0] = TOUCH_FIRMNESS
+    shifts = compute_spacing(times, places, keep)
     moved = np.linalg.norm(shifts, axis=2).max(axis=1)
     assert moved[0] < 0.2 * moved[1] and moved[1] > 0.3
 
 
 def test_keeping_is_firmest_at_the_touch():
-    firm = keeping(100, np.array([50.0]), FPS)
-    assert firm[50] == STEADY and firm[20] == 1.0 and np.all(np.diff(firm[20:51]) >= 0.0)
-    assert np.all(keeping(10, np.zeros(0), FPS) == 1.0)
+    firm = compute_firmness(100, np.array([50.0]), FPS)
+    assert firm[50] == TOUCH_FIRMNESS and firm[20] == 1.0 and np.all(np.diff(firm[20:51]) >= 0.0)
+    assert np.all(compute_firmness(10, np.zeros(0), FPS) == 1.0)
 
 
 def bump(count, at, size):
@@ -146,8 +146,8 @@ def curves(walk):
 
 
 def test_a_correction_keeps_bones_and_untouched_frames(walk, curves):
-    found = Correction.of(curves, 1000, FPS)
-    moved = applied(walk, found, 1000)
+    found = Correction.from_curves(curves, 1000, FPS)
+    moved = apply_correction(walk, found, 1000)
     assert np.array_equal(moved.rotations[80:], walk.rotations[80:])
     assert np.array_equal(moved.root_positions[:25], walk.root_positions[:25])
     assert found.curves(1000, len(walk)) == pytest.approx(curves, abs=1.5e-3)
@@ -155,28 +155,28 @@ def test_a_correction_keeps_bones_and_untouched_frames(walk, curves):
     before, turned = forward_kinematics(walk)
     bones = [np.linalg.norm(p[:, 1:] - p[:, list(walk.skeleton.parents[1:])], axis=2) for p in (joints, before)]
     assert bones[0] == pytest.approx(bones[1], abs=1e-9)
-    legs = identify(walk.skeleton)
+    legs = identify_joints(walk.skeleton)
     for side, limb in enumerate((legs.left, legs.right)):
         off = joints[:, limb.foot] - before[:, limb.foot]
         assert off[:, :2] == pytest.approx(curves[:, FEET].reshape(-1, 2, 2)[:, side], abs=0.012)
         assert np.abs(np.sum(world[:, limb.foot] * turned[:, limb.foot], axis=1)) == pytest.approx(1.0)
-    assert jerk(joints, FPS).max() < 1.2 * jerk(before, FPS).max()
+    assert compute_jerk(joints, FPS).max() < 1.2 * compute_jerk(before, FPS).max()
 
 
 def test_frames_are_corrected_by_themselves(walk, curves):
-    whole, part = carried(walk, curves), carried(walk.frames(40, 70), curves[40:70])
+    whole, part = apply_curves(walk, curves), apply_curves(walk.frames(40, 70), curves[40:70])
     assert np.array_equal(whole.rotations[40:70], part.rotations)
     assert np.array_equal(whole.root_positions[40:70], part.root_positions)
 
 
 def test_without_correction_the_motion_is_the_same(walk):
-    assert applied(walk, Correction.none(FPS), 7) is walk
+    assert apply_correction(walk, Correction.build_empty(FPS), 7) is walk
 
 
 def test_windows_join_to_what_one_would_have_given(curves):
-    whole = Correction.of(curves, 0, FPS)
-    parts = [Correction.of(curves[:75], 0, FPS), Correction.of(curves[45:], 45, FPS)]
-    found = joined([(parts[0], 0, 60), (parts[1], 60, 120)], 15)
+    whole = Correction.from_curves(curves, 0, FPS)
+    parts = [Correction.from_curves(curves[:75], 0, FPS), Correction.from_curves(curves[45:], 45, FPS)]
+    found = join_corrections([(parts[0], 0, 60), (parts[1], 60, 120)], 15)
     assert found.curves(0, len(curves)) == pytest.approx(whole.curves(0, len(curves)), abs=2e-3)
 
 
@@ -191,15 +191,15 @@ def test_arrays_that_are_no_correction_are_told(knots, values, what):
 
 def test_rates_have_to_agree(walk):
     with pytest.raises(InputError, match="frames per second"):
-        applied(walk, Correction.none(25.0))
+        apply_correction(walk, Correction.build_empty(25.0))
 
 
 def test_heads_follow_the_ball_each_in_its_own_way(walk):
-    head = identify(walk.skeleton).head
+    head = identify_joints(walk.skeleton).head
     at = np.arange(len(walk)) / 20.0
     ball = np.column_stack([3.0 + 0.0 * at, 8.0 * np.sin(at), 0.1 + 0.0 * at])
     known, look = np.ones(len(walk), bool), np.array([1.0, 0.0, 0.0])
-    seen = [looking(walk, ball, known, look, seed, start=100.0) for seed in (1, 2, 1)]
+    seen = [add_gaze(walk, ball, known, look, seed, start=100.0) for seed in (1, 2, 1)]
     assert np.array_equal(seen[0].rotations, seen[2].rotations)
     apart = quaternion.multiply(seen[0].rotations[:, head], quaternion.inverse(seen[1].rotations[:, head]))
     assert np.linalg.norm(quaternion.to_rotation_vector(apart), axis=1).max() > 0.05
@@ -208,13 +208,13 @@ def test_heads_follow_the_ball_each_in_its_own_way(walk):
 
 
 def _turned(motion):
-    body = identify(motion.skeleton)
+    body = identify_joints(motion.skeleton)
     return {body.chest, body.neck, body.head}
 
 
 def test_without_a_ball_nobody_looks(walk):
     nothing = np.zeros((len(walk), 3))
-    assert looking(walk, nothing, np.zeros(len(walk), bool), np.array([1.0, 0, 0])) is walk
+    assert add_gaze(walk, nothing, np.zeros(len(walk), bool), np.array([1.0, 0, 0])) is walk
 
 
 def test_curves_have_their_columns():

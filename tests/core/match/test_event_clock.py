@@ -7,7 +7,7 @@ import pytest
 
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.files.event_data import MatchEvent, MatchEvents
-from beyond_mocap.match.event_clock import aligned
+from beyond_mocap.match.event_clock import align_events
 from beyond_mocap.motion.track.match_data import Half
 
 HALVES = (Half(1, 0.0, 0.0, 900.0), Half(2, 910.0, 910.0, 1810.0))
@@ -55,7 +55,7 @@ def test_few_events_that_do_not_fit_are_left_out_and_told():
     ) for event, share in
              zip(inside * 2, rng.random(8))]  # fmt: skip
     others = [event for event in sent if not 90.0 < event.time < 140.0][:20]
-    found = aligned(MatchEvents((*moved, *others), "made"), touches, HALVES, (100.0, 128.0))
+    found = align_events(MatchEvents((*moved, *others), "made"), touches, HALVES, (100.0, 128.0))
     assert not found.clocks and np.isnan(found.times).all() and (found.touches < 0).all()
     assert len(found.notes) == 1 and "its events are ignored" in found.notes[0] and "fit (by chance" in found.notes[0]
 
@@ -66,7 +66,7 @@ def test_few_events_that_do_not_fit_are_left_out_and_told():
 ])
 def test_each_period_gets_its_own_clock(lag, drift):
     touches, events, truth = planted(lag=lag, drift=drift)
-    found = aligned(events, touches, HALVES)
+    found = align_events(events, touches, HALVES)
     for number, clock in found.clocks.items():
         for since in (100.0, 800.0):
             late = clock.lag + clock.drift * since
@@ -79,7 +79,7 @@ def test_each_period_gets_its_own_clock(lag, drift):
 
 def test_exact_events_find_every_touch():
     touches, events, truth = planted(scatter=0.0, stray=0.0)
-    found = aligned(events, touches, HALVES)
+    found = align_events(events, touches, HALVES)
     assert right(found, truth) == 1.0
     own = np.array([touches[i].time for i in found.touches])
     np.testing.assert_allclose(found.times, own, atol=0.05)
@@ -90,13 +90,13 @@ def test_events_of_another_match_are_refused():
     touches, _, _ = planted(seed=1)
     _, others, _ = planted(seed=2)
     with pytest.raises(InputError, match=r"events.xml: .*by chance.*of the same match"):
-        aligned(others, touches, HALVES)
+        align_events(others, touches, HALVES)
 
 
 def test_a_span_of_the_match_is_enough():
     touches, events, truth = planted()
     inside = [touch for touch in touches if 200.0 <= touch.time <= 320.0]
-    found = aligned(events, inside, HALVES, (200.0, 320.0))
+    found = align_events(events, inside, HALVES, (200.0, 320.0))
     assert found.clocks[1].lag == pytest.approx(2.9, abs=0.3)
     there = [i for i, touch in enumerate(truth) if touch >= 0 and 205.0 < touches[touch].time < 315.0]
     good = [found.touches[i] >= 0 and inside[found.touches[i]] is touches[truth[i]] for i in there]
@@ -130,7 +130,7 @@ def test_in_a_short_span_events_of_another_match_are_not_believed():
 
 def clocks_or_none(events, touches, span):
     try:
-        return list(aligned(events, touches, HALVES[:1], span).clocks.values())
+        return list(align_events(events, touches, HALVES[:1], span).clocks.values())
     except InputError:
         return []
 
@@ -138,11 +138,11 @@ def clocks_or_none(events, touches, span):
 def test_too_few_events_are_told_and_left():
     touches, events, _ = planted()
     few = MatchEvents(events.events[:4], "made")
-    found = aligned(few, touches, HALVES)
+    found = align_events(few, touches, HALVES)
     assert not found.clocks and "too few" in found.notes[0] and (found.touches == -1).all()
-    short = aligned(events, [touch for touch in touches if 300.0 < touch.time < 305.0], HALVES, (300.0, 305.0))
+    short = align_events(events, [touch for touch in touches if 300.0 < touch.time < 305.0], HALVES, (300.0, 305.0))
     assert not short.clocks and (short.touches == -1).all()
-    assert aligned(MatchEvents((), "made"), touches, HALVES).touches.size == 0
+    assert align_events(MatchEvents((), "made"), touches, HALVES).touches.size == 0
 
 
 def test_events_of_nobody_and_of_periods_that_are_missing_keep_no_touch():
@@ -150,7 +150,7 @@ def test_events_of_nobody_and_of_periods_that_are_missing_keep_no_touch():
     extra = (MatchEvent(
         time=5.0, period=1, player="", team="home", kind="pass",
     ), MatchEvent(time=5.0, period=3, player="p1", team="home", kind="pass"))
-    found = aligned(MatchEvents((*events.events, *extra), "made"), touches, HALVES)
+    found = align_events(MatchEvents((*events.events, *extra), "made"), touches, HALVES)
     assert found.touches[-2:].tolist() == [-1, -1] and np.isnan(found.times[-1])
 
 
@@ -159,10 +159,10 @@ def test_a_file_that_begins_within_the_second_half_is_no_trouble():
     half = Half(2, -490.0, 10.0, 400.0)  # its first frame is 500 s into the half
     moved = [SimpleNamespace(**{**vars(touch), "time": touch.time - 910.0 - 490.0}) for touch in touches]
     inside = [touch for touch in moved if half.start <= touch.time <= half.end]
-    found = aligned(events, inside, [half])
+    found = align_events(events, inside, [half])
     assert found.clocks[2].lag == pytest.approx(2.9, abs=0.2) and list(found.clocks) == [2]
     pairs = [(event, touch) for event, touch in enumerate(truth) if touch >= 0 and moved[touch] in inside]
     assert len(pairs) > 50
     assert np.mean([found.touches[e] >= 0 and inside[found.touches[e]] is moved[t] for e, t in pairs]) > 0.85
     with pytest.raises(InputError, match="by chance"):  # events count from the half's begin, further off than MOST_LAG
-        aligned(events, inside, [Half(2, 10.0, 10.0, 400.0)])
+        align_events(events, inside, [Half(2, 10.0, 10.0, 400.0)])

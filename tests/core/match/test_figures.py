@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 
 from beyond_mocap.evaluation.report import evaluate
-from beyond_mocap.match.pieces.work import combined, per_second, player_report, time_lost
+from beyond_mocap.match.pieces.work import merge_reports, measure_per_second, build_player_report, measure_time_lost
 from beyond_mocap.motion.track.ball_path import BallPath
-from beyond_mocap.synthesis.quality.played import played_from_take
+from beyond_mocap.synthesis.quality.played import playback_from_take
 
 
 def test_time_lost_counts_every_second_once():
-    assert time_lost([[[1.0, 3.0], [2.0, 4.0]], [[3.5, 3.75]], [], [[10.0, 10.5]]]) == pytest.approx(3.5)
-    assert time_lost([]) == 0.0
+    assert measure_time_lost([[[1.0, 3.0], [2.0, 4.0]], [[3.5, 3.75]], [], [[10.0, 10.5]]]) == pytest.approx(3.5)
+    assert measure_time_lost([]) == 0.0
 
 
 def test_reports_of_stretches_are_joined_by_what_their_figures_mean():
@@ -19,22 +19,22 @@ def test_reports_of_stretches_are_joined_by_what_their_figures_mean():
            "warp_rate": {"min": 0.9, "max": 1.1}}  # fmt: skip
     two = {"version": 1, "frames": 90, "root_error_m": {"mean": 2.0, "max": 9.0}, "keys": [2, 3], "loop_share": 0.5,
            "warp_rate": {"min": 0.8, "max": 1.0}}  # fmt: skip
-    joined = combined([one, two], [30, 90])
+    joined = merge_reports([one, two], [30, 90])
     assert joined == {"version": 1, "frames": 120, "root_error_m": {"mean": 1.75, "max": 9.0}, "keys": [1, 2, 3],
                       "loop_share": 0.5, "warp_rate": {"min": 0.8, "max": 1.1}}  # fmt: skip
     assert type(joined["frames"]) is int
-    assert combined([one], [30]) == one
+    assert merge_reports([one], [30]) == one
 
 
 def test_every_second_has_its_own_figures(take, library):
-    played, track = played_from_take(take), take.plan.track
+    played, track = playback_from_take(take), take.plan.track
     count = len(take.motion)
     times = take.start_time + np.arange(count) / take.motion.fps
     ball = np.column_stack([played.pelvis + [3.0, 4.0], np.full(count, 0.11)])
     ball[30:60] += [30.0, 0.0, 0.0]
     overlap = np.zeros(count)
     overlap[45] = 0.25
-    report = player_report(library, [take], [track], [overlap], BallPath(times, ball, np.ones(count, bool)))
+    report = build_player_report(library, [take], [track], [overlap], BallPath(times, ball, np.ones(count, bool)))
     alone = evaluate(take, track, library)
     assert {name: report[name] for name in alone} == alone
     rows = report["per_second"]
@@ -51,8 +51,8 @@ def test_seconds_between_stretches_are_empty(take):
     later = replace(take, start_time=take.start_time + 40.0)
     count = len(take.motion)
     ball = BallPath(np.arange(2.0), np.full((2, 3), np.nan), np.zeros(2, bool))
-    rows = per_second(
-        [played_from_take(take), played_from_take(later)], [take.plan.track] * 2, [np.zeros(count)] * 2, ball
+    rows = measure_per_second(
+        [playback_from_take(take), playback_from_take(later)], [take.plan.track] * 2, [np.zeros(count)] * 2, ball
     )
     there = [value is not None for value in rows["overlap_m"]]
     assert there[0] and there[40] and not there[30]

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from beyond_mocap.base.errors import InputError
-from beyond_mocap.match.folder import file_names, opened, read_state
-from beyond_mocap.match.order import MatchOrder, digest_of, identity
+from beyond_mocap.match.folder import build_file_names, open_folder, read_state
+from beyond_mocap.match.order import MatchRequest, compute_digest, build_identity
 
 TOP = Path(__file__).resolve().parents[3]
 
@@ -24,36 +24,36 @@ class Planted:
 
 def test_the_same_content_has_the_same_digest_and_no_other_has():
     one = Planted("a", np.arange(6.0))
-    assert digest_of(one) == digest_of(Planted("a", np.arange(6.0)[::1]))
+    assert compute_digest(one) == compute_digest(Planted("a", np.arange(6.0)[::1]))
     others = [Planted("b", np.arange(6.0)), Planted("a", np.arange(6)), Planted("a", np.arange(6.0).reshape(2, 3)),
               Planted("a", np.arange(5.0)), (1, 2), (1, (2,)), ((1,), 2), (12,), ("1", 2), (1.0, 2), (True, 2), None,
               {"a": 1}, {"a": 2}, frozenset("ab"), ("a", "b"), ("ab",), b"ab", Path("ab")]  # fmt: skip
-    assert len({digest_of(value) for value in [one, *others]}) == len(others) + 1
+    assert len({compute_digest(value) for value in [one, *others]}) == len(others) + 1
     with pytest.raises(TypeError, match="function"):
-        digest_of(test_the_same_content_has_the_same_digest_and_no_other_has)
+        compute_digest(test_the_same_content_has_the_same_digest_and_no_other_has)
 
 
 @pytest.fixture
 def order(tmp_path):
     (tmp_path / "t.dat").write_text("tracking")
-    return MatchOrder(tmp_path / "t.dat", tmp_path / "clips", tmp_path / "out", players=("a", "b"))
+    return MatchRequest(tmp_path / "t.dat", tmp_path / "clips", tmp_path / "out", players=("a", "b"))
 
 
 def changed(order, **more):
-    return MatchOrder(**{**vars(order), **more})
+    return MatchRequest(**{**vars(order), **more})
 
 
 def test_what_decides_the_results_is_in_the_identity_and_nothing_else(order, tmp_path):
-    own = digest_of(identity(order, "key"))
+    own = compute_digest(build_identity(order, "key"))
     (tmp_path / "same.dat").write_text("tracking")
     same = [{"workers": 7}, {"scheduler": "tcp://x"}, {"bvh": True}, {"figures": False}, {"out": tmp_path / "o"},
             {"tracking": tmp_path / "same.dat"}, {"annotations": tmp_path}]  # fmt: skip
-    assert {digest_of(identity(changed(order, **more), "key")) for more in same} == {own}
+    assert {compute_digest(build_identity(changed(order, **more), "key")) for more in same} == {own}
     other = [{"seed": 1}, {"start": 0.0}, {"end": 9.0}, {"fps": 25.0}, {"players": ("a",)}, {"nearest": False},
              {"solve_touches": False}, {"window": 30.0}, {"events": tmp_path / "same.dat"}]  # fmt: skip
-    found = [digest_of(identity(changed(order, **more), "key")) for more in other]
+    found = [compute_digest(build_identity(changed(order, **more), "key")) for more in other]
     (tmp_path / "t.dat").write_text("other tracking")
-    found += [digest_of(identity(order, name)) for name in ("other", "key")]
+    found += [compute_digest(build_identity(order, name)) for name in ("other", "key")]
     assert len({own, *found}) == len(other) + 3
 
 
@@ -71,51 +71,51 @@ def test_an_order_without_sense_is_told(order, more, told):
 
 def test_a_file_that_is_not_there_is_told(order):
     with pytest.raises(InputError, match="nothing.dat: No such file"):
-        identity(changed(order, tracking=Path("nothing.dat")), "key")
+        build_identity(changed(order, tracking=Path("nothing.dat")), "key")
 
 
 STATE = {"state": "running", "players": [{"id": "a"}], "figure": np.float64("nan")}
 
 
 def test_a_folder_is_gone_on_with_by_the_same_order_only(order, tmp_path):
-    known = identity(order, "key")
-    with opened(order.out, known) as folder:
-        assert folder.before == {}
-        folder.tell({"identity": known, **STATE})
-    with opened(order.out, known) as folder:
-        assert folder.before["players"] == [{"id": "a"}] and folder.before["figure"] is None
+    known = build_identity(order, "key")
+    with open_folder(order.out, known) as folder:
+        assert folder.previous_state == {}
+        folder.write_state({"identity": known, **STATE})
+    with open_folder(order.out, known) as folder:
+        assert folder.previous_state["players"] == [{"id": "a"}] and folder.previous_state["figure"] is None
     for more, key, told in (
         ({"start": 1.0}, "key", "start time"), ({"seed": 1}, "other", "seed"), ({}, "other", "library"),
     ):  # fmt: skip
         with pytest.raises(InputError, match=rf"out: holds the results of another request \(its {told} differs\)"):
-            with opened(order.out, identity(changed(order, **more), key)):
+            with open_folder(order.out, build_identity(changed(order, **more), key)):
                 pass
 
 
 def test_pieces_are_kept_till_they_are_forgotten(order):
-    with opened(order.out, identity(order, "key")) as folder:
+    with open_folder(order.out, build_identity(order, "key")) as folder:
         for name in "abc":
-            folder.place("search", name).write_text(name)
-        folder.forget("search", ["b"])
-        assert [path.name for path in folder.place("search", "b").parent.iterdir()] == ["b.npz"]
+            folder.piece_path("search", name).write_text(name)
+        folder.remove_pieces("search", ["b"])
+        assert [path.name for path in folder.piece_path("search", "b").parent.iterdir()] == ["b.npz"]
 
 
 def test_what_a_killed_run_was_about_to_rename_is_swept_and_nothing_else(order):
-    known = identity(order, "key")
-    with opened(order.out, known) as folder:
-        folder.tell({"players": []})
-        folder.place("search", "a").write_bytes(b"piece")
+    known = build_identity(order, "key")
+    with open_folder(order.out, known) as folder:
+        folder.write_state({"players": []})
+        folder.piece_path("search", "a").write_bytes(b"piece")
     left = [order.out / ".match.json.28075.140397754297216.part", order.out / ".work" / "search" / ".b.npz.7.8.part"]
     mine = [order.out / ".notes.part", order.out / "home.1.2.part"]
     for path in (*left, *mine):
         path.write_bytes(b"half of it")
-    with opened(order.out, known) as folder:
-        assert folder.place("search", "a").read_bytes() == b"piece"
+    with open_folder(order.out, known) as folder:
+        assert folder.piece_path("search", "a").read_bytes() == b"piece"
     assert not any(path.exists() for path in left) and all(path.exists() for path in mine)
 
 
 def test_two_runs_at_once_are_told_and_a_dead_one_holds_nothing(order):
-    known = identity(order, "key")
+    known = build_identity(order, "key")
     text = f"""
 import sys, os; sys.path.insert(0, {str(TOP)!r})
 from pathlib import Path
@@ -127,23 +127,23 @@ with opened(Path({str(order.out)!r}), {known!r}):
     other = subprocess.Popen([sys.executable, "-c", text], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
     assert other.stdout.readline() == b"in\n"
     with pytest.raises(InputError, match=rf"another run \(process {other.pid}\) uses it"):
-        with opened(order.out, known):
+        with open_folder(order.out, known):
             pass
     other.kill()
     other.wait()
-    with opened(order.out, known) as folder:
-        assert folder.before == {}
+    with open_folder(order.out, known) as folder:
+        assert folder.previous_state == {}
 
 
 def test_folders_that_are_none_of_a_match_are_told(order, tmp_path):
-    known = identity(order, "key")
+    known = build_identity(order, "key")
     (tmp_path / "file").write_text("x")
     (tmp_path / "full").mkdir()
     (tmp_path / "full" / "thesis.txt").write_text("x")
     for path, told in ((tmp_path / "file", "is a file"), (tmp_path / "full", r"holds other files \(thesis.txt\)"),
                        (tmp_path / "no" / "where", "the folder above it does not exist")):  # fmt: skip
         with pytest.raises(InputError, match=told):
-            with opened(path, known):
+            with open_folder(path, known):
                 pass
     assert not (tmp_path / "no").exists() and [p.name for p in (tmp_path / "full").iterdir()] == ["thesis.txt"]
 
@@ -164,10 +164,10 @@ def test_a_state_that_cannot_be_read_is_told(tmp_path, text, told):
 @pytest.fixture
 def begun(order):
     """What decides the results of an order, whose folder has one piece of work and its state."""
-    known = identity(order, "key")
-    with opened(order.out, known) as folder:
-        folder.tell({"identity": known, "players": [{"id": "a"}]})
-        folder.place("search", "a").write_bytes(b"piece")
+    known = build_identity(order, "key")
+    with open_folder(order.out, known) as folder:
+        folder.write_state({"identity": known, "players": [{"id": "a"}]})
+        folder.piece_path("search", "a").write_bytes(b"piece")
     return known
 
 
@@ -185,21 +185,21 @@ def cut(state: Path, drop: str = "") -> None:
 def test_a_damaged_state_is_set_aside_and_the_work_goes_on(order, begun, drop, told):
     cut(order.out / "match.json", drop)
     damaged = (order.out / "match.json").read_bytes()
-    with opened(order.out, begun) as folder:
-        assert folder.place("search", "a").read_bytes() == b"piece" and folder.before == {}
+    with open_folder(order.out, begun) as folder:
+        assert folder.piece_path("search", "a").read_bytes() == b"piece" and folder.previous_state == {}
         assert told in folder.notes[0] and "match.json.damaged" in folder.notes[0] and len(folder.notes) == 1
         assert (order.out / "match.json.damaged").read_bytes() == damaged
-    with opened(order.out, begun) as folder:  # the run before ended before it told anything
-        assert folder.place("search", "a").read_bytes() == b"piece" and folder.notes == ()
+    with open_folder(order.out, begun) as folder:  # the run before ended before it told anything
+        assert folder.piece_path("search", "a").read_bytes() == b"piece" and folder.notes == ()
 
 
 def test_an_empty_state_of_another_order_is_refused(order, begun):
     (order.out / "match.json").write_text("")
     with pytest.raises(InputError, match="holds the results of another request"):
-        with opened(order.out, identity(changed(order, seed=1), "key")):
+        with open_folder(order.out, build_identity(changed(order, seed=1), "key")):
             pass
     assert (order.out / "match.json").read_text() == ""
-    with opened(order.out, begun) as folder:
+    with open_folder(order.out, begun) as folder:
         assert "renamed to match.json.damaged" in folder.notes[0]
 
 
@@ -207,21 +207,21 @@ def test_a_state_without_a_digest_and_without_pieces_is_refused(tmp_path):
     text = '{"version": 1, "players": [], "of": "somebody else"}'
     (tmp_path / "match.json").write_text(text)
     with pytest.raises(InputError, match="match.json: no digest"):
-        with opened(tmp_path, {"seed": 1}):
+        with open_folder(tmp_path, {"seed": 1}):
             pass
     assert [path.name for path in tmp_path.iterdir()] == ["match.json"]
     assert (tmp_path / "match.json").read_text() == text
 
 
 def test_a_damaged_state_of_another_order_or_version_is_refused(order, begun):
-    other = identity(changed(order, seed=1), "key")
+    other = build_identity(changed(order, seed=1), "key")
     cut(order.out / "match.json")
     with pytest.raises(InputError, match="holds the results of another request; expected"):  # which, it does not say
-        with opened(order.out, other):
+        with open_folder(order.out, other):
             pass
     (order.out / "match.json").write_text('{"players": [], "version": 99}')
     with pytest.raises(InputError, match="version 99"):
-        with opened(order.out, begun):
+        with open_folder(order.out, begun):
             pass
     assert not (order.out / "match.json.damaged").exists() and (order.out / ".work" / "search" / "a.npz").exists()
 
@@ -232,14 +232,14 @@ def test_a_state_that_somebody_else_wrote_is_refused_and_left(order, tmp_path):
     (folder / "match.json").write_text('{"matchInfo": {}}')
     for _ in range(2):
         with pytest.raises(InputError, match="no list of players"):
-            with opened(folder, identity(order, "key")):
+            with open_folder(folder, build_identity(order, "key")):
                 pass
     assert [path.name for path in folder.iterdir()] == ["match.json"]
 
 
 def test_files_of_players_have_names_that_every_system_takes():
     ids = ["home_1", "DFL-OBJ-0001", "a/b", "a_b", "A_B", "../..", "", "con", "COM1.x", "é", "x" * 300, "a b"]
-    names = file_names(ids)
+    names = build_file_names(ids)
     assert set(names) == set(ids) and names["home_1"] == "home_1"
     assert len({name.lower() for name in names.values()}) == len(ids)
     for name in names.values():

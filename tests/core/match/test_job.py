@@ -12,19 +12,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from beyond_mocap.base.errors import Cancelled
+from beyond_mocap.base.errors import UserCancelledError
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.files.tables import read_ball, read_rows
 from beyond_mocap.files.tracking.tracking import read_match
-from beyond_mocap.library.build import build
+from beyond_mocap.library.build import build_library
 from beyond_mocap.match.folder import read_state
-from beyond_mocap.match.make import make_match
+from beyond_mocap.match.make import synthesize_match
 from beyond_mocap.match.player_edit import read_player
-from beyond_mocap.match.shown import shown
+from beyond_mocap.match.shown import construct_displayed_player
 from beyond_mocap.motion.track.ball_path import BallPath
 from beyond_mocap.synthesis.provenance import read_provenance
 from tests.core.cli.test_command_line import assert_contract
-from tests.core.match.small_match import LIBRARY, PLAYERS, SECONDS, SMALL, TOP, kept_files
+from tests.core.match.small_match import LIBRARY, PLAYERS, SECONDS, SMALL, TOP, read_reproducible_files
 
 FRAMES = round((SECONDS[1] - SECONDS[0]) * 30.0) + 1
 
@@ -39,7 +39,7 @@ def touches():
 
 def test_everything_promised_is_in_the_folder(made):
     folder, result = made
-    assert sorted(one.id for one in result.done) == sorted(PLAYERS) and not result.failed and result.span == SECONDS
+    assert sorted(one.id for one in result.finished) == sorted(PLAYERS) and not result.failed and result.span == SECONDS
     state = read_state(folder)
     assert (state["status"], state["title"], state["from_s"], state["to_s"]) == ("done", "Reds - Blues", *SECONDS)
     assert [row["status"] for row in state["players"]] == ["done"] * 3
@@ -47,7 +47,7 @@ def test_everything_promised_is_in_the_folder(made):
         assert row["units"] == row["units_done"] == 2
         for kind in ("take", "report", "provenance", "bvh"):
             assert (folder / row[kind]).is_file()
-        motion = bvh.read(folder / row["bvh"], 0.01).motion
+        motion = bvh.read_bvh(folder / row["bvh"], 0.01).motion
         provenance = read_provenance(folder / row["provenance"])
         assert len(motion) == len(provenance) == FRAMES and provenance.times[0] == SECONDS[0]
         report = json.loads((folder / row["report"]).read_text())
@@ -63,7 +63,7 @@ def test_players_are_where_the_tracking_has_them_and_the_ball_where_it_is_touche
     match, ball = read_match(SMALL / "small.dat"), read_ball(folder / "ball.csv")
     assert len(ball.times) == FRAMES and np.isfinite(ball.positions).all()
     for player in PLAYERS:
-        motion, track = bvh.read(folder / f"{player}.bvh", 0.01).motion, match.track(player, *SECONDS)
+        motion, track = bvh.read_bvh(folder / f"{player}.bvh", 0.01).motion, match.track(player, *SECONDS)
         times = SECONDS[0] + np.arange(FRAMES) / 30.0
         wanted = np.stack([np.interp(times, track.times, column) for column in track.positions.T], axis=1)
         assert np.linalg.norm(motion.root_positions[:, :2] - wanted, axis=1).mean() < 0.12
@@ -79,9 +79,9 @@ def test_players_are_where_the_tracking_has_them_and_the_ball_where_it_is_touche
 def test_a_player_is_shown_from_his_file_as_he_was_written(made, sample_cache):
     folder, _ = made
     edit, ball = read_player(folder / "home_7.take.npz"), read_ball(folder / "ball.csv")
-    library = build(LIBRARY, cache_dir=sample_cache)
-    (take,) = shown(library, edit, ball, *SECONDS)
-    motion = bvh.read(folder / "home_7.bvh", 0.01).motion
+    library = build_library(LIBRARY, cache_dir=sample_cache)
+    (take,) = construct_displayed_player(library, edit, ball, *SECONDS)
+    motion = bvh.read_bvh(folder / "home_7.bvh", 0.01).motion
     assert np.abs(take.motion.root_positions - motion.root_positions).max() < 1e-4
     assert len(read_provenance(folder / "home_7.provenance.csv").clip) == len(take.clip)
 
@@ -91,8 +91,8 @@ def test_a_frame_looks_the_same_whatever_span_is_shown(made, sample_cache, span)
     """The head too, whose turn to the ball is smoothed over time."""
     folder, _ = made
     edit, ball = read_player(folder / "home_7.take.npz"), read_ball(folder / "ball.csv")
-    library = build(LIBRARY, cache_dir=sample_cache)
-    (whole,), (part,) = shown(library, edit, ball, *SECONDS), shown(library, edit, ball, *span)
+    library = build_library(LIBRARY, cache_dir=sample_cache)
+    (whole,), (part,) = construct_displayed_player(library, edit, ball, *SECONDS), construct_displayed_player(library, edit, ball, *span)
     at = slice(round(30.0 * (span[0] - SECONDS[0])), round(30.0 * (span[1] - SECONDS[0])) + 1)
     assert part.start_time == span[0] and part.clip_frame.tolist() == whole.clip_frame[at].tolist()
     assert np.array_equal(part.motion.root_positions, whole.motion.root_positions[at])
@@ -103,16 +103,16 @@ def test_a_ball_that_is_told_of_for_a_part_only_is_unknown_in_the_rest(made, sam
     folder, _ = made
     edit, ball = read_player(folder / "home_7.take.npz"), read_ball(folder / "ball.csv")
     part = BallPath(*(values[60:150] for values in (ball.times, ball.positions, ball.measured)))
-    library = build(LIBRARY, cache_dir=sample_cache)
-    (take,) = shown(library, edit, part, *SECONDS)
+    library = build_library(LIBRARY, cache_dir=sample_cache)
+    (take,) = construct_displayed_player(library, edit, part, *SECONDS)
     known = np.isfinite(take.ball.positions).all(axis=1)
     assert np.flatnonzero(known).tolist() == list(range(60, 150)) and len(known) == len(take.motion) == FRAMES
     assert np.array_equal(take.ball.positions[60:150], part.positions) and np.allclose(take.ball.times, ball.times)
 
 
 def test_any_number_of_workers_gives_the_same_bits(made, order_to, tmp_path):
-    make_match(order_to(tmp_path / "two", workers=2))
-    assert kept_files(tmp_path / "two") == kept_files(made[0])
+    synthesize_match(order_to(tmp_path / "two", workers=2))
+    assert read_reproducible_files(tmp_path / "two") == read_reproducible_files(made[0])
 
 
 def command(order):
@@ -139,8 +139,8 @@ def test_a_run_that_was_killed_is_gone_on_with_to_the_same_bits(made, order_to, 
     process.wait()
     assert read_state(order.out)["status"] == "running"
     kept = {path: path.stat().st_mtime_ns for path in (order.out / ".work").rglob("*.npz")}
-    make_match(replace(order, workers=1))
-    assert kept_files(order.out) == kept_files(made[0])
+    synthesize_match(replace(order, workers=1))
+    assert read_reproducible_files(order.out) == read_reproducible_files(made[0])
     assert kept and all(path.stat().st_mtime_ns == when for path, when in kept.items())
 
 
@@ -150,13 +150,13 @@ def test_what_is_cancelled_is_told_and_gone_on_with(made, order_to, tmp_path):
     def progress(fraction, text):
         told.append((fraction, text))
 
-    with pytest.raises(Cancelled):
-        make_match(order, progress, lambda: any("windows" in text for _, text in told))
+    with pytest.raises(UserCancelledError):
+        synthesize_match(order, progress, lambda: any("windows" in text for _, text in told))
     state = read_state(order.out)
     assert state["status"] == "cancelled" and sum(row["units_done"] for row in state["players"]) == 1
     assert [fraction for fraction, _ in told] == sorted(fraction for fraction, _ in told)
-    make_match(order)
-    assert kept_files(order.out) == kept_files(made[0])
+    synthesize_match(order)
+    assert read_reproducible_files(order.out) == read_reproducible_files(made[0])
 
 
 def test_figures_that_are_made_outlast_a_run_that_ends_before_them(made, order_to, tmp_path):
@@ -166,13 +166,13 @@ def test_figures_that_are_made_outlast_a_run_that_ends_before_them(made, order_t
     text = order.out / "annotations" / "away_6.txt"
     words, told = text.read_text(), []
     text.write_text(words + "9.5 kick right\n")
-    with pytest.raises(Cancelled):
-        make_match(order, lambda fraction, line: told.append(line), lambda: any("windows" in line for line in told))
+    with pytest.raises(UserCancelledError):
+        synthesize_match(order, lambda fraction, line: told.append(line), lambda: any("windows" in line for line in told))
     assert read_state(order.out)["status"] == "cancelled"
     text.write_text(words)
-    make_match(order)
+    synthesize_match(order)
     assert len(before) == 3 and before == {path: path.stat().st_mtime_ns for path in before}
-    assert kept_files(order.out) == kept_files(made[0])
+    assert read_reproducible_files(order.out) == read_reproducible_files(made[0])
     assert [row["status"] for row in read_state(order.out)["players"]] == ["done"] * 3
 
 
@@ -182,21 +182,21 @@ def test_a_cut_state_is_told_and_nothing_is_searched_again(made, order_to, tmp_p
     state = order.out / "match.json"
     state.write_bytes(state.read_bytes()[:-2000])
     pieces = {path: path.stat().st_mtime_ns for path in order.out.glob(".work/*/*.npz")}
-    result = make_match(order)
+    result = synthesize_match(order)
     assert [line for line in result.notes if "not valid JSON" in line and "renamed to match.json.damaged" in line]
     assert pieces and pieces == {path: path.stat().st_mtime_ns for path in order.out.glob(".work/*/*.npz")}
     (order.out / "match.json.damaged").unlink()
-    assert kept_files(order.out) == kept_files(made[0])
+    assert read_reproducible_files(order.out) == read_reproducible_files(made[0])
 
 
 def test_edited_words_touch_their_player_and_nobody_else(made, order_to, tmp_path):
     order = order_to(tmp_path / "edited")
     shutil.copytree(made[0], order.out)
-    before, pieces = kept_files(order.out), set((order.out / ".work" / "search").iterdir())
+    before, pieces = read_reproducible_files(order.out), set((order.out / ".work" / "search").iterdir())
     text = order.out / "annotations" / "away_6.txt"
     text.write_text(text.read_text() + "9.5 kick right\n")
-    make_match(order)
-    after = kept_files(order.out)
+    synthesize_match(order)
+    after = read_reproducible_files(order.out)
     assert {name for name in before if before[name] != after[name]} - {"ball.csv"} >= {"away_6.take.npz", "away_6.bvh"}
     others = [name for name in before if "away_6" not in name and name.endswith("take.npz")]
     assert len(others) == 2 and all(before[name] == after[name] for name in others)
@@ -208,14 +208,14 @@ def test_edited_words_touch_their_player_and_nobody_else(made, order_to, tmp_pat
 def test_one_bad_player_stops_nobody(made, order_to, tmp_path):
     (tmp_path / "words").mkdir()
     (tmp_path / "words" / "home_7.txt").write_text("5 kick wrongword\n")
-    result = make_match(order_to(tmp_path / "bad", annotations=tmp_path / "words", figures=True))
-    assert {one.id for one in result.done} == {"away_6", "home_10"}
+    result = synthesize_match(order_to(tmp_path / "bad", annotations=tmp_path / "words", figures=True))
+    assert {one.id for one in result.finished} == {"away_6", "home_10"}
     assert [one.id for one in result.failed] == ["home_7"] and "wrongword" in result.failed[0].reason
     state = read_state(tmp_path / "bad")
     assert state["status"] == "partial"
     assert {row["id"]: row["status"] for row in state["players"]}["home_7"] == "failed"
-    good = kept_files(made[0])
-    assert kept_files(tmp_path / "bad")["away_6.take.npz"] == good["away_6.take.npz"]
+    good = read_reproducible_files(made[0])
+    assert read_reproducible_files(tmp_path / "bad")["away_6.take.npz"] == good["away_6.take.npz"]
 
 
 def test_a_cluster_that_loses_a_worker_gives_the_same_bits(made, order_to, tmp_path, cluster):
@@ -227,5 +227,5 @@ def test_a_cluster_that_loses_a_worker_gives_the_same_bits(made, order_to, tmp_p
             killed.append(processes[1].pid)
             os.kill(processes[1].pid, signal.SIGKILL)
 
-    make_match(order_to(tmp_path / "spread", scheduler=address), progress)
-    assert killed and kept_files(tmp_path / "spread") == kept_files(made[0])
+    synthesize_match(order_to(tmp_path / "spread", scheduler=address), progress)
+    assert killed and read_reproducible_files(tmp_path / "spread") == read_reproducible_files(made[0])

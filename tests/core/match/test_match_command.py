@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from beyond_mocap.cli.main import main
-from beyond_mocap.cli.matching import without
+from beyond_mocap.cli.matching import remove_option
 from beyond_mocap.match.folder import read_state
 from tests.core.match.small_match import LIBRARY, SMALL
 
@@ -97,15 +97,15 @@ def test_words_for_a_time_at_which_nobody_is_there_are_told(match, tmp_path):
 
 
 def test_texts_of_players_who_are_away_are_told_where_everybody_is_asked_for(tmp_path):
-    from beyond_mocap.match.order import MatchOrder
-    from beyond_mocap.match.parts import unused_lines
+    from beyond_mocap.match.order import MatchRequest
+    from beyond_mocap.match.parts import list_unused_labels
 
     for name in ("home_7", "away_9"):
         (tmp_path / f"{name}.txt").write_text("13 kick right\n")
     files = {"home 7": "home_7", "away 9": "away_9", "away 8": "away_8"}
     order = dict(tracking=Path("t"), library=Path("l"), out=Path("o"), annotations=tmp_path)
-    assert unused_lines([], MatchOrder(**order, players=("home 7",)), files) == []
-    (line,) = unused_lines([], MatchOrder(**order), files)
+    assert list_unused_labels([], MatchRequest(**order, players=("home 7",)), files) == []
+    (line,) = list_unused_labels([], MatchRequest(**order), files)
     assert line.startswith("home_7.txt, away_9.txt: ignored")
 
 
@@ -130,7 +130,7 @@ def test_the_events_second_file_and_provider_may_be_named(match, tmp_path):
 
 @pytest.mark.parametrize("written", [["--scene", "x.blend"], ["--scene=x.blend"], ["--sce", "x.blend"], ["--scen=x"]])
 def test_an_option_is_taken_out_however_it_is_written(written):
-    assert without(["match", "--seed", "3", *written, "--json"], "--scene") == ["match", "--seed", "3", "--json"]
+    assert remove_option(["match", "--seed", "3", *written, "--json"], "--scene") == ["match", "--seed", "3", "--json"]
 
 
 @pytest.mark.parametrize("options, status, told", [
@@ -163,7 +163,7 @@ def test_what_is_wrong_is_told_in_one_line(match, tmp_path, monkeypatch, options
     from beyond_mocap.match.pieces import pool
 
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(pool, "_ANSWERS", "500ms")
+    monkeypatch.setattr(pool, "_ANSWER_TIMEOUT", "500ms")
     found, out, error = match(**options)
     assert found == status and len(error) == 1 and told in error[0] and error[0].startswith("beyond-mocap"), error
     assert out == "" and "Traceback" not in error[0]

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from beyond_mocap.base.errors import InputError
-from beyond_mocap.match.report.page import page
-from beyond_mocap.match.report.pictures import colours, heat_strip
-from beyond_mocap.match.report.results import LIMITS, read_match_results, worst_seconds
+from beyond_mocap.match.report.page import build_match_page
+from beyond_mocap.match.report.pictures import compute_colours, render_heat_strip
+from beyond_mocap.match.report.results import LIMITS, read_match_results, find_worst_seconds
 
 SECONDS, FIRST = 60, 100.0
 
@@ -80,7 +80,7 @@ def test_planted_bad_seconds_come_first_and_in_order(tmp_path):
         "b": report(skate_cm_s=column(2.0, s40=70.0)),
         "c": report(root_error_m=column(0.002, s20=0.045, s21=0.040, s22=0.016)),
     }
-    found = worst_seconds(read_match_results(written(tmp_path, reports)).players)
+    found = find_worst_seconds(read_match_results(written(tmp_path, reports)).players)
     assert [(one.player.id, one.time, one.figure) for one in found] == [
         ("a", 110.0, "root_error_m"), ("b", 140.0, "skate_cm_s"), ("c", 120.0, "root_error_m"),
     ]
@@ -90,20 +90,20 @@ def test_planted_bad_seconds_come_first_and_in_order(tmp_path):
 def test_two_bodies_in_each_other_are_one_second_of_both(tmp_path):
     deep = {"overlap_m": column(0.0, s30=0.08)}
     folder = written(tmp_path, {"a": report(**deep), "b": report(), "c": report(**deep)})
-    found = worst_seconds(read_match_results(folder).players)
+    found = find_worst_seconds(read_match_results(folder).players)
     assert [(one.player.id, one.other.id, one.value) for one in found] == [("a", "c", 0.08)]
 
 
 def test_at_most_ten_and_none_within_the_limits(tmp_path):
     busy = report(root_error_m=column(0.002, **{f"s{row}": 0.03 + 0.001 * row for row in range(0, 60, 4)}))
-    assert len(worst_seconds(read_match_results(written(tmp_path, {"a": busy})).players)) == 10
+    assert len(find_worst_seconds(read_match_results(written(tmp_path, {"a": busy})).players)) == 10
     edge = report(root_error_m=[LIMITS["root_error_m"]] * SECONDS)
-    assert worst_seconds(read_match_results(written(tmp_path, {"a": edge})).players) == ()
+    assert find_worst_seconds(read_match_results(written(tmp_path, {"a": edge})).players) == ()
 
 
 def test_the_page_tells_who_when_and_which_frame(tmp_path):
     folder = written(tmp_path, {"a": report(root_error_m=column(0.002, s10=0.30)), "b": report()})
-    text = page(folder)
+    text = build_match_page(folder)
     assert "110 s (1:50)" in text and "frame 300" in text
     assert "30.0 cm off the track" in text and "ball 20.0 m away" in text
     assert "bpy.ops.beyond_mocap.match_second(seconds=110, player=&#x27;a&#x27;)" in text
@@ -114,14 +114,14 @@ def test_the_page_tells_who_when_and_which_frame(tmp_path):
 @pytest.mark.parametrize("start, frame", [(FIRST, 210), (FIRST + 0.01, 209), (FIRST + 7.9, 0)])
 def test_frames_count_from_the_first_on_the_clocks_grid(tmp_path, start, frame):
     """Second 107 begins with frame 3210 of the clock; 100.01 s lie between its frames 3000 and 3001."""
-    text = page(written(tmp_path, {"a": report(root_error_m=column(0.002, s7=0.08))}, from_s=start))
+    text = build_match_page(written(tmp_path, {"a": report(root_error_m=column(0.002, s7=0.08))}, from_s=start))
     assert f"</b>, frame {frame}:" in text
 
 
 def test_nothing_is_loaded_all_is_escaped_and_links_lead_somewhere(tmp_path):
     reports = {name: report(root_error_m=column(0.002, s10=0.1)) for name in ("a", "b", "c")}
     reports["c"]["warnings"] = ["<script>alert(1)</script>"]
-    text = page(written(tmp_path, reports))
+    text = build_match_page(written(tmp_path, reports))
     tags = Tags(text)
     assert "script" not in tags.tags and tags.outside == [] and "url(" not in text and "@import" not in text
     assert set(tags.links) <= {f"#{name}" for name in tags.ids} and len(tags.ids) == len(set(tags.ids))
@@ -132,7 +132,7 @@ def test_failed_and_unreadable_players_are_marked_and_the_rest_is_told(tmp_path)
     folder = written(tmp_path, {"a": report(), "b": None, "c": report(), "d": report()})
     (folder / "file-c.report.json").write_text('{"fps": 30.0, "per_sec', "utf-8")
     (folder / "file-d.report.json").unlink()
-    text = page(folder)
+    text = build_match_page(folder)
     assert "1 of 4 players finished" in text and "Partial: 3 not finished" in text
     assert "no &lt;bones&gt; &amp; no luck" in text and "cannot be read" in text
     assert "file-d.report.json is missing" in text
@@ -142,21 +142,21 @@ def test_what_all_reports_say_is_told_once_and_not_counted(tmp_path):
     reports = {name: report() for name in ("a", "b", "c")}
     for name, one in reports.items():
         one["warnings"] = ["unit guessed", f"only {name} slides"]
-    text = page(written(tmp_path, reports))
+    text = build_match_page(written(tmp_path, reports))
     assert text.count("unit guessed") == 1 and all(text.count(f"only {name} slides") == 1 for name in reports)
 
 
 def test_a_player_who_comes_late_and_unknown_values(tmp_path):
     late = {"start_s": FIRST + 50.0, "root_error_m": [0.002, None, 0.09], "skate_cm_s": [1.0], "overlap_m": "none"}
     one = {**report(), "per_second": late}
-    found = worst_seconds(read_match_results(written(tmp_path, {"a": one})).players)
+    found = find_worst_seconds(read_match_results(written(tmp_path, {"a": one})).players)
     assert [(second.time, second.value) for second in found] == [(152.0, 0.09)]
-    assert "152 s" in page(tmp_path)
+    assert "152 s" in build_match_page(tmp_path)
 
 
 @pytest.mark.parametrize("changed", [{"to_s": 1e12}, {"to_s": 10**400}, {"from_s": -1e300}])
 def test_seconds_that_no_match_has_do_not_stop_the_page(tmp_path, changed):
-    text = page(written(tmp_path, {"a": report(root_error_m=column(0.002, s7=0.08))}, **changed))
+    text = build_match_page(written(tmp_path, {"a": report(root_error_m=column(0.002, s7=0.08))}, **changed))
     assert "1 of 1 players finished" in text and "8.0 cm off the track" in text
 
 
@@ -167,7 +167,7 @@ def test_seconds_that_no_match_has_do_not_stop_the_page(tmp_path, changed):
 ])
 def test_odd_values_of_one_player_touch_nobody_else(tmp_path, changed, told):
     folder = written(tmp_path, {"a": {**report(), **changed}, "b": report(root_error_m=column(0.002, s7=0.08))})
-    text = page(folder)
+    text = build_match_page(folder)
     assert told in text and f"{1 if told else 2} of 2 players finished" in text and "8.0 cm off the track" in text
 
 
@@ -176,21 +176,21 @@ def test_odd_values_of_one_player_touch_nobody_else(tmp_path, changed, told):
 def test_a_broken_match_json_is_told_in_one_line(tmp_path, told):
     (tmp_path / "match.json").write_text(told, "latin-1")
     with pytest.raises(InputError, match="match.json") as caught:
-        page(tmp_path)
+        build_match_page(tmp_path)
     assert "\n" not in str(caught.value)
 
 
 def test_an_empty_folder_and_an_empty_match(tmp_path):
     with pytest.raises(InputError, match="match.json"):
-        page(tmp_path)
+        build_match_page(tmp_path)
     (tmp_path / "match.json").write_text('{"players": []}', "utf-8")
-    assert "0 of 0 players finished" in page(tmp_path)
+    assert "0 of 0 players finished" in build_match_page(tmp_path)
 
 
 def test_reports_without_seconds_still_make_a_page(tmp_path):
     one = report()
     del one["per_second"]
-    assert "No report has figures by the second" in page(written(tmp_path, {"a": one, "b": {"version": 1}}))
+    assert "No report has figures by the second" in build_match_page(written(tmp_path, {"a": one, "b": {"version": 1}}))
 
 
 def test_a_thumbnail_is_asked_for_each_worst_second_and_shown_the_right_way_up(tmp_path):
@@ -202,7 +202,7 @@ def test_a_thumbnail_is_asked_for_each_worst_second_and_shown_the_right_way_up(t
         pose[0] = (1.0, 0.0, 0.0, 1.0)  # the lowest row
         return pose
 
-    text = page(written(tmp_path, {"a": report(root_error_m=column(0.002, s10=0.3)), "b": report()}), draw)
+    text = build_match_page(written(tmp_path, {"a": report(root_error_m=column(0.002, s10=0.3)), "b": report()}), draw)
     assert asked == [("a", 110.5)] and text.count("class=pose") == 1
     data = base64.b64decode(text.split("class=pose")[1].split("base64,")[1].split('"')[0])
     assert decoded(data)[-1, 0].tolist() == [255, 0, 0, 255] and decoded(data)[0, 0].tolist() == [0, 0, 0, 0]
@@ -221,13 +221,13 @@ def test_a_strip_shows_the_worst_of_each_cell():
     bad = np.full(2700, 0.2)
     bad[1234] = 5.0
     bad[300:320] = np.nan
-    row = decoded(heat_strip(bad, 0.0, (0.0, 2700.0)))[0]
+    row = decoded(render_heat_strip(bad, 0.0, (0.0, 2700.0)))[0]
     assert row.shape == (900, 3)
-    assert row[1234 // 3].tolist() == colours(np.array(5.0)).tolist()
-    assert row[303 // 3].tolist() == colours(np.array(np.nan)).tolist()
-    assert row[0].tolist() == colours(np.array(0.2)).tolist()
+    assert row[1234 // 3].tolist() == compute_colours(np.array(5.0)).tolist()
+    assert row[303 // 3].tolist() == compute_colours(np.array(np.nan)).tolist()
+    assert row[0].tolist() == compute_colours(np.array(0.2)).tolist()
 
 
 def test_a_strip_leaves_out_what_lies_beyond_its_span():
-    row = decoded(heat_strip(np.full(10, 5.0), 95.0, (100.0, 120.0)))[0]
-    assert (row[:5] == colours(np.array(5.0))).all() and (row[5:] == colours(np.array(np.nan))).all()
+    row = decoded(render_heat_strip(np.full(10, 5.0), 95.0, (100.0, 120.0)))[0]
+    assert (row[:5] == compute_colours(np.array(5.0))).all() and (row[5:] == compute_colours(np.array(np.nan))).all()

@@ -7,9 +7,9 @@ import time
 
 import pytest
 
-from beyond_mocap.base.errors import Cancelled, InputError
+from beyond_mocap.base.errors import UserCancelledError, InputError
 from beyond_mocap.match.pieces import pool
-from beyond_mocap.match.pieces.pool import Failed, Workplace, run
+from beyond_mocap.match.pieces.pool import TaskFailure, WorkerConfig, run_tasks
 
 
 def numbers(count, *more):
@@ -18,13 +18,13 @@ def numbers(count, *more):
 
 @pytest.mark.parametrize("workers", [1, 2])
 def test_everything_is_done_once(chores, workers):
-    assert sorted(run(numbers(9), chores.square, Workplace(workers))) == [(n, n * n) for n in range(9)]
+    assert sorted(run_tasks(numbers(9), chores.square, WorkerConfig(workers))) == [(n, n * n) for n in range(9)]
 
 
 @pytest.mark.parametrize("workers", [1, 2])
 def test_what_fails_fails_alone_and_says_why(chores, workers):
-    found = dict(run(numbers(5), chores.odd, Workplace(workers)))
-    assert found == {0: 0, 2: 2, 4: 4, 1: Failed("ValueError: 1 is odd"), 3: Failed("ValueError: 3 is odd")}
+    found = dict(run_tasks(numbers(5), chores.odd, WorkerConfig(workers)))
+    assert found == {0: 0, 2: 2, 4: 4, 1: TaskFailure("ValueError: 1 is odd"), 3: TaskFailure("ValueError: 3 is odd")}
 
 
 def test_tasks_are_taken_only_as_far_as_there_are_workers(chores):
@@ -35,20 +35,20 @@ def test_tasks_are_taken_only_as_far_as_there_are_workers(chores):
             taken.append(task)
             yield task
 
-    going = run(watched(), chores.square, Workplace(2))
+    going = run_tasks(watched(), chores.square, WorkerConfig(2))
     next(going)
-    assert len(taken) <= 2 * pool.AHEAD + 1
+    assert len(taken) <= 2 * pool.PIECES_PER_WORKER + 1
     assert len(list(going)) == 39
 
 
 def test_a_worker_that_is_killed_costs_nothing(chores, tmp_path):
-    found = dict(run(numbers(8, tmp_path, 1), chores.deadly, Workplace(2)))
+    found = dict(run_tasks(numbers(8, tmp_path, 1), chores.deadly, WorkerConfig(2)))
     assert {key: value[0] for key, value in found.items()} == {n: n for n in range(8)}
 
 
 def test_a_worker_that_ends_while_results_are_looked_at_costs_nothing(chores):
     """The pool is broken before anything else is handed out."""
-    going = run([(number, (0.01,)) for number in range(12)], chores.slow, Workplace(2))
+    going = run_tasks([(number, (0.01,)) for number in range(12)], chores.slow, WorkerConfig(2))
     found = [next(going)]
     os.kill(found[0][1], signal.SIGKILL)
     time.sleep(1.0)
@@ -57,48 +57,48 @@ def test_a_worker_that_ends_while_results_are_looked_at_costs_nothing(chores):
 
 
 def test_a_piece_that_kills_every_worker_fails_alone(chores, tmp_path):
-    found = dict(run(numbers(8, tmp_path, 99), chores.deadly, Workplace(2)))
+    found = dict(run_tasks(numbers(8, tmp_path, 99), chores.deadly, WorkerConfig(2)))
     assert "worker process ended" in found.pop(3).reason
     assert {key: value[0] for key, value in found.items()} == {n: n for n in range(8) if n != 3}
 
 
 def test_cancelling_does_not_wait_for_the_work(chores):
     begun = time.monotonic()
-    with pytest.raises(Cancelled):
-        list(run([(n, (60.0,)) for n in range(4)], chores.slow, Workplace(2), lambda: time.monotonic() > begun + 1.0))
+    with pytest.raises(UserCancelledError):
+        list(run_tasks([(n, (60.0,)) for n in range(4)], chores.slow, WorkerConfig(2), lambda: time.monotonic() > begun + 1.0))
     assert time.monotonic() - begun < 10.0
 
 
 def test_what_pieces_took_is_told(chores):
     told = []
-    list(run(numbers(3), chores.square, Workplace(2), spent=told.append))
+    list(run_tasks(numbers(3), chores.square, WorkerConfig(2), report_result=told.append))
     assert len(told) == 3 and all(5.0 < one.memory < 1000.0 and 0.0 <= one.seconds < 5.0 for one in told)
 
 
 def test_fewer_than_one_worker_is_told():
     with pytest.raises(InputError, match="workers: 0; expected 1 or more"):
-        Workplace(0)
+        WorkerConfig(0)
 
 
 def test_a_scheduler_that_does_not_answer_is_told(chores, monkeypatch):
-    monkeypatch.setattr(pool, "_ANSWERS", "500ms")
+    monkeypatch.setattr(pool, "_ANSWER_TIMEOUT", "500ms")
     for address in ("tcp://127.0.0.1:9", "nonsense://x"):
         with pytest.raises(InputError, match="scheduler: .* does not answer"):
-            list(run(numbers(1), chores.square, Workplace(1, address)))
+            list(run_tasks(numbers(1), chores.square, WorkerConfig(1, address)))
 
 
 def test_a_cluster_does_the_same_though_a_worker_is_killed_midway(chores, cluster):
     address, processes = cluster
     tasks = [(n, (0.1,)) for n in range(30)]
     found, killed = {}, False
-    for key, pid in run(tasks, chores.slow, Workplace(1, address)):
+    for key, pid in run_tasks(tasks, chores.slow, WorkerConfig(1, address)):
         found[key] = pid
         if len(set(found.values())) == 2 and not killed:
             killed = True
             os.kill(processes[1].pid, signal.SIGKILL)
     assert killed and set(found) == set(range(30))
     assert all(isinstance(pid, int) for pid in found.values())
-    assert sorted(run(numbers(9), chores.square, Workplace(1, address))) == [(n, n * n) for n in range(9)]
+    assert sorted(run_tasks(numbers(9), chores.square, WorkerConfig(1, address))) == [(n, n * n) for n in range(9)]
 
 
 @pytest.mark.parametrize("gone, told", [([0, 1, 2], "the scheduler has stopped"), ([1, 2], "no worker for 1 s")])
@@ -107,4 +107,4 @@ def test_a_cluster_that_goes_away_is_told(chores, cluster, monkeypatch, gone, to
     monkeypatch.setattr(pool, "PATIENCE", 1.0)
     threading.Timer(2.0, lambda: [processes[number].kill() for number in gone]).start()
     with pytest.raises(InputError, match=f"scheduler: {told}"):
-        list(run([(n, (60.0,)) for n in range(4)], chores.slow, Workplace(1, address)))
+        list(run_tasks([(n, (60.0,)) for n in range(4)], chores.slow, WorkerConfig(1, address)))

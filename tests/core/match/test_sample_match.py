@@ -32,13 +32,13 @@ def test_the_small_match_is_what_its_script_makes(small, tmp_path):
 def test_the_small_match_could_be_played(small):
     times = np.arange(0.0, small.SECONDS, 0.02)
     for player in small.PLAYERS:
-        path = small.player_at(player, times)
+        path = small.compute_player(player, times)
         there = np.isfinite(path[:, 0])
         velocity = np.gradient(path[there], times[there], axis=0)
         assert np.linalg.norm(velocity, axis=1).max() < 7.5, player
         assert np.linalg.norm(np.gradient(velocity, times[there], axis=0), axis=1).max() < 6.0, player
     for one in small.played():
-        away = one.position[:2] - small.player_at(one.touch.player, np.array([one.time]))[0]
+        away = one.position[:2] - small.compute_player(one.touch.player, np.array([one.time]))[0]
         assert 0.15 < np.linalg.norm(away) < 0.45, one.time
 
 

@@ -8,10 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from beyond_mocap.base.errors import InputError
-from beyond_mocap.match.pieces.named_edit import NamedEdit, NamedKey, bound, chained, named, part, retabled, table
-from beyond_mocap.match.pieces.units import units_of
-from beyond_mocap.match.pieces.windows import spliced
-from beyond_mocap.synthesis.search.edit_list import find_seams
+from beyond_mocap.match.pieces.named_edit import NamedEdit, NamedKey, to_library_edit, join_named_edits, to_named_edit, cut_named_edit, renumber_clips, list_clips
+from beyond_mocap.match.pieces.units import build_units
+from beyond_mocap.match.pieces.windows import join_pieces
+from beyond_mocap.synthesis.search.edit_list import find_transitions
 from beyond_mocap.synthesis.synthesize import synthesize
 
 from .conftest import KICK_TIME
@@ -40,8 +40,8 @@ def test_parts_of_an_edit_list_chained_are_the_whole(edit, data):
     at = data.draw(st.integers(1, max(1, len(edit) - 1)))
     if at >= len(edit):
         return
-    parts = part(edit, 0, at), part(edit, at, len(edit))
-    again = chained(parts, ())
+    parts = cut_named_edit(edit, 0, at), cut_named_edit(edit, at, len(edit))
+    again = join_named_edits(parts, ())
     assert (len(parts[0]), len(parts[1]), len(again)) == (at, len(edit) - at, len(edit))
     assert all(np.array_equal(a, b) for a, b in zip(again.frames(), edit.frames()))
     assert set(again.seams) - {at} == set(edit.seams) - {at}
@@ -50,29 +50,29 @@ def test_parts_of_an_edit_list_chained_are_the_whole(edit, data):
 @given(edits())
 def test_another_table_names_the_same_clips(edit):
     clips = (("b.bvh", False), ("z.bvh", True), ("a.bvh", True), ("a.bvh", False))
-    other = retabled(replace(edit, keys=(NamedKey(
+    other = renumber_clips(replace(edit, keys=(NamedKey(
         time=1.0, clip=2, frame=3.0, start=1.0, end=5.0, words=("kick",),
     ),)), clips)
     assert [clips[c] for c in other.clip] == [edit.clips[c] for c in edit.clip]
-    assert clips[other.keys[0].clip] == edit.clips[2] and table([other, edit])[0] == ("a.bvh", False)
+    assert clips[other.keys[0].clip] == edit.clips[2] and list_clips([other, edit])[0] == ("a.bvh", False)
 
 
 def test_an_edit_list_comes_back_from_its_names(library, take):
-    whole = library.extended
+    whole = library.with_synthetic_clips
     moments = take.plan.timeline.keys
-    again = bound(whole, named(whole, take.edit, moments), moments)
+    again = to_library_edit(whole, to_named_edit(whole, take.edit, moments), moments)
     assert np.array_equal(again.clip, take.edit.clip) and np.allclose(again.frame, take.edit.frame, atol=1e-6)
-    assert np.array_equal(again.seams, take.edit.seams) and again.keys == take.edit.keys
+    assert np.array_equal(again.transitions, take.edit.transitions) and again.keys == take.edit.keys
 
 
 def test_a_library_in_another_order_shows_the_same(library, take):
-    clips, frames = library.extended.clips, library.extended.frames
-    edit = named(library.extended, take.edit, take.plan.timeline.keys)
+    clips, frames = library.with_synthetic_clips.clips, library.with_synthetic_clips.frames
+    edit = to_named_edit(library.with_synthetic_clips, take.edit, take.plan.timeline.keys)
     turned = replace(
-        library.extended, clips=clips[::-1],
+        library.with_synthetic_clips, clips=clips[::-1],
         frames=replace(frames, first=np.cumsum([0, *frames.count[:0:-1]]), count=frames.count[::-1]),
     )  # fmt: skip
-    other = bound(turned, edit)
+    other = to_library_edit(turned, edit)
     assert all(
         turned.clips[a] is clips[b] and abs((f - turned.frames.first[a]) - (g - frames.first[b])) < 1e-6
         for a, f, b, g in zip(other.clip, other.frame, take.edit.clip, take.edit.frame)
@@ -80,7 +80,7 @@ def test_a_library_in_another_order_shows_the_same(library, take):
 
 
 def test_windows_that_agree_are_joined_without_a_seam(library, weaving_plan, weaving_pieces):
-    player, joints = spliced(library, [weaving_plan], weaving_pieces)
+    player, joints = join_pieces(library, [weaving_plan], weaving_pieces)
     edit = player.stretches[0].edit
     assert len(joints) == len(weaving_pieces) - 1 and len(edit) == 751
     clip, frame = edit.frames()
@@ -89,7 +89,7 @@ def test_windows_that_agree_are_joined_without_a_seam(library, weaving_plan, wea
         if joint.agreed and at not in weaving_seams(weaving_pieces):
             assert clip[at] == clip[at - 1] and abs(frame[at] - frame[at - 1] - 1.0) < 0.3
     assert [key.time for key in edit.keys] == [KICK_TIME]
-    jumps = find_seams(clip, frame)
+    jumps = find_transitions(clip, frame)
     assert set(jumps) <= set(edit.seams)
 
 
@@ -102,15 +102,15 @@ def test_the_same_search_cut_in_two_agrees_everywhere(library, weaving_plan, wea
     whole = max(weaving_pieces, key=lambda piece: len(piece.edit))
     length = len(whole.edit)
     edge = whole.first + length // 2
-    first = replace(whole, number=0, edit=part(whole.edit, 0, length // 2 + 40), own=(whole.first, edge))
-    second = replace(whole, number=1, first=edge - 40, edit=part(whole.edit, length // 2 - 40, length),
+    first = replace(whole, number=0, edit=cut_named_edit(whole.edit, 0, length // 2 + 40), own=(whole.first, edge))
+    second = replace(whole, number=1, first=edge - 40, edit=cut_named_edit(whole.edit, length // 2 - 40, length),
                      own=(edge, whole.first + length))  # fmt: skip
-    unit = units_of(weaving_plan, window=8.0, overlap=3.0)[whole.number]
+    unit = build_units(weaving_plan, window=8.0, overlap=3.0)[whole.number]
     shifted = [replace(piece, first=piece.first - whole.first, own=tuple(f - whole.first for f in piece.own))
                for piece in (second, first)]  # fmt: skip
-    player, joints = spliced(library, [unit.plan], shifted)
+    player, joints = join_pieces(library, [unit.plan], shifted)
     assert joints[0].agreed and joints[0].frame == edge - whole.first
-    whole = replace(whole, edit=retabled(whole.edit, player.stretches[0].edit.clips))
+    whole = replace(whole, edit=renumber_clips(whole.edit, player.stretches[0].edit.clips))
     assert all(np.allclose(a, b, atol=1e-9) for a, b in zip(player.stretches[0].edit.frames(), whole.edit.frames()))
     assert np.array_equal(player.stretches[0].edit.seams, whole.edit.seams)
 
@@ -124,7 +124,7 @@ def test_windows_that_never_agree_meet_at_the_cheapest_place(library, weaving_pl
                          cut=[True])
     pieces[1] = replace(pieces[1], edit=standing)
     assert library.frames.count[other] > 100
-    player, joints = spliced(library, [weaving_plan], pieces)
+    player, joints = join_pieces(library, [weaving_plan], pieces)
     assert not joints[0].agreed and joints[0].frame in player.stretches[0].edit.seams
     low, high = pieces[1].first, pieces[0].first + len(pieces[0].edit)
     assert low < joints[0].frame < high
@@ -132,11 +132,11 @@ def test_windows_that_never_agree_meet_at_the_cheapest_place(library, weaving_pl
 
 def test_a_window_that_is_missing_is_told(library, weaving_plan, weaving_pieces):
     with pytest.raises(InputError, match="all windows of a stretch"):
-        spliced(library, [weaving_plan], weaving_pieces[1:])
+        join_pieces(library, [weaving_plan], weaving_pieces[1:])
 
 
 def test_a_clip_that_is_missing_is_told(library, weaving_player):
     edit = weaving_player.stretches[0].edit
     edit = replace(edit, clips=(("gone.bvh", True), *edit.clips[1:]))
     with pytest.raises(InputError, match=r"no clip gone.bvh \(mirrored\)"):
-        bound(library.extended, edit)
+        to_library_edit(library.with_synthetic_clips, edit)

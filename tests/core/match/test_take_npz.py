@@ -13,9 +13,9 @@ from beyond_mocap.annotation import KeyMoment, Span, Timeline
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.match.crowd.correction import CURVES, Correction
 from beyond_mocap.match.pieces.named_edit import NamedEdit, NamedKey
-from beyond_mocap.match.player_edit import PlayerEdit, Stretch, kept, read_player, write_player
+from beyond_mocap.match.player_edit import PlayerEdit, Stretch, to_stored_plan, read_player, write_player
 from beyond_mocap.motion.track import Track
-from beyond_mocap.synthesis.plan import Pin, Plan, SolvedCourse, Touched
+from beyond_mocap.synthesis.plan import Pin, Plan, SolvedTrajectory, PlayerTouch
 
 RUNS = ("clip", "first", "rate", "length", "cut")
 ARRAYS = ("positions", "ball", "times", "filled", "outlier", "ball_height_known")
@@ -27,7 +27,7 @@ def made_player(seed: int = 3) -> PlayerEdit:
     curves = np.zeros((60, CURVES))
     curves[10:40, :2] = 0.1
     stretches = tuple(made_stretch(random, begin) for begin in (0.04, 2000.0))
-    return PlayerEdit("home_7", 30.0, stretches, Correction.of(curves, 100, 25.0))
+    return PlayerEdit("home_7", 30.0, stretches, Correction.from_curves(curves, 100, 25.0))
 
 
 def made_stretch(random, begin: float) -> Stretch:
@@ -40,13 +40,13 @@ def made_stretch(random, begin: float) -> Stretch:
     fine = np.arange(times[0], times[-1], 0.01)
     course = random.normal(size=(len(fine), 3))
     course[:30] = np.nan
-    touches = (Touched(begin + 1.0, True, "foot", "kick"), Touched(begin + 3.1, None, "", "receive"))
+    touches = (PlayerTouch(begin + 1.0, True, "foot", "kick"), PlayerTouch(begin + 3.1, None, "", "receive"))
     timeline = Timeline(
         (Span(begin, begin + 2.0, ("walking",), avoid=("kick",)),), (KeyMoment(begin + 1.1, ("kick", "left")),)
     )
     plan = Plan(
         track=track, timeline=timeline, library="clips", nearest=True, seed=9, fps=25.0, height=1.83,
-        solve_touches=True, solved=SolvedCourse(fine, course, random.random(len(fine)) < 0.2, touches),
+        solve_touches=True, solved=SolvedTrajectory(fine, course, random.random(len(fine)) < 0.2, touches),
         style=("academy",),
         gaits=(("walking", "walk.bvh"),), strong_foot="left",
         pins=(Pin(begin + 2.0, "gaze", (0.0, 1.0, 1.5), 0.5),),
@@ -56,7 +56,7 @@ def made_stretch(random, begin: float) -> Stretch:
                      keys=(NamedKey(
                          time=begin + 1.1, clip=1, frame=20.5, start=10.0, end=30.0, words=("kick", "left"),
                      ),))  # fmt: skip
-    return Stretch(kept(plan), edit, ("the library has no clip for 'bow'",), ((begin, begin + 1.0),))
+    return Stretch(to_stored_plan(plan), edit, ("the library has no clip for 'bow'",), ((begin, begin + 1.0),))
 
 
 @pytest.fixture(scope="module")

@@ -5,13 +5,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from beyond_mocap.appearance.picture import pose_picture
-from beyond_mocap.library.build import build
-from beyond_mocap.match.make import make_match
-from beyond_mocap.match.order import MatchOrder
+from beyond_mocap.appearance.picture import render_pose
+from beyond_mocap.library.build import build_library
+from beyond_mocap.match.make import synthesize_match
+from beyond_mocap.match.order import MatchRequest
 from beyond_mocap.match.player_edit import read_player
-from beyond_mocap.match.report.pictures import SIZE, thumbnails
-from beyond_mocap.match.shown import shown
+from beyond_mocap.match.report.pictures import PICTURE_SIZE, build_thumbnail_renderer
+from beyond_mocap.match.shown import construct_displayed_player
 
 SAMPLE = Path(__file__).resolve().parents[3] / "sample_blend"
 
@@ -20,29 +20,29 @@ SAMPLE = Path(__file__).resolve().parents[3] / "sample_blend"
 def made(sample_cache, tmp_path_factory):
     """Four seconds of one player of the sample's match, and the library."""
     place = tmp_path_factory.mktemp("thumbnails")
-    order = MatchOrder(
+    order = MatchRequest(
         tracking=SAMPLE / "match" / "small" / "small.dat", library=SAMPLE / "library", out=place / "made",
         cache=sample_cache, start=2.0, end=6.0, players=("home_1",), solve_touches=False, figures=False, workers=1,
     )  # fmt: skip
-    assert make_match(order).failed == ()
-    return place / "made", build(order.library, cache_dir=order.cache)
+    assert synthesize_match(order).failed == ()
+    return place / "made", build_library(order.library, cache_dir=order.cache)
 
 
 def test_a_picture_is_the_pose_of_that_second(made):
     folder, library = made
-    take = shown(library, read_player(folder / "home_1.take.npz"), None, 2.0, 6.0)[0]
-    draw = thumbnails(library, folder)
+    take = construct_displayed_player(library, read_player(folder / "home_1.take.npz"), None, 2.0, 6.0)[0]
+    draw = build_thumbnail_renderer(library, folder)
     for second in (2.5, 4.0):
         frame = round((second - take.start_time) * take.motion.fps)
         near = range(frame - 9, frame + 10, 3)
         picture = draw("home_1", second)
-        off = [np.abs(picture - pose_picture(take.motion, one, SIZE)).mean() for one in near]
+        off = [np.abs(picture - render_pose(take.motion, one, PICTURE_SIZE)).mean() for one in near]
         assert near[int(np.argmin(off))] == frame and min(off) < 0.2 * np.median(off)
 
 
 def test_there_is_none_where_he_is_not_or_his_file_is_broken(made):
     folder, library = made
-    draw = thumbnails(library, folder)
+    draw = build_thumbnail_renderer(library, folder)
     assert draw("home_1", 30.0) is None
     (folder / "home_1.take.npz").write_bytes(b"none")
     assert draw("home_1", 2.5) is None

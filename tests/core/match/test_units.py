@@ -8,18 +8,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from beyond_mocap.annotation import KeyMoment, Span, Timeline
-from beyond_mocap.base.errors import Cancelled, InputError
-from beyond_mocap.match.pieces.units import cut_plan, cut_track, frame_count, units_of, window_edges
-from beyond_mocap.match.pieces.windows import searched
-from beyond_mocap.match.player_edit import kept
-from beyond_mocap.motion.track import Track, sample
-from beyond_mocap.synthesis.plan import Plan, SolvedCourse, Touched
+from beyond_mocap.base.errors import UserCancelledError, InputError
+from beyond_mocap.match.pieces.units import cut_plan, cut_track, count_frames, build_units, build_window_edges
+from beyond_mocap.match.pieces.windows import search_window
+from beyond_mocap.match.player_edit import to_stored_plan
+from beyond_mocap.motion.track import Track, sample_track
+from beyond_mocap.synthesis.plan import Plan, SolvedTrajectory, PlayerTouch
 from beyond_mocap.synthesis.search.offer import SLOT
 
 
 @given(st.floats(0.0, 500.0), st.integers(60, 20000), st.sampled_from([10.0, 30.0, 60.0]))
 def test_windows_follow_each_other_and_lie_on_the_clock(begin, count, window):
-    edges = window_edges(begin, count, window)
+    edges = build_window_edges(begin, count, window)
     assert edges[0] == 0 and edges[-1] == count and np.all(np.diff(edges) > 0)
     for edge in edges[1:-1]:
         time = begin + edge / 30.0
@@ -28,16 +28,16 @@ def test_windows_follow_each_other_and_lie_on_the_clock(begin, count, window):
 
 
 def test_a_part_of_a_stretch_is_laid_out_in_the_windows_of_the_whole():
-    whole, part = window_edges(5.0, 6000, 30.0, step=1), window_edges(65.0, 1800, 30.0, step=1)
+    whole, part = build_window_edges(5.0, 6000, 30.0, step=1), build_window_edges(65.0, 1800, 30.0, step=1)
     assert {edge + 1800 for edge in part[1:-1]} <= set(whole)
 
 
 def test_units_cover_a_stretch_and_share_their_overlaps(weaving_plan):
-    units = units_of(weaving_plan, 3, window=8.0, overlap=3.0)
+    units = build_units(weaving_plan, 3, window=8.0, overlap=3.0)
     assert [unit.number for unit in units] == list(range(len(units))) and len(units) == 4
     assert {(unit.player, unit.stretch) for unit in units} == {("home_7", 3)}
     assert [unit.own for unit in units[1:]] == [(a.own[1], b.own[1]) for a, b in zip(units, units[1:])]
-    assert units[0].own[0] == 0 and units[-1].own[1] == frame_count(weaving_plan)
+    assert units[0].own[0] == 0 and units[-1].own[1] == count_frames(weaving_plan)
     for unit in units:
         assert unit.start == pytest.approx(5.0 + unit.own[0] / 30.0)
         assert unit.plan.track.times[0] == pytest.approx(5.0 + unit.first / 30.0, abs=1e-9)
@@ -46,37 +46,37 @@ def test_units_cover_a_stretch_and_share_their_overlaps(weaving_plan):
 
 
 def test_a_unit_that_has_travelled_finds_the_same(library, weaving_plan, weaving_pieces):
-    unit = units_of(weaving_plan, window=8.0, overlap=3.0)[2]
-    piece = pickle.loads(pickle.dumps(searched(library, pickle.loads(pickle.dumps(unit)))))
+    unit = build_units(weaving_plan, window=8.0, overlap=3.0)[2]
+    piece = pickle.loads(pickle.dumps(search_window(library, pickle.loads(pickle.dumps(unit)))))
     same = weaving_pieces[2]
     assert (piece.first, piece.own, piece.warnings) == (same.first, same.own, same.warnings)
     assert piece.edit.clips == same.edit.clips
     assert all(np.array_equal(a, b) for a, b in zip(piece.edit.frames(), same.edit.frames()))
     assert piece.edit.keys == same.edit.keys and len(piece.edit.keys) == 1 and piece.seconds > 0.0
-    assert len(piece.edit) == frame_count(unit.plan)
+    assert len(piece.edit) == count_frames(unit.plan)
 
 
 def test_a_search_that_is_cancelled_ends(library, weaving_plan):
-    with pytest.raises(Cancelled):
-        searched(library, units_of(weaving_plan, window=8.0, overlap=3.0)[0], lambda: True)
+    with pytest.raises(UserCancelledError):
+        search_window(library, build_units(weaving_plan, window=8.0, overlap=3.0)[0], lambda: True)
 
 
 def test_a_search_in_a_hurry_says_from_where_on(library, weaving_plan):
-    unit = units_of(weaving_plan, window=8.0, overlap=3.0)[0]
+    unit = build_units(weaving_plan, window=8.0, overlap=3.0)[0]
     asked = iter([False] * 4 + [True] * 10000)
-    piece = searched(library, unit, hurry=lambda: next(asked))
-    assert piece.hurried is not None and 0 < piece.hurried < len(piece.edit) == frame_count(unit.plan)
+    piece = search_window(library, unit, hurry=lambda: next(asked))
+    assert piece.hurried is not None and 0 < piece.hurried < len(piece.edit) == count_frames(unit.plan)
 
 
 @pytest.mark.parametrize("window, overlap", [(2.0, 1.0), (60.0, 40.0), (60.0, 0.1)])
 def test_windows_without_sense_are_told(weaving_plan, window, overlap):
     with pytest.raises(InputError):
-        units_of(weaving_plan, window=window, overlap=overlap)
+        build_units(weaving_plan, window=window, overlap=overlap)
 
 
 def test_a_cut_track_is_sampled_as_the_whole_one_away_from_its_ends(weaving_plan):
-    whole = sample(weaving_plan.track, 30.0)
-    part = sample(cut_track(weaving_plan.track, 5.0 + 100 / 30.0, 5.0 + 400 / 30.0), 30.0)
+    whole = sample_track(weaving_plan.track, 30.0)
+    part = sample_track(cut_track(weaving_plan.track, 5.0 + 100 / 30.0, 5.0 + 400 / 30.0), 30.0)
     inside = slice(60, -60)
     assert len(part) == 301
     assert np.allclose(part.times, whole.times[100:401]) and np.allclose(part.raw, whole.raw[100:401])
@@ -104,14 +104,14 @@ def with_course(plan: Plan) -> Plan:
     times = np.arange(5.0, 30.0, 0.004)
     ball = np.column_stack([times, np.sin(times), 1.2 + np.sin(times)])
     ball[:100] = np.nan
-    touches = (Touched(7.0, True, "foot", "kick"), Touched(20.45, None, "", "receive"))
+    touches = (PlayerTouch(7.0, True, "foot", "kick"), PlayerTouch(20.45, None, "", "receive"))
     return Plan(track=plan.track, timeline=plan.timeline, solve_touches=True, nearest=True,
-                solved=SolvedCourse(times, ball, times > 25.0, touches))  # fmt: skip
+                solved=SolvedTrajectory(times, ball, times > 25.0, touches))  # fmt: skip
 
 
 def test_what_is_kept_of_a_plan_is_kept_once_for_all(weaving_plan):
-    once = kept(with_course(weaving_plan))
-    twice = kept(once)
+    once = to_stored_plan(with_course(weaving_plan))
+    twice = to_stored_plan(once)
     assert np.array_equal(once.track.positions, twice.track.positions)
     assert np.array_equal(once.solved.times, twice.solved.times)
     assert np.array_equal(once.solved.ball, twice.solved.ball, equal_nan=True)
@@ -120,10 +120,10 @@ def test_what_is_kept_of_a_plan_is_kept_once_for_all(weaving_plan):
 
 def test_a_kept_plan_is_a_millimetre_off_at_most(weaving_plan):
     plan = with_course(weaving_plan)
-    short = kept(plan)
+    short = to_stored_plan(plan)
     assert np.abs(short.track.positions - plan.track.positions).max() <= 0.000501
     at = np.linspace(6.0, 29.0, 500)
-    assert np.abs(short.solved.at(at)[0] - plan.solved.at(at)[0]).max() <= 0.0012
+    assert np.abs(short.solved.interpolate(at)[0] - plan.solved.interpolate(at)[0]).max() <= 0.0012
 
 
 @settings(max_examples=20)
@@ -132,4 +132,4 @@ def test_a_cut_course_is_the_same_where_it_is_needed(weaving_plan, start, length
     plan = with_course(weaving_plan)
     cut = cut_plan(plan, start, start + length)
     at = np.linspace(start, start + length, 50)
-    assert np.array_equal(cut.solved.at(at)[0], plan.solved.at(at)[0], equal_nan=True)
+    assert np.array_equal(cut.solved.interpolate(at)[0], plan.solved.interpolate(at)[0], equal_nan=True)

@@ -5,27 +5,27 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from beyond_mocap.annotation import validate
-from beyond_mocap.annotation.event_words import TABLE, read_event_words
+from beyond_mocap.annotation import check_timeline
+from beyond_mocap.annotation.event_words import TABLE, read_event_labels
 from beyond_mocap.ball.tracked.solve import SolvedTouch, solve_ball
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.match.words import (
-    LEAST_CONFIDENCE,
-    NEAREST,
+    MIN_CONFIDENCE,
+    MIN_DISTANCE_SECONDS,
     TOUCHES,
     USER,
     Moment,
-    apart,
-    dribbles,
-    edited,
-    moment_of,
-    read_words,
-    timeline_of,
-    words_of,
-    write_words,
+    select_separate_moments,
+    find_dribbles,
+    is_edited,
+    build_touch_moment,
+    read_labels,
+    build_timeline,
+    label_match,
+    write_labels,
 )
 from beyond_mocap.motion.track.match_data import Match, MatchPlayer, Team
-from beyond_mocap.synthetic.ground_truth.planted import planted_match, sample_feed
+from beyond_mocap.synthetic.ground_truth.planted import build_match, sample_feed
 
 
 def match_of(feed):
@@ -41,10 +41,10 @@ def match_of(feed):
 @pytest.fixture(scope="module")
 def planted():
     """A made match of 40 s, what was made of it, and the words."""
-    truth = planted_match(40.0, seed=3)
+    truth = build_match(40.0, seed=3)
     match = match_of(sample_feed(truth, noise=0.03))
     solved = solve_ball(match)
-    return truth, match, solved, words_of(match, solved)
+    return truth, match, solved, label_match(match, solved)
 
 
 def touch(kind="kick", part="foot", height=0.11, time=1.0, after=(10.0, 0.0, 0.0), sure=0.9):
@@ -73,13 +73,13 @@ def running(speed):
     ("deflection", "foot", 0.1, 3.0, True, None),
 ])
 def test_a_touch_gets_the_words_of_the_table(kind, part, height, speed, known, expected):
-    found = moment_of(touch(kind, part, height), *running(speed), known, read_event_words())
-    assert (found and " ".join(found.words)) == expected
+    found = build_touch_moment(touch(kind, part, height), *running(speed), known, read_event_labels())
+    assert (found and " ".join(found.labels)) == expected
 
 
 def test_a_save_that_holds_the_ball_is_a_catch():
-    found = moment_of(touch("save", "hand", 0.3, after=(0.5, 0, 0)), *running(0.0), True, read_event_words())
-    assert found.words == ("catchb", "low")
+    found = build_touch_moment(touch("save", "hand", 0.3, after=(0.5, 0, 0)), *running(0.0), True, read_event_labels())
+    assert found.labels == ("catchb", "low")
 
 
 def test_most_planted_touches_come_back_as_words_of_their_player(planted):
@@ -92,36 +92,36 @@ def test_most_planted_touches_come_back_as_words_of_their_player(planted):
     )
     assert len(wanted) >= 15 and found >= 0.6 * len(wanted)
     assert set(words.players) == set(truth.ids) and all(
-        m.source == TOUCHES and LEAST_CONFIDENCE <= m.confidence <= 1.0 for ms in words.players.values() for m in ms
+        m.source == TOUCHES and MIN_CONFIDENCE <= m.confidence <= 1.0 for ms in words.players.values() for m in ms
     )
     for player in match.players:
-        validate(timeline_of(words.players[player.id]), start=0.0, end=40.0)
+        check_timeline(build_timeline(words.players[player.id]), start=0.0, end=40.0)
 
 
 def test_without_a_ball_nobody_has_words(planted):
-    assert not any(words_of(planted[1], None).players.values())
+    assert not any(label_match(planted[1], None).players.values())
 
 
 def test_key_moments_of_one_player_keep_apart_and_the_surer_one_stays():
     sure, unsure = Moment(
-        time=1.0, words=("kick",), source=TOUCHES, confidence=0.9,
-    ), Moment(time=1.3, words=("kick",), source=TOUCHES, confidence=0.5)
-    other = Moment(time=1.0 + NEAREST, words=("receive", "foot"), source=TOUCHES, confidence=0.4)
-    assert apart([unsure, other, sure]) == [sure, other]
+        time=1.0, labels=("kick",), source=TOUCHES, confidence=0.9,
+    ), Moment(time=1.3, labels=("kick",), source=TOUCHES, confidence=0.5)
+    other = Moment(time=1.0 + MIN_DISTANCE_SECONDS, labels=("receive", "foot"), source=TOUCHES, confidence=0.4)
+    assert select_separate_moments([unsure, other, sure]) == [sure, other]
 
 
 def test_touches_in_a_row_are_one_dribble():
     kinds = [(1.0, "receive"), (1.7, "dribble"), (2.5, "dribble"), (3.2, "kick"), (4.0, "receive"), (5.5, "kick")]
-    (found,) = dribbles([touch(kind, time=time) for time, kind in kinds])
-    assert (found.time, found.end, found.words) == (1.0, 3.2, ("dribble",))
-    assert dribbles([touch("receive", time=1.0), touch("kick", time=2.5)]) == []
+    (found,) = find_dribbles([touch(kind, time=time) for time, kind in kinds])
+    assert (found.time, found.end, found.labels) == (1.0, 3.2, ("dribble",))
+    assert find_dribbles([touch("receive", time=1.0), touch("kick", time=2.5)]) == []
 
 
 def test_a_timeline_is_cut_to_its_span():
     moments = [Moment(
-        time=1.0, words=("kick",), source=TOUCHES, confidence=1.0,
-    ), Moment(time=2.0, words=("dribble",), source=TOUCHES, confidence=1.0, end=6.0)]
-    timeline = timeline_of(moments, 1.5, 4.0)
+        time=1.0, labels=("kick",), source=TOUCHES, confidence=1.0,
+    ), Moment(time=2.0, labels=("dribble",), source=TOUCHES, confidence=1.0, end=6.0)]
+    timeline = build_timeline(moments, 1.5, 4.0)
     assert not timeline.keys and [(span.start, span.end) for span in timeline.spans] == [(2.0, 4.0)]
 
 
@@ -132,30 +132,30 @@ def test_words_come_back_from_their_file(tmp_path, planted):
     words = planted[3]
     player = max(words.players, key=lambda one: len(words.players[one]))
     moments = words.players[player]
-    write_words(tmp_path / "p.txt", player, moments)
-    assert not edited(tmp_path / "p.txt") and not edited(tmp_path / "none.txt")
-    assert read_words(tmp_path / "p.txt", moments) == moments
-    assert {m.source for m in read_words(tmp_path / "p.txt")} == {USER}
+    write_labels(tmp_path / "p.txt", player, moments)
+    assert not is_edited(tmp_path / "p.txt") and not is_edited(tmp_path / "none.txt")
+    assert read_labels(tmp_path / "p.txt", moments) == moments
+    assert {m.source for m in read_labels(tmp_path / "p.txt")} == {USER}
 
 
 def test_edits_are_seen_and_kept(tmp_path):
     moments = (Moment(
-        time=1.5, words=("kick", "low"), source=TOUCHES, confidence=0.75,
-    ), Moment(time=3.0, words=("header",), source=TOUCHES, confidence=0.5))
+        time=1.5, labels=("kick", "low"), source=TOUCHES, confidence=0.75,
+    ), Moment(time=3.0, labels=("header",), source=TOUCHES, confidence=0.5))
     file = tmp_path / "p.txt"
-    write_words(file, "home_7", moments)
+    write_labels(file, "home_7", moments)
     text = file.read_text()
     assert "1.5 kick low  # touches 0.75" in text
     file.write_text(text.replace("3 header  # touches 0.50\n", "3.2 header jump\n"))
-    assert edited(file)
-    kept, changed = read_words(file, moments)
-    assert kept == moments[0] and changed == Moment(time=3.2, words=("header", "jump"), source=USER, confidence=1.0)
+    assert is_edited(file)
+    kept, changed = read_labels(file, moments)
+    assert kept == moments[0] and changed == Moment(time=3.2, labels=("header", "jump"), source=USER, confidence=1.0)
     file.write_bytes(text.replace("\n", "\r\n").encode())  # another editor's line ends are no edit
-    assert not edited(file)
+    assert not is_edited(file)
     file.write_text("1.0 kcik\n")
-    assert edited(file)
+    assert is_edited(file)
     with pytest.raises(InputError, match=r"p\.txt:1: the word 'kcik'.*kick"):
-        read_words(file)
+        read_labels(file)
 
 
 @settings(deadline=None, max_examples=60)
@@ -164,8 +164,8 @@ def test_any_file_of_words_is_read_or_refused(tmp_path_factory, content):
     file = tmp_path_factory.mktemp("fuzz") / "p.txt"
     file.write_bytes(content)
     try:
-        assert edited(file) in (True, False)
-        read_words(file)
+        assert is_edited(file) in (True, False)
+        read_labels(file)
     except InputError as error:
         assert "\n" not in str(error)
 
@@ -176,12 +176,12 @@ def test_any_file_of_words_is_read_or_refused(tmp_path_factory, content):
 def test_the_most_telling_row_counts(tmp_path):
     file = tmp_path / "own.csv"
     file.write_text("# mine\nkind,part,detail,words\npass,,,kick\npass,head,,header {jump}\npass,,throw-in,throwb\n")
-    table = read_event_words(file)
-    assert table.words("pass") == table.words("pass", "chest") == ("kick",)
-    assert table.words("pass", "head", filled_in={"jump": "jump"}) == ("header", "jump")
-    assert table.words("pass", "head") == ("header",)
-    assert table.words("pass", "head", ["throw-in"]) == ("throwb",)
-    assert table.words("shot") == ()
+    table = read_event_labels(file)
+    assert table.find_labels("pass") == table.find_labels("pass", "chest") == ("kick",)
+    assert table.find_labels("pass", "head", placeholders={"jump": "jump"}) == ("header", "jump")
+    assert table.find_labels("pass", "head") == ("header",)
+    assert table.find_labels("pass", "head", ["throw-in"]) == ("throwb",)
+    assert table.find_labels("shot") == ()
 
 
 @pytest.mark.parametrize("text, part", [
@@ -198,11 +198,11 @@ def test_the_most_telling_row_counts(tmp_path):
 def test_mistakes_in_a_table_get_one_line(tmp_path, text, part):
     (tmp_path / "t.csv").write_text(text)
     with pytest.raises(InputError) as caught:
-        read_event_words(tmp_path / "t.csv")
+        read_event_labels(tmp_path / "t.csv")
     assert " ".join(part.split()) in str(caught.value) and "\n" not in str(caught.value)
 
 
 def test_our_own_table_is_read_and_own_words_may_be_added(tmp_path):
-    assert len(read_event_words().rows) > 20 and TABLE.is_file()
+    assert len(read_event_labels().rows) > 20 and TABLE.is_file()
     (tmp_path / "t.csv").write_text("kind,part,detail,words\npass,,,rabona\n")
-    assert read_event_words(tmp_path / "t.csv", ["rabona"]).words("pass") == ("rabona",)
+    assert read_event_labels(tmp_path / "t.csv", ["rabona"]).find_labels("pass") == ("rabona",)

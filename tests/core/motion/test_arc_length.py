@@ -29,13 +29,13 @@ def bezier(*points):
 def back_and_forth(arc, count=101):
     """The largest error in metres of parameter and length one after the other."""
     s = np.linspace(0.0, arc.length, count)
-    return np.abs(arc.at(arc.parameter(s)) - s).max()
+    return np.abs(arc.distance_at(arc.parameter_at(s)) - s).max()
 
 
 def test_a_parabola_has_its_length():
     arc = ArcLength(polynomial([0, 1], [0, 0, 1], [0], domain=(0.0, 2.0)))
     assert arc.length == pytest.approx(np.sqrt(17) + np.arcsinh(4) / 4, abs=1e-9)
-    assert arc.at(np.array([1.0]))[0] == pytest.approx(np.sqrt(5) / 2 + np.arcsinh(2) / 4, abs=1e-9)
+    assert arc.distance_at(np.array([1.0]))[0] == pytest.approx(np.sqrt(5) / 2 + np.arcsinh(2) / 4, abs=1e-9)
     assert back_and_forth(arc) < 1e-9
 
 
@@ -68,14 +68,14 @@ def test_a_bezier_curve_against_adaptive_quadrature():
 
 def test_a_path_of_one_place_has_no_length():
     arc = ArcLength(bezier(*[(1, 2, 3)] * 4))
-    assert arc.length < 1e-12 and np.abs(arc.at(np.array([0.0, 0.5, 2.0]))).max() < 1e-12
-    assert np.isfinite(arc.parameter(np.array([-1.0, 0.0, 5.0]))).all()
+    assert arc.length < 1e-12 and np.abs(arc.distance_at(np.array([0.0, 0.5, 2.0]))).max() < 1e-12
+    assert np.isfinite(arc.parameter_at(np.array([-1.0, 0.0, 5.0]))).all()
 
 
 def test_beyond_its_ends_it_is_at_its_ends():
     arc = ArcLength(bezier((0, 0, 0), (1, 0, 0), (2, 0, 0), (3, 0, 0)))
-    assert arc.at(np.array([-1.0, 2.0])) == pytest.approx([0.0, 3.0])
-    assert arc.parameter(np.array([-1.0, 9.0])) == pytest.approx([0.0, 1.0])
+    assert arc.distance_at(np.array([-1.0, 2.0])) == pytest.approx([0.0, 3.0])
+    assert arc.parameter_at(np.array([-1.0, 9.0])) == pytest.approx([0.0, 1.0])
 
 
 def test_large_coordinates_are_no_reason_to_halve_for_ever():
@@ -104,8 +104,8 @@ class Helix(Path):
 
 def test_a_helix_that_sets_out_from_a_stand():
     arc, u = ArcLength(Helix()), np.linspace(0.0, 3.0, 50)
-    assert arc.at(u) == pytest.approx(np.sqrt(4.25) * u**2, abs=1e-7)
-    assert arc.parameter(np.sqrt(4.25) * u**2) == pytest.approx(u, abs=1e-6)
+    assert arc.distance_at(u) == pytest.approx(np.sqrt(4.25) * u**2, abs=1e-7)
+    assert arc.parameter_at(np.sqrt(4.25) * u**2) == pytest.approx(u, abs=1e-6)
 
 
 def test_a_circle_drawn_as_a_closed_spline():
@@ -128,4 +128,4 @@ def test_lengths_are_found_where_the_path_stands_for_a_while():
     arc = ArcLength(SplinePath(knots, points))
     assert arc.length == pytest.approx(5.0, abs=1e-9)
     assert back_and_forth(arc, 1001) < 1e-7
-    assert np.all(np.diff(arc.parameter(np.linspace(0, 5, 400))) > 0)
+    assert np.all(np.diff(arc.parameter_at(np.linspace(0, 5, 400))) > 0)

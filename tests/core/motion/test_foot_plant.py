@@ -6,29 +6,29 @@ import numpy as np
 import pytest
 
 from beyond_mocap.motion import contacts
-from beyond_mocap.motion.foot_plant import MOST_DROP, plant, shift
-from beyond_mocap.motion.humanoid import identify, leg_length
-from beyond_mocap.motion.limb import two_bone
-from beyond_mocap.motion.motion import local_rotations, place, pose_kinematics
-from beyond_mocap.motion.retargeting.neutral import neutral_stance
-from beyond_mocap.synthetic.gait import gait
+from beyond_mocap.motion.foot_plant import MAX_DROP, plant_feet, solve_shift
+from beyond_mocap.motion.humanoid import identify_joints, measure_leg_length
+from beyond_mocap.motion.limb import solve_two_bone
+from beyond_mocap.motion.motion import compute_local_rotations, place_motion, compute_pose
+from beyond_mocap.motion.retargeting.neutral import build_neutral_stance
+from beyond_mocap.synthetic.gait import build_gait
 
 
 @pytest.fixture(scope="module")
 def walk():
     """A clean walk along +x, toes on the ground, and which of its heels and toes stand."""
-    return grounded(gait(1.4, 4.0, 30.0))
+    return grounded(build_gait(1.4, 4.0, 30.0))
 
 
 def grounded(motion):
-    down = motion.root_positions - [0.0, 0.0, contacts.floor_height(motion)]
-    return replace(motion, root_positions=down), contacts.points(motion)
+    down = motion.root_positions - [0.0, 0.0, contacts.measure_floor_height(motion)]
+    return replace(motion, root_positions=down), contacts.detect_heel_toe_contacts(motion)
 
 
 def feet_of(motion, root, rotations):
     """Heels and toes (T, 2 sides, 2, 3)."""
-    body = identify(motion.skeleton)
-    places, _ = pose_kinematics(motion.skeleton, root, rotations)
+    body = identify_joints(motion.skeleton)
+    places, _ = compute_pose(motion.skeleton, root, rotations)
     return np.stack([places[:, [limb.foot, limb.toe_or_foot]] for limb in (body.left, body.right)], axis=1)
 
 
@@ -43,7 +43,7 @@ def slide(motion, root, rotations, stands):
 def planted(motion, stands, moved=0.0):
     """The motion with `moved` (T, 3) added to its root, before and after planting."""
     root = motion.root_positions + moved
-    return root, plant(motion.skeleton, root, motion.rotations, stands, motion.fps)
+    return root, plant_feet(motion.skeleton, root, motion.rotations, stands, motion.fps)
 
 
 @pytest.mark.parametrize("velocity", [(0.3, 0.0), (0.0, 0.2), (-0.3, 0.1)])
@@ -63,8 +63,8 @@ def test_a_planted_slide_is_removed(walk, velocity):
 
 def test_turning_on_a_standing_foot_is_removed(walk):
     motion, stands = walk
-    turned = place(motion, 0.05 * np.sin(np.arange(len(motion)) / 10.0))
-    out = plant(motion.skeleton, turned.root_positions, turned.rotations, stands, 30.0)
+    turned = place_motion(motion, 0.05 * np.sin(np.arange(len(motion)) / 10.0))
+    out = plant_feet(motion.skeleton, turned.root_positions, turned.rotations, stands, 30.0)
     before = slide(motion, turned.root_positions, turned.rotations, stands)
     assert slide(motion, out.root, out.rotations, stands) < 0.25 * before
 
@@ -94,7 +94,7 @@ def test_a_heel_rises_before_the_pelvis_sinks(walk):
     (low, up), behind = ((feet_of(motion, p.root, p.rotations)[..., 2] for p in (still, out)), stands[..., 1])
     assert np.median(np.abs(up[..., 1][behind])) < 0.006 and out.miss.max() < 0.005
     assert np.percentile((up[..., 0] - low[..., 0])[behind], 90) > 0.02
-    assert (root[:, 2] - out.root[:, 2]).max() <= MOST_DROP + 1e-9
+    assert (root[:, 2] - out.root[:, 2]).max() <= MAX_DROP + 1e-9
 
 
 def test_a_foot_in_the_air_need_not_be_reached(walk):
@@ -108,7 +108,7 @@ def test_bones_keep_their_length_and_rotations_are_unit(walk):
     motion, stands = walk
     _, out = planted(motion, stands, np.outer(np.arange(len(motion)) / 30.0, (0.4, 0.0, 0.0)))
     assert np.allclose(np.linalg.norm(out.rotations, axis=-1), 1.0, atol=1e-9)
-    places, _ = pose_kinematics(motion.skeleton, out.root, out.rotations)
+    places, _ = compute_pose(motion.skeleton, out.root, out.rotations)
     for joint, parent in enumerate(motion.skeleton.parents):
         if parent >= 0:
             length = np.linalg.norm(places[:, joint] - places[:, parent], axis=1)
@@ -118,12 +118,12 @@ def test_bones_keep_their_length_and_rotations_are_unit(walk):
 def test_only_legs_and_the_hips_height_move(walk):
     motion, stands = walk
     root, out = planted(motion, stands, np.outer(np.arange(len(motion)) / 30.0, (0.4, 0.0, 0.0)))
-    body = identify(motion.skeleton)
+    body = identify_joints(motion.skeleton)
     legs = {j for limb in (body.left, body.right) for j in (limb.upper_leg, limb.lower_leg, limb.foot)}
     others = [j for j in range(len(motion.skeleton)) if j not in legs]
     assert np.array_equal(out.rotations[:, others], motion.rotations[:, others])
     drop = root[:, 2] - out.root[:, 2]
-    assert drop.min() > -1e-9 and drop.max() <= MOST_DROP + 1e-9
+    assert drop.min() > -1e-9 and drop.max() <= MAX_DROP + 1e-9
 
 
 def test_what_was_moved_is_told(walk):
@@ -140,7 +140,7 @@ def test_what_was_moved_is_told(walk):
 @pytest.mark.parametrize("count", [1, 2, 3, 4, 5, 40])
 def test_never_or_always_standing_and_few_frames(walk, stands, count):
     motion = walk[0].frames(0, count)
-    out = plant(motion.skeleton, motion.root_positions, motion.rotations, np.full((count, 2, 2), stands), 30.0)
+    out = plant_feet(motion.skeleton, motion.root_positions, motion.rotations, np.full((count, 2, 2), stands), 30.0)
     for values in (out.root, out.rotations, out.correction, out.miss):
         assert np.all(np.isfinite(values))
     assert out.rotations.shape == motion.rotations.shape and out.correction.shape == (count, 2)
@@ -156,7 +156,7 @@ def test_a_foot_that_never_stands_is_left_where_it_is(walk):
 
 @pytest.mark.parametrize("fps", [24.0, 60.0, 120.0])
 def test_at_any_rate(fps):
-    motion, stands = grounded(gait(1.4, 4.0, fps))
+    motion, stands = grounded(build_gait(1.4, 4.0, fps))
     moved = np.outer(np.arange(len(motion)) / fps, (0.3, 0.0, 0.0))
     root, out = planted(motion, stands, moved)
     assert (
@@ -167,7 +167,7 @@ def test_at_any_rate(fps):
 def test_the_input_is_left_alone(walk):
     motion, stands = walk
     root, rotations = motion.root_positions.copy(), motion.rotations.copy()
-    plant(motion.skeleton, root, rotations, stands, 30.0)
+    plant_feet(motion.skeleton, root, rotations, stands, 30.0)
     assert np.array_equal(root, motion.root_positions) and np.array_equal(rotations, motion.rotations)
 
 
@@ -175,10 +175,10 @@ def test_the_shift_cancels_velocity_where_it_has_weight_and_is_gentle_elsewhere(
     velocity = np.full((89, 1), 0.01)
     weight = np.zeros((90, 1))
     weight[20:40] = weight[60:80] = 1.0
-    found = shift(velocity, weight)[:, 0]
+    found = solve_shift(velocity, weight)[:, 0]
     assert np.allclose(np.diff(found)[22:37], -0.01, atol=1e-3) and np.allclose(np.diff(found)[62:77], -0.01, atol=1e-3)
     assert np.abs(np.diff(found, 3)).max() < 0.02 and np.abs(found).max() < 0.25
-    assert np.allclose(shift(velocity, weight * 0.0), 0.0)
+    assert np.allclose(solve_shift(velocity, weight * 0.0), 0.0)
 
 
 def test_a_given_shift_is_reached_and_kept_while_the_foot_stands():
@@ -186,15 +186,15 @@ def test_a_given_shift_is_reached_and_kept_while_the_foot_stands():
     weight[20:40] = 1.0
     kept = np.full((60, 2), np.nan)
     kept[:25] = [0.03, -0.01]
-    found = shift(np.zeros((59, 2)), weight, kept=kept)
+    found = solve_shift(np.zeros((59, 2)), weight, fixed_shifts=kept)
     assert np.allclose(found[:25], [0.03, -0.01], atol=1e-6)
     assert np.abs(np.diff(found[25:40], axis=0)).max() < 5e-4 and np.abs(found[55:]).max() < 2e-3
 
 
 def knees_of(motion, root, rotations):
     """Angle inside both knees (T, 2), degrees."""
-    body = identify(motion.skeleton)
-    places, _ = pose_kinematics(motion.skeleton, root, rotations)
+    body = identify_joints(motion.skeleton)
+    places, _ = compute_pose(motion.skeleton, root, rotations)
     out = []
     for limb in (body.left, body.right):
         up, down = (places[:, other] - places[:, limb.lower_leg] for other in (limb.upper_leg, limb.foot))
@@ -207,18 +207,18 @@ def knees_of(motion, root, rotations):
 def test_a_leg_comes_as_straight_as_it_was(walk, levels):
     """Whoever stands and goes up to straight knees, at 172 degrees, keeps them; nothing slides."""
     motion, _ = walk
-    body = identify(motion.skeleton)
-    count, leg = 60, leg_length(motion.skeleton)
-    stance = neutral_stance(motion.skeleton)
-    rotations = np.tile(local_rotations(motion.skeleton, stance.rotations), (count, 1, 1))
-    straight = pose_kinematics(motion.skeleton, np.zeros((1, 3)), rotations[:1])[0][0]
+    body = identify_joints(motion.skeleton)
+    count, leg = 60, measure_leg_length(motion.skeleton)
+    stance = build_neutral_stance(motion.skeleton)
+    rotations = np.tile(compute_local_rotations(motion.skeleton, stance.rotations), (count, 1, 1))
+    straight = compute_pose(motion.skeleton, np.zeros((1, 3)), rotations[:1])[0][0]
     rise = -0.0025 * leg - 0.02 * (1.0 + np.cos(np.linspace(0.0, 2.0 * np.pi, count)))
     root = np.outer(rise - straight[body.left.toe_or_foot, 2], [0.0, 0.0, 1.0])
     for limb in (body.left, body.right):
         target = np.tile(straight[limb.foot] - [0.0, 0.0, straight[body.left.toe_or_foot, 2]], (count, 1))
         chain = (limb.upper_leg, limb.lower_leg, limb.foot)
-        rotations = two_bone(motion.skeleton, root, rotations, chain, target, soft=1e-6).rotations
+        rotations = solve_two_bone(motion.skeleton, root, rotations, chain, target, soft=1e-6).rotations
     given = knees_of(motion, root, rotations)
     assert given.max() > 170.0
-    out = plant(motion.skeleton, root, rotations, np.ones((count, 2, 2), bool), 30.0, levels=levels)
+    out = plant_feet(motion.skeleton, root, rotations, np.ones((count, 2, 2), bool), 30.0, level_feet=levels)
     assert np.abs(knees_of(motion, out.root, out.rotations) - given).max() < 2.0

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from beyond_mocap.base.errors import InputError
-from beyond_mocap.motion.humanoid import heading, identify, leg_length, side_and_part
-from beyond_mocap.motion.motion import place
+from beyond_mocap.motion.humanoid import compute_heading, identify_joints, measure_leg_length, split_joint_name
+from beyond_mocap.motion.motion import place_motion
 from beyond_mocap.motion.skeleton import Skeleton
-from beyond_mocap.synthetic.gait import gait
+from beyond_mocap.synthetic.gait import build_gait
 
 # hips, spine, neck, head, then an arm (shoulder, upper, lower, hand) and a leg (upper, lower, foot, toe); {} the side
 FAMILIES = {
@@ -52,7 +52,7 @@ def family_skeleton(family: str) -> Skeleton:
 @pytest.mark.parametrize("family", FAMILIES)
 def test_families_of_names(family):
     skeleton = family_skeleton(family)
-    body = identify(skeleton)
+    body = identify_joints(skeleton)
     hips, spine, neck, head, arm, leg = FAMILIES[family].split(" ")
     assert skeleton.names[body.hips] == hips and skeleton.names[body.neck] == neck and skeleton.names[body.head] == head
     assert [skeleton.names[j] for j in body.spine] == spine.split(",") and body.chest == body.spine[-1]
@@ -83,26 +83,26 @@ def test_families_of_names(family):
     ],
 )
 def test_sides_and_parts(name, side, part):
-    assert side_and_part(name) == (side, part)
+    assert split_joint_name(name) == (side, part)
 
 
 def test_a_body_without_legs_is_refused():
     with pytest.raises(InputError, match="left upper_leg"):
-        identify(Skeleton(("Hips", "Spine"), (-1, 0), np.zeros((2, 3))))
+        identify_joints(Skeleton(("Hips", "Spine"), (-1, 0), np.zeros((2, 3))))
 
 
 def test_arms_are_not_taken_for_legs_that_lack():
     names = ["Hips", *(f"{side}{part}" for side in ("Left", "Right") for part in ("Arm", "ForeArm", "Hand"))]
     offsets = [[0, 0, 1], *([0.0, side * step, 0.4 * (step < 0.2)] for side in (1, -1) for step in (0.15, 0.3, 0.25))]
     with pytest.raises(InputError, match="no joint found for left upper_leg"):
-        identify(Skeleton(names, [-1, 0, 1, 2, 0, 4, 5], np.array(offsets, float)))
+        identify_joints(Skeleton(names, [-1, 0, 1, 2, 0, 4, 5], np.array(offsets, float)))
 
 
 def test_toes_and_arms_may_be_missing():
     full = family_skeleton("LAFAN1")
     keep = [i for i, n in enumerate(full.names) if not any(word in n for word in ("Toe", "Arm", "Hand", "Shoulder"))]
     new = {old: i for i, old in enumerate(keep)}
-    body = identify(
+    body = identify_joints(
         Skeleton([full.names[i] for i in keep], [new.get(full.parents[i], -1) for i in keep], full.offsets[keep])
     )
     assert body.left.toe is None and body.left.toe_or_foot == body.left.foot and body.right.hand is None
@@ -110,17 +110,17 @@ def test_toes_and_arms_may_be_missing():
 
 @pytest.mark.parametrize("angle", [0.0, 1.0, -2.5, np.pi / 2])
 def test_heading_is_where_the_body_faces(angle):
-    motion = place(gait(1.4, 1.0), angle)
-    off = (heading(motion) - angle + np.pi) % (2 * np.pi) - np.pi
+    motion = place_motion(build_gait(1.4, 1.0), angle)
+    off = (compute_heading(motion) - angle + np.pi) % (2 * np.pi) - np.pi
     assert np.abs(off).max() < np.radians(15.0) and abs(np.mean(off)) < np.radians(3.0)
 
 
 def test_heading_runs_on_through_whole_turns():
-    walk = gait(0.0, 4.0)
-    spin = place(walk, np.linspace(0, 4 * np.pi, len(walk)))
-    assert np.ptp(heading(spin)) == pytest.approx(4 * np.pi, abs=0.2)
+    walk = build_gait(0.0, 4.0)
+    spin = place_motion(walk, np.linspace(0, 4 * np.pi, len(walk)))
+    assert np.ptp(compute_heading(spin)) == pytest.approx(4 * np.pi, abs=0.2)
 
 
 def test_leg_length_is_thigh_plus_shank():
     skeleton = family_skeleton("CMU")
-    assert leg_length(skeleton) == pytest.approx(2 * np.sqrt(3))
+    assert measure_leg_length(skeleton) == pytest.approx(2 * np.sqrt(3))

@@ -8,11 +8,11 @@ import pytest
 
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.files.tracking.feed import Feed
-from beyond_mocap.files.tracking.match_repairs import mended_ball, mended_players, mended_sides, side_lines
+from beyond_mocap.files.tracking.match_repairs import repair_ball, repair_players, repair_sides, check_side_names
 from beyond_mocap.files.tracking.providers import PROVIDERS
-from beyond_mocap.files.tracking.referees import read_team_colours, referee_samples
+from beyond_mocap.files.tracking.referees import read_team_colours, read_referee_samples
 from beyond_mocap.files.tracking.tracking import read_match
-from beyond_mocap.motion.track.match_data import Match, MatchPlayer, presence_lines
+from beyond_mocap.motion.track.match_data import Match, MatchPlayer, describe_presence
 
 PERIODS = ((0.0, 99.9), (109.9, 209.8))
 
@@ -46,13 +46,13 @@ def test_a_player_s_stretches_end_where_he_leaves_and_with_the_half():
     positions[2] = np.nan
     match = match_of(times, positions, ball, teams)
     whole = ((0.0, 99.9), (109.9, 209.8))
-    assert np.allclose(match.stretches("home_0"), ((0.0, 50.0), (70.0, 99.9), (109.9, 209.8)))
-    assert np.allclose(match.stretches("home_0", gap=1.0)[:2], ((0.0, 20.0), (22.0, 50.0)))
-    assert np.allclose(match.stretches("home_1"), ((0.0, 99.9), (109.9, 150.0)))
-    assert match.stretches("home_2") == () and np.allclose(match.stretches("away_12"), whole)
+    assert np.allclose(match.list_stretches("home_0"), ((0.0, 50.0), (70.0, 99.9), (109.9, 209.8)))
+    assert np.allclose(match.list_stretches("home_0", gap=1.0)[:2], ((0.0, 20.0), (22.0, 50.0)))
+    assert np.allclose(match.list_stretches("home_1"), ((0.0, 99.9), (109.9, 150.0)))
+    assert match.list_stretches("home_2") == () and np.allclose(match.list_stretches("away_12"), whole)
     with pytest.raises(InputError, match="one of home_0"):
-        match.stretches("nobody")
-    lines = presence_lines(match)
+        match.list_stretches("nobody")
+    lines = describe_presence(match)
     assert [line.split(":")[0] for line in lines] == ["home_0", "home_1", "home_2"]
     assert "1 short gaps" in lines[0] and "never" in lines[2]
 
@@ -66,7 +66,7 @@ def test_a_ball_that_is_not_there_is_unknown_and_told():
     ball[20, 2] = -10.0
     ball[30, :2] = 90.0, 0.0
     ball[40, 2] = 99.0
-    found, lines = mended_ball(ball, 105.0, 68.0)
+    found, lines = repair_ball(ball, 105.0, 68.0)
     gone = np.isnan(found[:, 0])
     assert np.flatnonzero(gone).tolist() == [10, 11, 12, 13, 14, 20, 30]
     assert np.isnan(found[40, 2]) and np.isfinite(found[40, :2]).all()
@@ -77,7 +77,7 @@ def test_a_ball_at_rest_on_the_spot_stays():
     ball = np.zeros((100, 3))
     ball[60:, 0] = np.linspace(0.0, 20.0, 40)
     ball[60:, 2] = 0.1
-    assert np.isfinite(mended_ball(ball, 105.0, 68.0)[0]).all()
+    assert np.isfinite(repair_ball(ball, 105.0, 68.0)[0]).all()
 
 
 def test_parked_players_are_away():
@@ -85,7 +85,7 @@ def test_parked_players_are_away():
     positions[0, times < 50] = 0.0, 60.0  # on a bench that is tracked
     positions[1, times > 160] = 3.0, 4.0  # the last place kept
     positions[2, 100:120] = positions[2, 100]  # two seconds of rest
-    found, lines = mended_players(times, positions, 105.0, 68.0, [f"p{i}" for i in range(22)])
+    found, lines = repair_players(times, positions, 105.0, 68.0, [f"p{i}" for i in range(22)])
     assert np.isnan(found[0, times < 50]).all() and np.isnan(found[1, times > 160]).all()
     np.testing.assert_array_equal(found[2:], positions[2:])
     assert lines[0] == "p0: 50 s beside the pitch, set to absent"
@@ -105,7 +105,7 @@ def test_halves_are_turned_to_fit(signs, told):
     wrong, wrong_ball = positions.copy(), ball.copy()
     wrong[:, second] *= signs
     wrong_ball[second, :2] *= signs
-    found, found_ball, lines = mended_sides(times, wrong, wrong_ball, PERIODS, teams)
+    found, found_ball, lines = repair_sides(times, wrong, wrong_ball, PERIODS, teams)
     np.testing.assert_allclose(found, positions)
     np.testing.assert_allclose(found_ball, ball)
     assert [told in line and "period 2" in line for line in lines] == ([True] if told else [])
@@ -115,9 +115,9 @@ def test_one_half_and_few_players_are_left():
     times, positions, ball, teams = two_halves()
     first = times < 105.0
     part = times[first], positions[:, first], ball[first], PERIODS[:1], teams
-    assert mended_sides(*part)[2] == []
+    assert repair_sides(*part)[2] == []
     few = [3, 4, 15, 16]
-    found, _, lines = mended_sides(times, positions[few] * [1.0, -1.0], ball, PERIODS, [teams[i] for i in few])
+    found, _, lines = repair_sides(times, positions[few] * [1.0, -1.0], ball, PERIODS, [teams[i] for i in few])
     assert lines == []  # too few to tell that a half is mirrored
 
 
@@ -125,9 +125,9 @@ def test_a_lineup_that_does_not_fit_the_sides_is_told():
     times, positions, _, teams = two_halves()
     middle = positions[:, times < 100, 1].mean(axis=1) * np.where(np.array(teams) == "home", 1.0, -1.0)
     called = ["left back" if y > 8 else "right back" if y < -8 else "striker" for y in middle]
-    assert side_lines(times, positions, PERIODS, teams, called) == []
-    assert "left players are on the right" in side_lines(times, positions * [1.0, -1.0], PERIODS, teams, called)[0]
-    assert side_lines(times, positions * [1.0, -1.0], PERIODS, teams, [""] * 22) == []
+    assert check_side_names(times, positions, PERIODS, teams, called) == []
+    assert "left players are on the right" in check_side_names(times, positions * [1.0, -1.0], PERIODS, teams, called)[0]
+    assert check_side_names(times, positions * [1.0, -1.0], PERIODS, teams, [""] * 22) == []
 
 
 # --- files
@@ -247,7 +247,7 @@ def test_a_damaged_sample_ends_the_referees_and_is_told(tmp_path):
     frame = ('{{"FrameCount":{0},"PlayerPositions":[{{"Team":3,"JerseyNumber":0,"X":{1},"Y":5}}]}}').format
     (tmp_path / "g.json").write_text('{"FrameData":[' + ",".join(map(frame, (1, 2, 3), (1, 2, '"?"'))) + "]}")
     feed = Feed(PROVIDERS["tracab"], (tmp_path / "g.json",), (file.with_name("g_meta.xml"),))
-    names, places, lines = referee_samples(feed, np.arange(1, 5))
+    names, places, lines = read_referee_samples(feed, np.arange(1, 5))
     assert names == ["referee_0"] and np.isfinite(places[0, :, 0]).tolist() == [True, True, False, False]
     assert "up to frame 2 only" in lines[0]
 

@@ -8,11 +8,11 @@ import pytest
 
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.motion import quaternion
-from beyond_mocap.motion.humanoid import identify
+from beyond_mocap.motion.humanoid import identify_joints
 from beyond_mocap.motion.mirror import mirror
-from beyond_mocap.motion.motion import Motion, end_positions, forward_kinematics
+from beyond_mocap.motion.motion import Motion, compute_end_positions, forward_kinematics
 from beyond_mocap.motion.skeleton import Skeleton
-from beyond_mocap.synthetic.gait import gait
+from beyond_mocap.synthetic.gait import build_gait
 
 MOCAP = pathlib.Path(__file__).parents[3] / "../shared/data/mocap"
 # a turn of the axes that lets bones which hang down lie along X, as LAFAN1's and Bandai-Namco's do
@@ -50,25 +50,25 @@ def mirrored_behaviour(skeleton: Skeleton) -> np.ndarray:
 
 def image(motion: Motion, positions: np.ndarray) -> np.ndarray:
     """Positions (T, J, 3) reflected at y = 0, left and right exchanged."""
-    return positions[:, list(identify(motion.skeleton).mirror)] * (1.0, -1.0, 1.0)
+    return positions[:, list(identify_joints(motion.skeleton).mirror)] * (1.0, -1.0, 1.0)
 
 
 def tips_image(motion: Motion) -> np.ndarray:
     """The reflected tips (T, E, 3) in the order of their partners."""
-    skeleton, partner = motion.skeleton, identify(motion.skeleton).mirror
+    skeleton, partner = motion.skeleton, identify_joints(motion.skeleton).mirror
     own, order = [], []
     for joint in dict.fromkeys(skeleton.end_parents):
         own += [i for i, p in enumerate(skeleton.end_parents) if p == joint]
         order += [i for i, p in enumerate(skeleton.end_parents) if p == partner[joint]]
     out = np.empty((len(motion), len(order), 3))
-    out[:, own] = end_positions(motion)[:, order] * (1.0, -1.0, 1.0)
+    out[:, own] = compute_end_positions(motion)[:, order] * (1.0, -1.0, 1.0)
     return out
 
 
 @pytest.fixture(scope="module")
 def walk() -> Motion:
     """A curve to the left at a jog, seen from somewhere."""
-    motion = gait(2.5, 2.0, turn_rate=0.8)
+    motion = build_gait(2.5, 2.0, turn_rate=0.8)
     return replace(motion, root_positions=motion.root_positions + (3.0, -2.0, 0.5))
 
 
@@ -79,14 +79,14 @@ def test_every_joint_and_tip_stands_where_its_partner_is_reflected(walk, axes):
     mirrored = mirror(motion)
     assert mirrored.skeleton is motion.skeleton
     assert np.abs(forward_kinematics(mirrored)[0] - image(motion, forward_kinematics(motion)[0])).max() < 1e-9
-    assert np.abs(end_positions(mirrored) - tips_image(motion)).max() < 1e-9
+    assert np.abs(compute_end_positions(mirrored) - tips_image(motion)).max() < 1e-9
 
 
 def lopsided(skeleton: Skeleton) -> Skeleton:
     """Left bones 4 % longer and a little askew, as measured bodies are."""
     offsets = skeleton.offsets.copy()
     left = [name.startswith("Left") for name in skeleton.names]
-    tilt = quaternion.about_axis(np.array([1.0, 0.0, 0.0]), np.radians(3.0))
+    tilt = quaternion.from_axis_angle(np.array([1.0, 0.0, 0.0]), np.radians(3.0))
     offsets[left] = 1.04 * quaternion.rotate(tilt, offsets[left])
     return replace(skeleton, offsets=offsets)
 
@@ -102,7 +102,7 @@ def test_twice_is_the_same_on_any_skeleton(walk, axes):
 
 def test_uneven_bones_point_where_the_partner_reflected_points(walk):
     motion = replace(walk, skeleton=lopsided(walk.skeleton))
-    mirrored, body = mirror(motion), identify(motion.skeleton)
+    mirrored, body = mirror(motion), identify_joints(motion.skeleton)
     before, after = forward_kinematics(motion)[0], forward_kinematics(mirrored)[0]
     for limb, other in ((body.left, body.right), (body.right, body.left)):
         for upper, lower in (
@@ -119,9 +119,9 @@ def test_uneven_bones_point_where_the_partner_reflected_points(walk):
 
 
 def test_the_left_foot_kicks_what_the_right_one_kicked(walk):
-    body = identify(walk.skeleton)
+    body = identify_joints(walk.skeleton)
     rotations, hip = walk.rotations.copy(), body.right.upper_leg
-    forward = quaternion.about_axis(np.array([0.0, 1.0, 0.0]), -1.0)
+    forward = quaternion.from_axis_angle(np.array([0.0, 1.0, 0.0]), -1.0)
     rotations[20:30, hip] = quaternion.multiply(rotations[20:30, hip], forward)
     kick = replace(walk, rotations=rotations)
     (before, _), (after, _) = forward_kinematics(kick), forward_kinematics(mirror(kick))
@@ -153,7 +153,7 @@ def test_one_frame_is_enough_and_nothing_given_changes(walk):
 )
 def test_recordings_are_off_their_image_by_their_bodies_asymmetry_only(pattern, centimetres):
     for path in sorted(MOCAP.glob(pattern))[:12]:
-        motion = bvh.read(path).motion
+        motion = bvh.read_bvh(path).motion
         mirrored = mirror(motion)
         off = np.linalg.norm(forward_kinematics(mirrored)[0] - image(motion, forward_kinematics(motion)[0]), axis=-1)
         assert 100 * off.max() < centimetres, path.name

@@ -8,13 +8,13 @@ from beyond_mocap.base.errors import InputError
 from beyond_mocap.motion import quaternion
 from beyond_mocap.motion.motion import (
     Motion,
-    at_frames,
-    concatenate,
-    end_positions,
+    sample_frames,
+    concatenate_motions,
+    compute_end_positions,
     forward_kinematics,
-    place,
+    place_motion,
     resample,
-    world_rotation,
+    compute_world_rotation,
 )
 from beyond_mocap.motion.skeleton import Skeleton
 
@@ -49,7 +49,7 @@ def test_forward_kinematics_is_the_chain_of_its_parents(motion):
         assert np.allclose(positions[frame], places)
         assert np.allclose(quaternion.to_matrix(rotations[frame]), [turn.as_matrix() for turn in turns])
         tip = places[2] + turns[2].apply([0, 0, 0.1])
-        assert np.allclose(end_positions(motion)[frame, 0], tip)
+        assert np.allclose(compute_end_positions(motion)[frame, 0], tip)
 
 
 def test_rotations_are_unit_continuous_and_read_only(motion):
@@ -62,11 +62,11 @@ def test_rotations_are_unit_continuous_and_read_only(motion):
 
 
 def test_whole_frames_are_themselves_and_halves_lie_between(motion):
-    root, rotations = at_frames(motion, np.array([3.0, 7.0, 99.0, -5.0]))
+    root, rotations = sample_frames(motion, np.array([3.0, 7.0, 99.0, -5.0]))
     assert np.allclose(root, motion.root_positions[[3, 7, 19, 0]]) and np.allclose(
         rotations, motion.rotations[[3, 7, 19, 0]]
     )
-    root, rotations = at_frames(motion, np.array([3.5]))
+    root, rotations = sample_frames(motion, np.array([3.5]))
     assert np.allclose(root[0], motion.root_positions[3:5].mean(axis=0))
     assert np.allclose(rotations[0], quaternion.slerp(motion.rotations[3], motion.rotations[4], 0.5))
 
@@ -83,23 +83,23 @@ def test_resampling_keeps_the_time(motion, fps, count):
 
 def test_placing_turns_about_the_world_then_moves(motion):
     before, _ = forward_kinematics(motion)
-    after, _ = forward_kinematics(place(motion, np.pi / 2, (1.0, 2.0, 3.0)))
+    after, _ = forward_kinematics(place_motion(motion, np.pi / 2, (1.0, 2.0, 3.0)))
     assert np.allclose(after, before[..., (1, 0, 2)] * (-1, 1, 1) + (1.0, 2.0, 3.0))
     angles = np.linspace(0, 1, len(motion))
-    each, _ = forward_kinematics(place(motion, angles))
-    one, _ = forward_kinematics(place(motion, angles[7]))
+    each, _ = forward_kinematics(place_motion(motion, angles))
+    one, _ = forward_kinematics(place_motion(motion, angles[7]))
     assert np.allclose(each[7], one[7])
 
 
 def test_cutting_and_joining(motion):
-    joined = concatenate([motion.frames(0, 8), motion.frames(8, 20)])
+    joined = concatenate_motions([motion.frames(0, 8), motion.frames(8, 20)])
     assert np.allclose(forward_kinematics(joined)[0], forward_kinematics(motion)[0])
     assert len(motion.frames(4, 9)) == 5
 
 
 def test_one_frame_is_a_motion():
     one = Motion(TREE, np.zeros((1, 3)), quaternion.identity(1, 4), 30.0)
-    assert one.duration == 0.0 and len(resample(one, 60.0)) == 1 and at_frames(one, np.array([0.3]))[0].shape == (1, 3)
+    assert one.duration == 0.0 and len(resample(one, 60.0)) == 1 and sample_frames(one, np.array([0.3]))[0].shape == (1, 3)
 
 
 def test_what_does_not_fit_is_refused():
@@ -112,4 +112,4 @@ def test_what_does_not_fit_is_refused():
 def test_one_joint_turns_in_the_world_as_all_do(motion):
     _, world = forward_kinematics(motion)
     for joint in range(len(motion.skeleton)):
-        assert np.allclose(world_rotation(motion.skeleton, motion.rotations, joint), world[:, joint])
+        assert np.allclose(compute_world_rotation(motion.skeleton, motion.rotations, joint), world[:, joint])

@@ -8,14 +8,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from beyond_mocap.base.vectors import cross
+from beyond_mocap.base.vectors import cross_product
 from beyond_mocap.motion import quaternion
 
 ORDERS = ["".join(order) for order in itertools.permutations("XYZ")]
 
 
 def random_rotations(*shape, seed=0) -> np.ndarray:
-    return quaternion.normalized(np.random.default_rng(seed).normal(size=(*shape, 4)))
+    return quaternion.normalize(np.random.default_rng(seed).normal(size=(*shape, 4)))
 
 
 def theirs(q) -> Rotation:
@@ -36,7 +36,7 @@ def test_products_inverses_and_turned_vectors_agree_with_scipy():
     assert np.allclose(quaternion.to_matrix(quaternion.multiply(A, B)), (theirs(A) * theirs(B)).as_matrix())
     assert np.allclose(quaternion.rotate(A, V), theirs(A).apply(V))
     assert np.allclose(quaternion.rotate(quaternion.inverse(A), quaternion.rotate(A, V)), V)
-    assert np.allclose(cross(V, V[::-1]), np.cross(V, V[::-1]))
+    assert np.allclose(cross_product(V, V[::-1]), np.cross(V, V[::-1]))
 
 
 def test_leading_axes_are_free():
@@ -53,22 +53,22 @@ def test_matrices_rotation_vectors_and_yaw():
     assert np.allclose(quaternion.to_rotation_vector(A), theirs(A).as_rotvec())
     small = np.array([[1e-12, 0, 0], [0, 0, 0], [0, 3e-6, 0]])
     assert np.allclose(quaternion.to_rotation_vector(quaternion.from_rotation_vector(small)), small, rtol=1e-9, atol=0)
-    assert quaternion.yaw(quaternion.about_up(0.7)) == pytest.approx(0.7)
-    assert np.allclose(quaternion.about_up(0.7), quaternion.about_axis(np.array([0.0, 0.0, 1.0]), 0.7))
+    assert quaternion.to_yaw(quaternion.from_up_angle(0.7)) == pytest.approx(0.7)
+    assert np.allclose(quaternion.from_up_angle(0.7), quaternion.from_axis_angle(np.array([0.0, 0.0, 1.0]), 0.7))
 
 
 def test_matrices_of_half_turns_come_back():
     for axis in np.eye(3):
-        half = quaternion.about_axis(axis, np.pi)
+        half = quaternion.from_axis_angle(axis, np.pi)
         assert same_rotation(quaternion.from_matrix(quaternion.to_matrix(half)), half) < 1e-12
 
 
 def test_between_turns_one_vector_onto_another_even_the_opposite():
-    turned = quaternion.rotate(quaternion.between(V, V[::-1]), V)
-    assert np.allclose(cross(turned, V[::-1]), 0.0, atol=1e-9) and np.all(
+    turned = quaternion.rotate(quaternion.rotation_between(V, V[::-1]), V)
+    assert np.allclose(cross_product(turned, V[::-1]), 0.0, atol=1e-9) and np.all(
         np.sum(turned * V[::-1], axis=-1) > 0
     )
-    assert np.allclose(quaternion.rotate(quaternion.between(V, -V), V), -V)
+    assert np.allclose(quaternion.rotate(quaternion.rotation_between(V, -V), V), -V)
 
 
 @pytest.mark.parametrize("order", ORDERS)
@@ -103,23 +103,23 @@ def test_the_rotation_comes_back_at_the_pole_too(order, away):
 
 @given(st.lists(st.tuples(*[st.floats(-1, 1)] * 4), min_size=1, max_size=20))
 def test_continuous_changes_signs_only_and_keeps_neighbours_close(values):
-    q = quaternion.normalized(np.array(values))
-    out = quaternion.continuous(q)
+    q = quaternion.normalize(np.array(values))
+    out = quaternion.unify_signs(q)
     assert np.array_equal(np.abs(out), np.abs(q)) and np.array_equal(out[0], q[0])
     assert np.all(np.sum(out[1:] * out[:-1], axis=-1) >= 0)
 
 
 def test_wrapped_angles_lie_within_half_a_turn_and_mean_the_same():
     angles = np.linspace(-20.0, 20.0, 401)
-    wrapped = quaternion.wrapped(angles)
+    wrapped = quaternion.wrap_angle(angles)
     assert np.all((wrapped >= -np.pi) & (wrapped < np.pi))
     assert np.allclose(np.exp(1j * wrapped), np.exp(1j * angles))
 
 
 def test_a_sign_is_taken_from_what_a_rotation_comes_from():
-    q = quaternion.about_up(np.array([0.3, 0.3]))
-    like = quaternion.about_up(np.array([0.4, 0.4])) * [[1.0], [-1.0]]
-    assert np.array_equal(quaternion.signed_like(q, like), q * [[1.0], [-1.0]])
+    q = quaternion.from_up_angle(np.array([0.3, 0.3]))
+    like = quaternion.from_up_angle(np.array([0.4, 0.4])) * [[1.0], [-1.0]]
+    assert np.array_equal(quaternion.match_signs(q, like), q * [[1.0], [-1.0]])
 
 
 def test_slerp_goes_the_short_way_at_constant_speed():
@@ -132,4 +132,4 @@ def test_slerp_goes_the_short_way_at_constant_speed():
 
 
 def test_zero_becomes_the_identity():
-    assert np.array_equal(quaternion.normalized(np.zeros((2, 4))), quaternion.identity(2))
+    assert np.array_equal(quaternion.normalize(np.zeros((2, 4))), quaternion.identity(2))

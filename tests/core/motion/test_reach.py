@@ -5,28 +5,28 @@ import pytest
 
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.motion import quaternion
-from beyond_mocap.motion.humanoid import identify
-from beyond_mocap.motion.limb import CLEAR_BEND, bent_limb, two_bone
-from beyond_mocap.motion.motion import pose_kinematics
-from beyond_mocap.synthetic.gait import gait
+from beyond_mocap.motion.humanoid import identify_joints
+from beyond_mocap.motion.limb import MIN_BEND, solve_posed_limb, solve_two_bone
+from beyond_mocap.motion.motion import compute_pose
+from beyond_mocap.synthetic.gait import build_gait
 
 
 @pytest.fixture(scope="module")
 def running():
-    return gait(3.5, 2.0, 60.0)
+    return build_gait(3.5, 2.0, 60.0)
 
 
 def leg(motion):
-    limb = identify(motion.skeleton).left
+    limb = identify_joints(motion.skeleton).left
     return limb.upper_leg, limb.lower_leg, limb.foot
 
 
 def kinematics(motion, rotations):
-    return pose_kinematics(motion.skeleton, motion.root_positions, rotations)
+    return compute_pose(motion.skeleton, motion.root_positions, rotations)
 
 
 def reach(motion, target, **options):
-    return two_bone(motion.skeleton, motion.root_positions, motion.rotations, leg(motion), target, **options)
+    return solve_two_bone(motion.skeleton, motion.root_positions, motion.rotations, leg(motion), target, **options)
 
 
 def test_meets_its_target_without_stretching(running):
@@ -76,17 +76,17 @@ def test_soft_reach_misses_by_less_than_four_millimetres_and_does_not_snap(runni
     root, rotations = np.repeat(still.root_positions, count, axis=0), np.repeat(still.rotations, count, axis=0)
     down = np.linspace(0.94, 1.02, count) * length
     target = places[0, upper] + down[:, None] * np.array([0.0, 0.0, -1.0])
-    moved = two_bone(still.skeleton, root, rotations, (upper, middle, end), target)
+    moved = solve_two_bone(still.skeleton, root, rotations, (upper, middle, end), target)
     inside = down <= length
     assert moved.miss[inside].max() < 0.004 and moved.miss[down < length - 0.011].max() < 1e-9
-    after, _ = pose_kinematics(still.skeleton, root, moved.rotations)
+    after, _ = compute_pose(still.skeleton, root, moved.rotations)
     knee = after[:, middle]
     assert np.abs(np.diff(knee, n=2, axis=0)).max() < 1e-3  # metres per step squared: smooth up to full stretch
 
 
 def test_knees_never_flip(running):
     places, _ = kinematics(running, running.rotations)
-    body = identify(running.skeleton)
+    body = identify_joints(running.skeleton)
     upper, middle, end = leg(running)
     rng = np.random.default_rng(0)
     wander = np.cumsum(rng.normal(size=(len(running), 3)) * 0.004, axis=0)
@@ -102,11 +102,11 @@ def test_a_straight_leg_bends_forward_and_targets_at_the_hip_are_survived(runnin
     skeleton = running.skeleton
     count = 3
     root, rotations = np.tile([0.0, 0.0, 1.0], (count, 1)), quaternion.identity(count, len(skeleton))
-    places, _ = pose_kinematics(skeleton, root, rotations)
+    places, _ = compute_pose(skeleton, root, rotations)
     upper, middle, end = leg(running)
     target = np.stack([places[0, end] + [0.0, 0.0, 0.2], places[0, upper], places[0, upper] + [0.5, 0.0, 0.0]])
-    moved = two_bone(skeleton, root, rotations, (upper, middle, end), target)
-    after, _ = pose_kinematics(skeleton, root, moved.rotations)
+    moved = solve_two_bone(skeleton, root, rotations, (upper, middle, end), target)
+    after, _ = compute_pose(skeleton, root, moved.rotations)
     assert np.all(np.isfinite(moved.rotations))
     assert after[0, middle, 0] > 0.1
     assert np.linalg.norm(after[2, end] - target[2]) < 1e-6
@@ -116,7 +116,7 @@ def test_end_rotation_and_pole_are_obeyed(running):
     places, world = kinematics(running, running.rotations)
     upper, middle, end = leg(running)
     target = places[:, end] + 0.2 * (places[:, upper] - places[:, end])
-    wanted = quaternion.about_up(np.full(len(running), 0.4))
+    wanted = quaternion.from_up_angle(np.full(len(running), 0.4))
     pole = np.tile([0.0, 1.0, 0.0], (len(running), 1))
     moved = reach(running, target, end_rotation=wanted, pole=pole)
     after, turned = kinematics(running, moved.rotations)
@@ -132,7 +132,7 @@ def test_end_rotation_and_pole_are_obeyed(running):
 def test_wrong_joints_are_refused(running):
     upper, middle, end = leg(running)
     with pytest.raises(InputError):
-        two_bone(
+        solve_two_bone(
             running.skeleton, running.root_positions, running.rotations, (upper, end, middle), running.root_positions
         )
 
@@ -140,22 +140,22 @@ def test_wrong_joints_are_refused(running):
 def test_a_knee_that_bends_backwards_in_one_frame_does_not_flip():
     """Blended poses may overstretch a knee for a frame; the plane it bends in comes from the frames before and
     after."""
-    motion = gait(2.0, 2.0, 30.0)
-    limb = identify(motion.skeleton).left
+    motion = build_gait(2.0, 2.0, 30.0)
+    limb = identify_joints(motion.skeleton).left
     rotations = np.array(motion.rotations)
     places, _ = kinematics(motion, motion.rotations)
     straightest = int(np.argmin(np.abs(2.0 * np.arccos(np.clip(rotations[:, limb.lower_leg, 0], -1.0, 1.0)))))
-    back = quaternion.about_axis(np.array([0.0, 1.0, 0.0]), np.array(-0.5))
+    back = quaternion.from_axis_angle(np.array([0.0, 1.0, 0.0]), np.array(-0.5))
     rotations[straightest, limb.lower_leg] = back
     chain = (limb.upper_leg, limb.lower_leg, limb.foot)
-    out = two_bone(motion.skeleton, motion.root_positions, rotations, chain, places[:, limb.foot]).rotations
-    knees = pose_kinematics(motion.skeleton, motion.root_positions, out)[0][:, limb.lower_leg]
+    out = solve_two_bone(motion.skeleton, motion.root_positions, rotations, chain, places[:, limb.foot]).rotations
+    knees = compute_pose(motion.skeleton, motion.root_positions, out)[0][:, limb.lower_leg]
     assert np.abs(knees - places[:, limb.lower_leg]).max() < 0.08
 
 
 def test_a_leg_that_bends_more_than_it_did_keeps_its_knee_steady():
     """A leg a centimetre short of straight whose knee trembles by 20 degrees, bent by ten more."""
-    motion = gait(1.4, 2.0, 60.0)
+    motion = build_gait(1.4, 2.0, 60.0)
     places, world = (values.copy() for values in kinematics(motion, motion.rotations))
     upper, middle, end = leg(motion)
     lengths = [np.linalg.norm(places[0, b] - places[0, a]) for a, b in ((upper, middle), (middle, end))]
@@ -168,8 +168,8 @@ def test_a_leg_that_bends_more_than_it_did_keeps_its_knee_steady():
     places[:, end] = places[:, middle] - off + np.sqrt(lengths[1] ** 2 - 0.05**2) * down
     target = places[:, end] - 0.1 * down
     swings = []
-    for clear in (CLEAR_BEND, np.full(count, 0.2)):
-        local, miss = bent_limb(motion.skeleton, places, world, (upper, middle, end), target, soft=1e-4, clear=clear)
+    for clear in (MIN_BEND, np.full(count, 0.2)):
+        local, miss = solve_posed_limb(motion.skeleton, places, world, (upper, middle, end), target, soft=1e-4, min_bend=clear)
         bone = motion.skeleton.offsets[middle]
         thigh = quaternion.multiply(world[:, motion.skeleton.parents[upper]], local[upper])
         swings.append(np.ptp(quaternion.rotate(thigh, np.tile(bone, (count, 1)))[:, 1]))

@@ -11,12 +11,12 @@ import pytest
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.motion import quaternion
-from beyond_mocap.motion.humanoid import heading, identify, leg_length
+from beyond_mocap.motion.humanoid import compute_heading, identify_joints, measure_leg_length
 from beyond_mocap.motion.motion import Motion, forward_kinematics
-from beyond_mocap.motion.retargeting.adult import adult_skeleton
-from beyond_mocap.motion.retargeting.retarget import Retargeter, load_bone_map, pair_joints, save_bone_map
+from beyond_mocap.motion.retargeting.adult import build_adult_skeleton
+from beyond_mocap.motion.retargeting.retarget import Retargeter, read_bone_map, pair_joints, write_bone_map
 from beyond_mocap.motion.skeleton import Skeleton
-from beyond_mocap.synthetic.gait import gait
+from beyond_mocap.synthetic.gait import build_gait
 
 MOCAP = Path(__file__).resolve().parents[4] / "shared/data/mocap"
 RECORDED = {
@@ -27,13 +27,13 @@ RECORDED = {
 
 def retarget(motion, skeleton, bone_map=None, **how):
     """The motion on another skeleton, studied by itself."""
-    return Retargeter(motion, skeleton, bone_map, **how).carry(motion)
+    return Retargeter(motion, skeleton, bone_map, **how).retarget(motion)
 
 
 def other_axes(motion: Motion, seed: int) -> Motion:
     """The same posed body whose joints' axes, and with them the rest pose, are turned at random."""
     skeleton = motion.skeleton
-    axes = quaternion.normalized(np.random.default_rng(seed).normal(size=(len(skeleton), 4)))
+    axes = quaternion.normalize(np.random.default_rng(seed).normal(size=(len(skeleton), 4)))
     seen = lambda joints, vectors: quaternion.rotate(quaternion.inverse(axes[list(joints)]), vectors)  # noqa: E731
     offsets = np.concatenate([np.zeros((1, 3)), seen(skeleton.parents[1:], skeleton.offsets[1:])])
     tips = seen(skeleton.end_parents, skeleton.end_offsets)
@@ -79,7 +79,7 @@ def direction(motion: Motion, joint: int, child: int) -> np.ndarray:
 
 @pytest.fixture(scope="module")
 def run() -> Motion:
-    return gait(3.0, 3.0, 60.0, turn_rate=0.5, seed=3)
+    return build_gait(3.0, 3.0, 60.0, turn_rate=0.5, seed=3)
 
 
 def test_the_same_skeleton_gives_the_motion_back(run):
@@ -91,7 +91,7 @@ def test_the_same_skeleton_gives_the_motion_back(run):
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_rest_poses_do_not_matter(run, seed):
-    tall = gait(2.0, 2.0, 30.0, adult_skeleton(2.0))
+    tall = build_gait(2.0, 2.0, 30.0, build_adult_skeleton(2.0))
     tall = renamed(tall, lambda i, old: f"Tall:{old}")
     plain = retarget(run, tall.skeleton, example=tall)
     assert apart(retarget(other_axes(run, seed), tall.skeleton, example=tall), plain) < 1e-6
@@ -100,9 +100,9 @@ def test_rest_poses_do_not_matter(run, seed):
 
 
 def test_the_same_gait_on_another_body_is_what_retargeting_gives():
-    small, tall = adult_skeleton(1.6), adult_skeleton(1.9)
-    ratio = leg_length(tall) / leg_length(small)
-    walk = gait(1.4, 3.0, 60.0, small)
+    small, tall = build_adult_skeleton(1.6), build_adult_skeleton(1.9)
+    ratio = measure_leg_length(tall) / measure_leg_length(small)
+    walk = build_gait(1.4, 3.0, 60.0, small)
     there = retarget(walk, tall)
     wanted = forward_kinematics(walk)[0] * ratio
     ankle = forward_kinematics(there)[0][:, 0, 2].mean() - wanted[:, 0, 2].mean()
@@ -112,19 +112,19 @@ def test_the_same_gait_on_another_body_is_what_retargeting_gives():
 
 
 def test_a_tilted_hinge_and_other_proportions_keep_directions_and_standing_feet(run):
-    skeleton = adult_skeleton(1.7)
+    skeleton = build_adult_skeleton(1.7)
     offsets = skeleton.offsets.copy()
     factors = {"LeftLeg": 1.12, "RightLeg": 1.12, "LeftFoot": 0.9, "RightFoot": 0.9, "LeftForeArm": 1.2}
     for name, factor in factors.items():
         offsets[skeleton.index(name)] *= factor
     other = Skeleton(skeleton.names, skeleton.parents, offsets, skeleton.end_parents, skeleton.end_offsets)
     there = retarget(run, other)
-    body = identify(other)
+    body = identify_joints(other)
     for limb in (body.left, body.right):
         bones = ((limb.upper_arm, limb.lower_arm, 1e-6), (limb.lower_arm, limb.hand, 1e-6), (limb.foot, limb.toe, 0.03))
         for high, low, most in bones:
             assert np.abs(direction(there, high, low) - direction(run, high, low)).max() < most
-    scale = leg_length(other) / leg_length(run.skeleton)
+    scale = measure_leg_length(other) / measure_leg_length(run.skeleton)
     feet = [body.left.foot, body.right.foot]
     moved = forward_kinematics(there)[0][:, feet, :2] - scale * forward_kinematics(run)[0][:, feet, :2]
     assert np.percentile(np.abs(moved), 99) < 0.02
@@ -132,9 +132,9 @@ def test_a_tilted_hinge_and_other_proportions_keep_directions_and_standing_feet(
 
 
 def test_knees_and_feet_keep_their_way(run):
-    there = retarget(run, other_axes(gait(1.5, 1.0, 30.0), 5).skeleton, example=other_axes(gait(1.5, 1.0, 30.0), 5))
-    body = identify(there.skeleton)
-    ahead = np.stack([np.cos(heading(there)), np.sin(heading(there)), np.zeros(len(there))], axis=1)
+    there = retarget(run, other_axes(build_gait(1.5, 1.0, 30.0), 5).skeleton, example=other_axes(build_gait(1.5, 1.0, 30.0), 5))
+    body = identify_joints(there.skeleton)
+    ahead = np.stack([np.cos(compute_heading(there)), np.sin(compute_heading(there)), np.zeros(len(there))], axis=1)
     for limb in (body.left, body.right):
         thigh, shank = direction(there, limb.upper_leg, limb.lower_leg), direction(there, limb.lower_leg, limb.foot)
         left = np.cross([0.0, 0.0, 1.0], ahead)
@@ -157,7 +157,7 @@ def test_missing_joints_degrade_gracefully(run, parts):
 
 
 def test_bones_stay_as_they_are(run):
-    there = retarget(run, adult_skeleton(1.5))
+    there = retarget(run, build_adult_skeleton(1.5))
     places, _ = forward_kinematics(there)
     lengths = np.linalg.norm(places[:, 1:] - places[:, list(there.skeleton.parents[1:])], axis=-1)
     assert np.ptp(lengths, axis=0).max() < 1e-12
@@ -182,15 +182,15 @@ def test_a_saved_map_goes_before_names(run, tmp_path):
     table = dict(zip(blind.skeleton.names, run.skeleton.names))
     (tmp_path / "map.json").write_text(json.dumps(table))
     assert apart(retarget(blind, run.skeleton, tmp_path / "map.json", example=run), run) < 1e-6
-    save_bone_map(tmp_path / "saved.json", pair_joints(blind, run.skeleton), blind.skeleton, run.skeleton)
-    saved = load_bone_map(tmp_path / "saved.json")
+    write_bone_map(tmp_path / "saved.json", pair_joints(blind, run.skeleton), blind.skeleton, run.skeleton)
+    saved = read_bone_map(tmp_path / "saved.json")
     assert saved["J0"] == "Hips" and set(saved.items()) <= set(table.items())
     assert apart(retarget(blind, run.skeleton, {"J0": "Hips"}, example=run), run) < 1e-6
 
 
 def test_unnamed_sides_are_paired(run):
     blind = renamed(run, lambda i, old: f"J{i}")
-    assert identify(blind.skeleton).mirror == identify(run.skeleton).mirror
+    assert identify_joints(blind.skeleton).mirror == identify_joints(run.skeleton).mirror
 
 
 @pytest.mark.parametrize(
@@ -252,14 +252,14 @@ def test_families_of_names(run, family):
             names[ours.format(**fill)] = theirs.format(**fill)
     slim = without(run, "Spine1", "Spine2")
     named = renamed(slim, lambda i, old: names[old])
-    assert identify(named.skeleton) == identify(slim.skeleton)
+    assert identify_joints(named.skeleton) == identify_joints(slim.skeleton)
 
 
 def recorded(folder: str) -> Motion:
     found = sorted(path for path in glob.glob(str(MOCAP / folder / "*.bvh")) if RECORDED[folder] in path)
     if not found:
         pytest.skip(f"no recordings in {MOCAP / folder}")
-    motion = bvh.read(found[0]).motion
+    motion = bvh.read_bvh(found[0]).motion
     step = max(1, round(motion.fps / 30.0))
     some = slice(0, 200 * step, step)
     return Motion(motion.skeleton, motion.root_positions[some], motion.rotations[some], motion.fps / step)
@@ -269,7 +269,7 @@ def recorded(folder: str) -> Motion:
 def test_recordings_go_and_come_back(folder):
     motion = recorded(folder)
     assert apart(retarget(motion, motion.skeleton), motion) < 1e-6
-    body = identify(motion.skeleton)
+    body = identify_joints(motion.skeleton)
     limbs = [(s.upper_leg, s.lower_leg, s.foot, s.lower_arm, s.hand) for s in (body.left, body.right)]
     for other in ("lafan1", "lmd/Player1", "cmu10"):
         example = recorded(other)
@@ -290,6 +290,6 @@ def test_footprints_can_be_kept_on_other_legs(run):
     longer = Skeleton(run.skeleton.names, run.skeleton.parents, run.skeleton.offsets * 1.08, run.skeleton.end_parents,
                       run.skeleton.end_offsets * 1.08)
     for keeps, ratio in ((True, 1.0), (False, 1.08)):
-        found = Retargeter(run, longer, keeps_travel=keeps).carry(run)
+        found = Retargeter(run, longer, keeps_travel=keeps).retarget(run)
         travel = [np.linalg.norm(m.root_positions[-1, :2] - m.root_positions[0, :2]) for m in (found, run)]
         assert travel[0] / travel[1] == pytest.approx(ratio, abs=0.01)

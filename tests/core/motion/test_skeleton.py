@@ -44,6 +44,6 @@ def test_arrays_are_copies_that_cannot_be_written():
 
 def test_same_bones_within_a_millimetre_and_the_same_fingerprint_within_a_tenth():
     near, far = (dataclasses.replace(ARM, offsets=ARM.offsets + shift) for shift in (1e-6, 2e-3))
-    assert ARM.same_bones(near) and not ARM.same_bones(far) and ARM.same_bones(far, 0.01)
+    assert ARM.has_same_bones(near) and not ARM.has_same_bones(far) and ARM.has_same_bones(far, 0.01)
     assert ARM.fingerprint == near.fingerprint != far.fingerprint
-    assert not ARM.same_bones(dataclasses.replace(ARM, names=("root", "upper", "hand")))
+    assert not ARM.has_same_bones(dataclasses.replace(ARM, names=("root", "upper", "hand")))

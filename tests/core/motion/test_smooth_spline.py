@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import BSpline
 
-from beyond_mocap.motion.path.smooth_spline import smoothing_spline, spline_within
+from beyond_mocap.motion.path.smooth_spline import fit_smoothing_spline, fit_spline_within
 
 AT = np.sort(np.random.default_rng(5).uniform(0.0, 6.0, 200))
 VALUES = np.stack([np.sin(AT), np.cos(1.7 * AT), AT**2], axis=1) + np.random.default_rng(6).normal(size=(200, 3))
@@ -23,7 +23,7 @@ def total(knots, coefficients, order, stiff):
 @pytest.mark.parametrize("closed, ends_met", [(False, False), (False, True), (True, False)])
 def test_no_change_makes_it_better(order, closed, ends_met):
     more = {"domain": (0.0, 6.0)} if closed else {}
-    knots, best = smoothing_spline(VALUES, AT, 12, 0.5, order, closed=closed, ends_met=ends_met, **more)
+    knots, best = fit_smoothing_spline(VALUES, AT, 12, 0.5, order, closed=closed, keep_ends=ends_met, **more)
     least = total(knots, best, order, 0.5)
     for own in range(12 if closed else 15):
         if ends_met and own in (0, 14):
@@ -39,7 +39,7 @@ def test_no_change_makes_it_better(order, closed, ends_met):
 
 
 def test_closed_and_open_ends():
-    knots, closed = smoothing_spline(VALUES, AT, 12, 0.5, 3, closed=True, domain=(0.0, 6.0))
+    knots, closed = fit_smoothing_spline(VALUES, AT, 12, 0.5, 3, closed=True, domain=(0.0, 6.0))
     assert np.array_equal(closed[:3], closed[-3:])
     spline = BSpline(knots, closed, 3)
     for derivative in (0, 1, 2):
@@ -50,11 +50,11 @@ def test_closed_and_open_ends():
 def test_what_costs_nothing_is_kept(order):
     """A line has no acceleration; a parabola's does not change."""
     values = np.stack([2 + 3 * AT, (AT**2 if order == 3 else -AT)], axis=1)
-    knots, coefficients = smoothing_spline(values, AT, 30, 1.0, order)
+    knots, coefficients = fit_smoothing_spline(values, AT, 30, 1.0, order)
     assert BSpline(knots, coefficients, 3)(AT) == pytest.approx(values, abs=1e-6)
 
 
 def test_within_a_slack():
     corner = np.abs(AT - 3.0)[:, None] * [4.0, 0.0]
-    knots, coefficients = spline_within(corner, AT, 40, 0.5, 0.05)
+    knots, coefficients = fit_spline_within(corner, AT, 40, 0.5, 0.05)
     assert np.linalg.norm(BSpline(knots, coefficients, 3)(AT) - corner, axis=1).max() < 0.06

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from beyond_mocap.passes.links import BONES, BoneWeights, aligned, measure_bones, weigh_bones
+from beyond_mocap.passes.links import BONES, BoneWeights, align_poses, measure_bones, weigh_bones
 from beyond_mocap.synthesis.plan import Plan
 from beyond_mocap.synthesis.resolve_plan import resolve_plan
-from beyond_mocap.synthesis.search.path_costs import Alike, PathCosts, Weights
-from beyond_mocap.synthesis.search.wanted import build_order
+from beyond_mocap.synthesis.search.path_costs import BoneDistance, PathCosts, Weights
+from beyond_mocap.synthesis.search.wanted import build_request
 
 
 def pose_distance(a, b):
@@ -17,7 +17,7 @@ def pose_distance(a, b):
 
 @pytest.fixture(scope="module")
 def costs(library, track, asked):
-    order = build_order(library, resolve_plan(Plan(track=track, timeline=asked), library))
+    order = build_request(library, resolve_plan(Plan(track=track, timeline=asked), library))
     return lambda **more: PathCosts(library, order, **more)
 
 
@@ -27,7 +27,7 @@ def test_it_is_equation_1(library):
     first, other = library.frames.first[:2]
     clips, at = library.clips[:2], np.array([3.0, 11.0])
     poses = [
-        aligned(clip.motion, library.frames.source[start + 3 : start + 12 : 8])
+        align_poses(clip.motion, library.frames.source[start + 3 : start + 12 : 8])
         for clip, start in zip(clips, (first, other))
     ]
     by_hand = np.zeros((2, 2))
@@ -44,13 +44,13 @@ def test_the_search_pays_for_it(library, costs):
     """A cut's price is eq. 1 where it is given, the mean over the frames around it; and the weights steer it."""
     ends, start = np.array([40.0, 90.0]), np.arange(200.0, 260.0)
     rows = weigh_bones(library)
-    one = dict(costs(alike=Alike(rows)).cut_terms(ends, start))["pose"]
+    one = dict(costs(alike=BoneDistance(rows)).iter_cut_terms(ends, start))["pose"]
     at = ends.astype(int), start.astype(int)
     np.testing.assert_allclose(one, Weights().pose * pose_distance(rows[at[0]], rows[at[1]]), rtol=1e-3, atol=1e-3)
-    around = dict(costs(alike=Alike(rows, (-6, 6))).cut_terms(ends, start))["pose"]
+    around = dict(costs(alike=BoneDistance(rows, (-6, 6))).iter_cut_terms(ends, start))["pose"]
     assert not np.allclose(one, around, rtol=0.02)
     hands = BoneWeights((0.0, 0.0, 8.0, 0.0, 0.0, 0.0), (0.0,) * 6)
-    other = dict(costs(alike=Alike(weigh_bones(library, hands))).cut_terms(ends, start))["pose"]
+    other = dict(costs(alike=BoneDistance(weigh_bones(library, hands))).iter_cut_terms(ends, start))["pose"]
     assert np.any(np.argsort(one[0]) != np.argsort(other[0]))
 
 
@@ -58,7 +58,7 @@ def test_without_it_the_features_count_as_ever(library, costs):
     ends, start = np.array([40.0]), np.arange(200.0, 210.0)
     features = library.frames.features
     wanted_cost = Weights().pose * np.linalg.norm(features[[40]][:, None] - features[200:210][None], axis=-1)
-    np.testing.assert_allclose(dict(costs().cut_terms(ends, start))["pose"], wanted_cost, rtol=1e-3, atol=1e-3)
+    np.testing.assert_allclose(dict(costs().iter_cut_terms(ends, start))["pose"], wanted_cost, rtol=1e-3, atol=1e-3)
 
 
 def test_a_pose_is_like_itself_wherever_it_stands(library):

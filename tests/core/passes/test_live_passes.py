@@ -9,8 +9,8 @@ import pytest
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.motion.motion import forward_kinematics
-from beyond_mocap.passes.hits import analyse
-from beyond_mocap.passes.live_passes import FADE, answer, begin
+from beyond_mocap.passes.hits import detect_hits
+from beyond_mocap.passes.live_passes import BLEND_SECONDS, build_answer, start_rally
 from beyond_mocap.passes.scene_json import SAMPLES, parse_scene
 
 CLIPS = Path(__file__).resolve().parents[3] / "sample_blend" / "passes" / "library"
@@ -23,26 +23,26 @@ def library(strikes_library):
 
 @pytest.fixture(scope="module")
 def rally(library):
-    return begin(library, parse_scene(SAMPLES["three"]), "Ann")
+    return start_rally(library, parse_scene(SAMPLES["three"]), "Ann")
 
 
 def hit_of(name, side="right"):
-    return analyse(bvh.read(CLIPS / f"{name}.bvh").motion, "foot", side).strongest
+    return detect_hits(bvh.read_bvh(CLIPS / f"{name}.bvh").motion, "foot", side).strongest
 
 
 @pytest.fixture(scope="module")
 def passed(library, rally):
     """A pass to Cho at 2 s, then a toss to Ben."""
-    first = answer(library, rally, 2.0, hit_of("volley_pass"), "Cho")
-    after = rally.after(first, 2.0)
-    second = answer(library, after, after.free + 0.5, hit_of("volley_toss"), "Ben", bounces=1)
-    return first, after, second, after.after(second, after.free + 0.5)
+    first = build_answer(library, rally, 2.0, hit_of("volley_pass"), "Cho")
+    after = rally.add_pass(first, 2.0)
+    second = build_answer(library, after, after.ready_time + 0.5, hit_of("volley_toss"), "Ben", bounces=1)
+    return first, after, second, after.add_pass(second, after.ready_time + 0.5)
 
 
 def test_they_stand_where_the_scene_says_and_the_ball_lies(rally):
     for player in rally.scene.players:
         played = rally.players[player.name]
-        np.testing.assert_allclose(played.at(0.0).place, player.place, atol=0.1)
+        np.testing.assert_allclose(played.stance_at(0.0).place, player.place, atol=0.1)
         assert len(played.motion) / played.motion.fps > 60.0
         moved = np.linalg.norm(played.motion.root_positions[:, :2] - player.place, axis=1)
         assert moved.max() < 0.25
@@ -80,7 +80,7 @@ def test_what_was_done_goes_over_into_the_pass(rally, passed):
     first, after, _, _ = passed
     old, new = rally.players["Ann"].motion, after.players["Ann"].motion
     np.testing.assert_allclose(new.root_positions[:61], old.root_positions[:61], atol=1e-9)
-    later = int(FADE * new.fps) + 1
+    later = int(BLEND_SECONDS * new.fps) + 1
     np.testing.assert_allclose(new.root_positions[60 + later :], first.motions["Ann"].root_positions[later:])
     assert after.players["Ben"] is rally.players["Ben"]
 
@@ -88,7 +88,7 @@ def test_what_was_done_goes_over_into_the_pass(rally, passed):
 def test_the_left_foot_is_answered_with_the_left(library, rally):
     hit = hit_of("volley_pass")
     left = replace(hit, side="left", vectors=hit.vectors * [1.0, -1.0, 1.0], velocity=hit.velocity * [1.0, -1.0, 1.0])
-    piece = answer(library, rally, 2.0, left, "Ben")
+    piece = build_answer(library, rally, 2.0, left, "Ben")
     places, _ = forward_kinematics(piece.motions["Ann"])
     feet = [piece.motions["Ann"].skeleton.names.index(name) for name in ("LeftFoot", "RightFoot")]
     frame = round(piece.strike * piece.motions["Ann"].fps)
@@ -99,9 +99,9 @@ def test_the_left_foot_is_answered_with_the_left(library, rally):
 @pytest.mark.parametrize("target, said", [("Ann", "both passer and receiver"), ("Zoe", "one of Ann")])
 def test_a_target_that_is_none(library, rally, target, said):
     with pytest.raises(InputError, match=said):
-        answer(library, rally, 2.0, hit_of("volley_pass"), target)
+        build_answer(library, rally, 2.0, hit_of("volley_pass"), target)
 
 
 def test_an_unknown_holder(library, rally):
     with pytest.raises(InputError, match="holder"):
-        begin(library, rally.scene, "Zoe")
+        start_rally(library, rally.scene, "Zoe")

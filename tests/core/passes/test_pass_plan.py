@@ -6,15 +6,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from beyond_mocap.annotation.striking import ball_gap
-from beyond_mocap.ball.contact import striking_surface
-from beyond_mocap.ball.flight import Launch, fly
-from beyond_mocap.base.errors import Cancelled, InputError, NotInLibrary
+from beyond_mocap.annotation.striking import measure_ball_gap
+from beyond_mocap.ball.contact import find_striking_surface
+from beyond_mocap.ball.flight import Launch, simulate_flight
+from beyond_mocap.base.errors import UserCancelledError, InputError, NotInLibraryError
 from beyond_mocap.motion import quaternion
-from beyond_mocap.motion.humanoid import heading_from_positions
-from beyond_mocap.motion.motion import at_frames, pose_kinematics
+from beyond_mocap.motion.humanoid import compute_heading_from_positions
+from beyond_mocap.motion.motion import sample_frames, compute_pose
 from beyond_mocap.passes.pass_court import ON_TARGET
-from beyond_mocap.passes.passes import ball_of, ball_path, planned
+from beyond_mocap.passes.passes import build_ball, build_ball_path, plan_scene
 from beyond_mocap.passes.scene_json import SAMPLES, parse_scene
 
 
@@ -36,7 +36,7 @@ def plans(strikes_library):
 
     def plan(name):
         if name not in kept:
-            kept[name] = (scene_of(name), planned(strikes_library, scene_of(name)))
+            kept[name] = (scene_of(name), plan_scene(strikes_library, scene_of(name)))
         return kept[name]
 
     return plan
@@ -60,7 +60,7 @@ def test_times_are_a_chain_of_travels_on_whole_frames(plans, name):
 def test_every_ball_comes_to_the_next_strike_with_its_bounces(plans, name):
     scene, plan = plans(name)
     for before, after in zip(plan.strikes, plan.strikes[1:]):
-        flight = fly(Launch(0.0, before.order.ball, before.velocity_out, before.spin), ball_of(scene), before.travel)
+        flight = simulate_flight(Launch(0.0, before.order.ball, before.velocity_out, before.spin), build_ball(scene), before.travel)
         assert np.linalg.norm(flight.at([before.travel])[0] - after.order.ball) <= ON_TARGET
         assert np.sum(flight.bounces < before.travel - 2e-3) == before.bounces
         assert np.allclose(flight.velocity([before.travel - 2e-3])[0], after.velocity_in, atol=0.1)
@@ -71,21 +71,21 @@ def test_the_ball_is_on_the_surface_that_strikes(plans, strikes_library, name):
     scene, plan = plans(name)
     for one in plan.strikes:
         order, motion = one.order, strikes_library.clips[one.order.clip].motion
-        surface = striking_surface(motion.skeleton, order.part, order.side, order.tool)
+        surface = find_striking_surface(motion.skeleton, order.part, order.side, order.tool)
         places, world = laid(motion, order)
-        gap = ball_gap(surface.line(places, world), surface.radius, np.array(order.ball), ball_of(scene).radius)
-        low = order.ball[2] <= ball_of(scene).radius + 1e-9  # there it lies on the ground
+        gap = measure_ball_gap(surface.compute_line(places, world), surface.radius, np.array(order.ball), build_ball(scene).radius)
+        low = order.ball[2] <= build_ball(scene).radius + 1e-9  # there it lies on the ground
         assert abs(gap) < (0.1 if low else 1e-6)
         assert order.hit.first <= order.strike_frame <= order.hit.last
 
 
 def laid(motion, order):
     """Joints' places (J, 3) m and rotations (J, 4) of a clip's pose as an order lays it on the pitch."""
-    root, local = at_frames(motion, np.array([order.strike_frame]))
-    places, _ = pose_kinematics(motion.skeleton, root, local)
-    turn = quaternion.about_up(order.facing - heading_from_positions(motion.skeleton, places))
+    root, local = sample_frames(motion, np.array([order.strike_frame]))
+    places, _ = compute_pose(motion.skeleton, root, local)
+    turn = quaternion.from_up_angle(order.facing - compute_heading_from_positions(motion.skeleton, places))
     local[:, 0] = quaternion.multiply(turn, local[:, 0])
-    places, world = pose_kinematics(motion.skeleton, np.array([[*order.place, root[0, 2]]]), local)
+    places, world = compute_pose(motion.skeleton, np.array([[*order.place, root[0, 2]]]), local)
     return places[0], world[0]
 
 
@@ -100,11 +100,11 @@ def test_the_ball_is_pushed_away_from_the_part(plans, name):
 @NAMES
 def test_the_path_has_no_jumps_and_never_goes_under_ground(plans, name):
     scene, plan = plans(name)
-    path = ball_path(plan)
+    path = build_ball_path(plan)
     step = np.linalg.norm(np.diff(path.positions, axis=0), axis=1)
     fastest = max(np.linalg.norm([one.velocity_in, one.velocity_out], axis=1).max() for one in plan.strikes)
     assert step.max() * plan.fps < 1.2 * fastest + 1.0
-    assert path.positions[:, 2].min() >= ball_of(scene).radius - 1e-6
+    assert path.positions[:, 2].min() >= build_ball(scene).radius - 1e-6
     assert np.allclose(np.linalg.norm(path.rotations, axis=1), 1.0)
     for one in plan.strikes:
         frame = int(round(one.order.time * plan.fps))
@@ -113,11 +113,11 @@ def test_the_path_has_no_jumps_and_never_goes_under_ground(plans, name):
 
 def test_balls_go_over_the_net(plans):
     scene, plan = plans("volley_net")
-    path, crossed = ball_path(plan).positions, 0
+    path, crossed = build_ball_path(plan).positions, 0
     for a, b in zip(path, path[1:]):
         if (a[0] > 0) != (b[0] > 0):
             share = a[0] / (a[0] - b[0])
-            assert a[2] + share * (b[2] - a[2]) > scene.net.height + ball_of(scene).radius - 0.02
+            assert a[2] + share * (b[2] - a[2]) > scene.net.height + build_ball(scene).radius - 0.02
             crossed += 1
     assert crossed >= 5
 
@@ -131,24 +131,24 @@ def test_kinds_are_told_apart(plans):
 
 
 def test_the_same_scene_is_the_same_bits(strikes_library):
-    first, again = (planned(strikes_library, scene_of("dropped")) for _ in range(2))
-    assert ball_path(first).positions.tobytes() == ball_path(again).positions.tobytes()
+    first, again = (plan_scene(strikes_library, scene_of("dropped")) for _ in range(2))
+    assert build_ball_path(first).positions.tobytes() == build_ball_path(again).positions.tobytes()
     assert [one.order.clip for one in first.strikes] == [one.order.clip for one in again.strikes]
 
 
 def test_eighths_of_a_turn(strikes_library):
     scene = scene_of("dropped", directions=8)
-    for one in planned(strikes_library, scene).strikes:
-        eighths = (one.order.facing - scene.facing(one.player)) / (0.25 * np.pi)
+    for one in plan_scene(strikes_library, scene).strikes:
+        eighths = (one.order.facing - scene.find_facing(one.player)) / (0.25 * np.pi)
         assert abs(eighths - round(eighths)) < 1e-9
 
 
 def test_an_example_is_imitated(strikes_library):
     """The strike most like a stretch of the attack is the attack itself, whatever the kind says."""
     one = {"kind": "toss", "example": {"clip": "volley_attack.bvh", "from": 0.5}}
-    played = planned(strikes_library, two(**one)).strikes[0]
+    played = plan_scene(strikes_library, two(**one)).strikes[0]
     assert strikes_library.clips[played.order.clip].path.startswith("volley_attack")
-    plain = planned(strikes_library, two(kind="toss")).strikes[0]
+    plain = plan_scene(strikes_library, two(kind="toss")).strikes[0]
     assert strikes_library.clips[plain.order.clip].path.startswith("volley_toss")
 
 
@@ -157,21 +157,21 @@ def test_an_example_that_is_not_there(strikes_library):
     fouls = (({"clip": "none.bvh"}, "no recording"), (late, "a time up to"), ({"clip": "ready_1.bvh"}, "no strike"))
     for example, word in fouls:
         with pytest.raises(InputError, match=word):
-            planned(strikes_library, two(example=example))
+            plan_scene(strikes_library, two(example=example))
 
 
 def test_asked_seconds_are_kept(strikes_library):
-    plan = planned(strikes_library, two(seconds=1.5, bounces=0))
+    plan = plan_scene(strikes_library, two(seconds=1.5, bounces=0))
     assert plan.strikes[0].travel == pytest.approx(1.5)
 
 
 @pytest.mark.parametrize("side", ["left", "right"])
 def test_sides(strikes_library, side):
-    assert {one.order.side for one in planned(strikes_library, two(side=side)).strikes[:1]} == {side}
+    assert {one.order.side for one in plan_scene(strikes_library, two(side=side)).strikes[:1]} == {side}
 
 
 def test_a_joint_strikes(strikes_library):
-    plan = planned(strikes_library, two(part="RightLeg", bounces=0))
+    plan = plan_scene(strikes_library, two(part="RightLeg", bounces=0))
     assert plan.strikes[0].order.part == "RightLeg"
 
 
@@ -183,13 +183,13 @@ def test_a_joint_strikes(strikes_library):
 ])
 def test_what_cannot_be_is_told(strikes_library, far, one, word):
     with pytest.raises(InputError, match=word) as caught:
-        planned(strikes_library, two(far, **one))
+        plan_scene(strikes_library, two(far, **one))
     assert "\n" not in str(caught.value) and "pass 1" in str(caught.value)
 
 
 def test_what_the_library_lacks(strikes_library, clips_folder, library):
-    with pytest.raises(NotInLibrary) as caught:
-        planned(library, two(part="chest"))
+    with pytest.raises(NotInLibraryError) as caught:
+        plan_scene(library, two(part="chest"))
     assert "chest" in str(caught.value)
 
 
@@ -199,20 +199,20 @@ def test_what_the_library_lacks(strikes_library, clips_folder, library):
                                         ({"drag": [0.1, 0.1, 0.1]}, "drag")])
 def test_balls_that_are_none(strikes_library, ball, word):
     with pytest.raises(InputError, match=word):
-        planned(strikes_library, replace(two(), ball=parse_scene({**SAMPLES["three"], "ball": ball}).ball))
+        plan_scene(strikes_library, replace(two(), ball=parse_scene({**SAMPLES["three"], "ball": ball}).ball))
 
 
 def test_a_net_that_nobody_gets_over(strikes_library):
     scene = scene_of("volley_net", net={"from": [0, -5], "to": [0, 5], "height": 10.0})
     with pytest.raises(InputError, match="net of 10 m"):
-        planned(strikes_library, scene)
+        plan_scene(strikes_library, scene)
 
 
 def test_a_missed_ball_goes_past_and_on(strikes_library):
-    plan = planned(strikes_library, two(error="missed"))
+    plan = plan_scene(strikes_library, two(error="missed"))
     last = plan.strikes[-1]
     assert last.outcome == "missed" and not last.order.touches
-    path = ball_path(plan)
+    path = build_ball_path(plan)
     frame = int(round(last.order.time * plan.fps))
     assert 0.3 < np.linalg.norm(path.positions[frame] - last.order.ball) < 0.6
     assert path.positions[-1, 0] > 5.5, "it is behind who missed it"
@@ -220,44 +220,44 @@ def test_a_missed_ball_goes_past_and_on(strikes_library):
 
 def test_chance_ends_the_rally(strikes_library):
     scene = scene_of("three", errors={"dropped": 0.5}, seed=5)
-    plan = planned(strikes_library, scene)
+    plan = plan_scene(strikes_library, scene)
     assert plan.strikes[-1].outcome == "dropped" and 1 < len(plan.strikes) <= 10
-    assert len(planned(strikes_library, replace(scene, dropped=0.0, missed=1.0)).strikes) == 2
+    assert len(plan_scene(strikes_library, replace(scene, dropped=0.0, missed=1.0)).strikes) == 2
 
 
 def test_a_served_ball_is_in_the_air_from_the_beginning(plans):
     _, plan = plans("three")
-    path = ball_path(plan)
+    path = build_ball_path(plan)
     first = int(round(plan.strikes[0].order.time * plan.fps))
     assert np.linalg.norm(np.diff(path.positions[: first + 1], axis=0), axis=1).min() > 0.01, "it never hangs"
 
 
 def test_a_ball_that_lies_on_the_ground(strikes_library):
-    plan = planned(strikes_library, scene_of("dropped", serve="ground"))
-    path = ball_path(plan)
+    plan = plan_scene(strikes_library, scene_of("dropped", serve="ground"))
+    path = build_ball_path(plan)
     first = int(round(plan.strikes[0].order.time * plan.fps))
     assert np.ptp(path.positions[: first + 1], axis=0).max() < 1e-9
     assert path.positions[0, 2] == pytest.approx(0.11)
     with pytest.raises(InputError, match="lies on the ground"):
         players = [{**one, "part": "head"} for one in SAMPLES["dropped"]["players"]]
-        planned(strikes_library, scene_of("dropped", serve="ground", players=players))
+        plan_scene(strikes_library, scene_of("dropped", serve="ground", players=players))
 
 
 def test_who_has_too_little_time_is_told(strikes_library):
     scene = scene_of("dropped", defaults={"seconds": 0.35, "bounces": 0})
-    assert any("needs" in line for line in planned(strikes_library, scene).warnings)
+    assert any("needs" in line for line in plan_scene(strikes_library, scene).warnings)
 
 
 def test_a_ball_through_somebody_is_told(strikes_library):
     players = [{"name": "Ann", "place": [0, 0]}, {"name": "Ben", "place": [6, 0]},
                {"name": "Cho", "place": [3, 0.26]}, {"name": "Dia", "place": [3, -0.26]}]
     passes = [{"from": "Ann", "to": "Ben", "seconds": 0.6, "bounces": 0}]
-    plan = planned(strikes_library, parse_scene({"players": players, "passes": passes}))
+    plan = plan_scene(strikes_library, parse_scene({"players": players, "passes": passes}))
     assert any("through" in line for line in plan.warnings)
     free = parse_scene({"players": players, "passes": [{"from": "Ann", "to": "Ben", "bounces": 0}]})
-    assert planned(strikes_library, free).warnings == (), "with time of its own it goes over him"
+    assert plan_scene(strikes_library, free).warnings == (), "with time of its own it goes over him"
 
 
 def test_it_can_be_stopped(strikes_library):
-    with pytest.raises(Cancelled):
-        planned(strikes_library, scene_of(), cancelled=lambda: True)
+    with pytest.raises(UserCancelledError):
+        plan_scene(strikes_library, scene_of(), cancelled=lambda: True)

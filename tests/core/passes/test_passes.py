@@ -7,18 +7,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from beyond_mocap.annotation.striking import ball_gap
-from beyond_mocap.ball.contact import striking_surface
-from beyond_mocap.base.errors import Cancelled, NotInLibrary
+from beyond_mocap.annotation.striking import measure_ball_gap
+from beyond_mocap.ball.contact import find_striking_surface
+from beyond_mocap.base.errors import UserCancelledError, NotInLibraryError
 from beyond_mocap.cli.main import main
-from beyond_mocap.cli.outputs import Told
+from beyond_mocap.cli.outputs import ProgressReporter
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.files.tables import read_ball
-from beyond_mocap.motion.humanoid import stature
+from beyond_mocap.motion.humanoid import estimate_stature
 from beyond_mocap.motion.motion import forward_kinematics
 from beyond_mocap.passes.links import BONES, BoneWeights
 from beyond_mocap.passes.pass_scene import Weights
-from beyond_mocap.passes.passes import ball_of, bone_weights, list_unlabelled_strikes, passes, planned
+from beyond_mocap.passes.passes import build_ball, build_bone_weights, list_unlabelled_strikes, synthesize_passes, plan_scene
 from beyond_mocap.passes.scene_json import SAMPLES, parse_scene
 from beyond_mocap.synthesis.provenance import read_provenance
 
@@ -36,7 +36,7 @@ def played(strikes_library):
     def play(name):
         if name not in kept:
             said = TALL if name == "tall" else json.loads(json.dumps(SAMPLES[name]))
-            kept[name] = passes(strikes_library, parse_scene(said))
+            kept[name] = synthesize_passes(strikes_library, parse_scene(said))
         return kept[name]
 
     return play
@@ -46,15 +46,15 @@ def played(strikes_library):
 def test_every_strike_meets_the_ball(played, name):
     """The part's surface in the motion as it is written touches the ball's, within 5 mm."""
     whole = played(name)
-    radius = ball_of(whole.scene).radius
+    radius = build_ball(whole.scene).radius
     for player in whole.players:
         motion = player.take.motion
         places, world = forward_kinematics(motion)
-        for order in whole.plan.orders(player.name):
+        for order in whole.plan.list_orders(player.name):
             frame = int(round(order.time * whole.plan.fps))
-            surface = striking_surface(motion.skeleton, order.part, order.side, order.tool)
-            line, ball = surface.line(places[frame], world[frame]), whole.ball.positions[frame]
-            gap = ball_gap(line, surface.radius, ball, radius)
+            surface = find_striking_surface(motion.skeleton, order.part, order.side, order.tool)
+            line, ball = surface.compute_line(places[frame], world[frame]), whole.ball.positions[frame]
+            gap = measure_ball_gap(line, surface.radius, ball, radius)
             assert abs(gap) < (0.005 if name != "tall" else 0.01)
     assert max(whole.gap(number) for number in range(len(whole.plan.strikes))) < 0.005
     assert whole.warnings == ()
@@ -73,13 +73,13 @@ def test_a_small_players_tool_keeps_its_size(strikes_library):
     """The hand hardly has to move: the racquet of the plan is the one in his hand."""
     said = json.loads(json.dumps(SAMPLES["racquet"]))
     said.update(repeat=1, players=[{**one, "height": 1.2} for one in said["players"]])
-    whole = passes(strikes_library, parse_scene(said))
-    assert max(float(np.nanmax(player.moved)) for player in whole.players) < 0.01
+    whole = synthesize_passes(strikes_library, parse_scene(said))
+    assert max(float(np.nanmax(player.part_shifts)) for player in whole.players) < 0.01
 
 
 def test_players_of_their_own_height(played):
     whole = played("tall")
-    sizes = [stature(player.take.motion.skeleton) for player in whole.players]
+    sizes = [estimate_stature(player.take.motion.skeleton) for player in whole.players]
     assert np.allclose(sizes, [1.5, 2.0], atol=0.02)
 
 
@@ -91,7 +91,7 @@ def test_who_is_to_meet_it_elsewhere_goes_there(played):
 
 
 def test_the_same_bits(played, strikes_library):
-    again = passes(strikes_library, parse_scene(json.loads(json.dumps(SAMPLES["dropped"]))))
+    again = synthesize_passes(strikes_library, parse_scene(json.loads(json.dumps(SAMPLES["dropped"]))))
     for one, other in zip(played("dropped").players, again.players):
         assert one.take.motion.rotations.tobytes() == other.take.motion.rotations.tobytes()
     assert played("dropped").ball.positions.tobytes() == again.ball.positions.tobytes()
@@ -103,13 +103,13 @@ def test_progress_goes_up_and_work_can_be_stopped(strikes_library):
     def stop():
         return bool(shares) and shares[-1] > 0.4
 
-    with pytest.raises(Cancelled):
-        passes(strikes_library, parse_scene(SAMPLES["dropped"]), lambda share, text: shares.append(share), stop)
+    with pytest.raises(UserCancelledError):
+        synthesize_passes(strikes_library, parse_scene(SAMPLES["dropped"]), lambda share, text: shares.append(share), stop)
     assert shares == sorted(shares) and shares[-1] < 0.9
 
 
 def test_weights_of_equation_1_are_so_many_times_the_usual_ones():
-    own, asked = BoneWeights(), bone_weights(Weights(position=2.0, bones={"left foot": 3.0}))
+    own, asked = BoneWeights(), build_bone_weights(Weights(position=2.0, bones={"left foot": 3.0}))
     foot = BONES.index("left foot")
     assert asked.position[foot] == 6.0 * own.position[foot] and asked.velocity[foot] == 3.0 * own.velocity[foot]
     assert asked.position[0] == 2.0 * own.position[0] and asked.velocity[0] == own.velocity[0]
@@ -146,7 +146,7 @@ def test_what_is_written(run, tmp_path):
     report = json.loads((tmp_path / "out" / "scene.report.json").read_text())
     rows = list(csv.DictReader((tmp_path / "out" / "strikes.csv").open()))
     assert [row["outcome"] for row in rows] == ["struck", "dropped"] == [one["outcome"] for one in report["strikes"]]
-    assert len(ball.times) == report["frames"] == len(bvh.read(tmp_path / "out" / "Ann.bvh").motion)
+    assert len(ball.times) == report["frames"] == len(bvh.read_bvh(tmp_path / "out" / "Ann.bvh").motion)
     assert len(read_provenance(tmp_path / "out" / "Cho.provenance.csv")) == report["frames"]
     frame = int(rows[0]["frame"])
     assert np.allclose(ball.positions[frame], [float(rows[0][axis]) for axis in ("x_m", "y_m", "z_m")], atol=1e-3)
@@ -193,7 +193,7 @@ def test_other_fouls(run, tmp_path, clips_folder, monkeypatch):
     assert run(SAMPLES["three"], out="no/such/place")[0] == 2
     status, _, error = run({**SAMPLES["three"], "defaults": {"part": "chest"}}, library=clips_folder)
     assert status == 3 and len(error) == 1 and "chest" in error[0] and "add clips" in error[0]
-    monkeypatch.setattr(Told, "cancelled", lambda self: True)
+    monkeypatch.setattr(ProgressReporter, "cancelled", lambda self: True)
     assert run(SAMPLES["three"])[0] == 130
     assert not (tmp_path / "out").exists()
 
@@ -203,16 +203,16 @@ def test_strikes_that_no_words_tell_of_are_told(strikes_library):
         return replace(row, words=("standing",), key=None) if "stroke" in row.words else row
 
     scene = parse_scene(SAMPLES["racquet"])
-    assert list_unlabelled_strikes(strikes_library, planned(strikes_library, scene)) == []
+    assert list_unlabelled_strikes(strikes_library, plan_scene(strikes_library, scene)) == []
     silent = tuple(
         replace(clip, annotations=tuple(quiet(row) for row in clip.annotations)) for clip in strikes_library.clips
     )
-    told = passes(replace(strikes_library, clips=silent, kept=None), scene).warnings
+    told = synthesize_passes(replace(strikes_library, clips=silent, kept=None), scene).warnings
     assert any("no labels of the library name strikes with the tool" in line for line in told)
 
 
 def test_who_gets_up_strikes_nothing(strikes_library):
-    up = tuple(replace(clip, annotations=tuple(replace(row, words=("getting_up",)) for row in clip.annotations))
+    up = tuple(replace(clip, annotations=tuple(replace(row, words=("build_get_up",)) for row in clip.annotations))
                for clip in strikes_library.clips)
-    with pytest.raises(NotInLibrary, match="strikes with"):
-        passes(replace(strikes_library, clips=up, kept=None), parse_scene(SAMPLES["racquet"]))
+    with pytest.raises(NotInLibraryError, match="strikes with"):
+        synthesize_passes(replace(strikes_library, clips=up, kept=None), parse_scene(SAMPLES["racquet"]))

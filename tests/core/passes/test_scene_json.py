@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.passes import links
-from beyond_mocap.passes.pass_scene import BONES, GROUND, Example, PassScene, served_by
+from beyond_mocap.passes.pass_scene import BONES, GROUND, Example, PassScene, find_server
 from beyond_mocap.passes.scene_json import SAMPLES as KEPT
-from beyond_mocap.passes.scene_json import parse_scene, read_scene, scene_dict, scene_text
+from beyond_mocap.passes.scene_json import parse_scene, read_scene, to_json, format_scene
 
 SAMPLES = sorted((Path(__file__).resolve().parents[3] / "sample_blend" / "passes").glob("*.json"))
 THREE = {
@@ -49,8 +49,8 @@ def test_what_is_not_said_is_as_in_the_paper():
     assert [one.kind for one in scene.passes] == ["pass"] * 3
     assert [one.bounces for one in scene.passes] == [1] * 3
     assert scene.ball.kind == "paper" and scene.fps == 30.0 and scene.watch
-    assert math.isclose(scene.facing("A"), -math.pi / 2)
-    assert served_by(scene) == "C"
+    assert math.isclose(scene.find_facing("A"), -math.pi / 2)
+    assert find_server(scene) == "C"
 
 
 def test_everything_that_can_be_said():
@@ -76,8 +76,8 @@ def test_defaults_are_every_pass_that_does_not_say_otherwise():
 @pytest.mark.parametrize("path", SAMPLES, ids=lambda path: path.stem)
 def test_samples_are_read_and_written_back(path):
     scene = read_scene(path)
-    assert parse_scene(scene_text(scene)) == scene
-    assert parse_scene(scene_dict(scene)) == scene
+    assert parse_scene(format_scene(scene)) == scene
+    assert parse_scene(to_json(scene)) == scene
     assert parse_scene(KEPT[path.stem]) == scene
 
 
@@ -207,7 +207,7 @@ def test_any_facing_is_written_as_it_is_read(degrees):
     scene = json.loads(json.dumps(KEPT["three"]))
     scene["players"][0]["facing"] = degrees
     found = parse_scene(scene)
-    assert parse_scene(scene_text(found)) == found
+    assert parse_scene(format_scene(found)) == found
     wanted = math.radians(math.remainder(degrees, 360.0))
     assert math.isclose(math.cos(found.players[0].facing), math.cos(wanted), abs_tol=1e-9)
 
@@ -230,7 +230,7 @@ def test_any_value_anywhere_makes_a_scene_or_one_line(changes):
     except InputError as error:
         assert "\n" not in str(error)
     else:
-        assert parse_scene(scene_text(found)) == found
+        assert parse_scene(format_scene(found)) == found
 
 
 @settings(max_examples=200, deadline=None)

@@ -11,19 +11,19 @@ import pytest
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.cli.main import main
 from beyond_mocap.files.bvh import bvh
-from beyond_mocap.passes.stream.bvh_stream import BvhStream, hierarchy_of
-from beyond_mocap.passes.stream.listener import LOOPBACK, Listener, poses
+from beyond_mocap.passes.stream.bvh_stream import BvhStream, read_hierarchy
+from beyond_mocap.passes.stream.listener import LOOPBACK, Listener, convert_poses
 from beyond_mocap.passes.stream.live_hits import LiveHits
 from beyond_mocap.passes.stream.sender import Sender
-from beyond_mocap.synthetic.gait import gait
-from beyond_mocap.synthetic.gestures import strike
+from beyond_mocap.synthetic.gait import build_gait
+from beyond_mocap.synthetic.gestures import build_strike
 
 
 @pytest.fixture(scope="module")
 def clip(tmp_path_factory):
     """Two seconds of walking at 60 frames a second."""
     path = tmp_path_factory.mktemp("stream") / "walk.bvh"
-    bvh.write(path, gait(1.4, 2.0, 60.0))
+    bvh.write_bvh(path, build_gait(1.4, 2.0, 60.0))
     return path
 
 
@@ -57,10 +57,10 @@ def test_a_file_in_pieces_is_the_file(clip, text, size):
     stream, frames, data = BvhStream(), [], text.encode()
     for start in range(0, len(data), size):
         frames += stream.feed(data[start : start + size])
-    motion = bvh.read(clip).motion
-    root, rotations = stream.rows.poses(np.array([frame.values for frame in frames]))
-    assert len(frames) == len(motion) and stream.rubbish == 0 and stream.frame_time == pytest.approx(1 / 60.0, abs=1e-6)
-    assert stream.rows.skeleton.same_bones(motion.skeleton)
+    motion = bvh.read_bvh(clip).motion
+    root, rotations = stream.rows.compute_poses(np.array([frame.values for frame in frames]))
+    assert len(frames) == len(motion) and stream.invalid_count == 0 and stream.frame_time == pytest.approx(1 / 60.0, abs=1e-6)
+    assert stream.rows.skeleton.has_same_bones(motion.skeleton)
     np.testing.assert_allclose(root, motion.root_positions, atol=1e-9)
     np.testing.assert_allclose(np.abs(np.sum(rotations * motion.rotations, axis=-1)), 1.0, atol=1e-9)
 
@@ -68,27 +68,27 @@ def test_a_file_in_pieces_is_the_file(clip, text, size):
 def test_the_neuron_form_needs_a_hierarchy(clip, text):
     rows = " || ".join("0 Avatar00 " + row for row in rows_of(text)[:5]) + " ||"
     blind = BvhStream()
-    assert blind.feed(rows.encode()) == [] and blind.rubbish == 5 and "hierarchy" in blind.told
-    told = BvhStream(hierarchy_of(clip))
-    assert len(told.feed(rows.encode())) == 5 and told.rubbish == 0
+    assert blind.feed(rows.encode()) == [] and blind.invalid_count == 5 and "hierarchy" in blind.last_error
+    told = BvhStream(read_hierarchy(clip))
+    assert len(told.feed(rows.encode())) == 5 and told.invalid_count == 0
 
 
 def test_only_the_first_avatar_is_taken(clip, text):
-    stream, row = BvhStream(hierarchy_of(clip)), rows_of(text)[0]
+    stream, row = BvhStream(read_hierarchy(clip)), rows_of(text)[0]
     frames = stream.feed(f"0 Anna {row} || 1 Bert {row} || 0 Anna {row} ||".encode())
-    assert len(frames) == 2 and stream.others == 1 and stream.rubbish == 0
+    assert len(frames) == 2 and stream.other_avatars == 1 and stream.invalid_count == 0
 
 
 def test_rubbish_is_no_avatar_and_after_a_loss_another_one_may_come(clip, text):
-    stream = BvhStream(hierarchy_of(clip))
-    assert stream.feed(b"hello there friend\n7 Nobody 1 2 ||") == [] and stream.rubbish == 2
+    stream = BvhStream(read_hierarchy(clip))
+    assert stream.feed(b"hello there friend\n7 Nobody 1 2 ||") == [] and stream.invalid_count == 2
     for name in ("First", "Second"):
-        assert len(stream.feed(f"0 {name} {rows_of(text)[0]} ||".encode())) == 1 and stream.others == 0
-        stream.lost()
+        assert len(stream.feed(f"0 {name} {rows_of(text)[0]} ||".encode())) == 1 and stream.other_avatars == 0
+        stream.drop_partial()
 
 
 def test_the_clock_is_read(clip, text):
-    stream = BvhStream(hierarchy_of(clip))
+    stream = BvhStream(read_hierarchy(clip))
     frames = stream.feed(f"# a remark\n# sent 12.5\n{rows_of(text)[0]}\n{rows_of(text)[1]}\n".encode())
     assert [frame.sent for frame in frames] == [12.5, None]
 
@@ -109,11 +109,11 @@ def test_a_hierarchy_that_comes_again_changes_nothing(text):
 def test_rubbish_is_counted_and_left_out(text, rubbish):
     stream = BvhStream()
     stream.feed(text.encode())
-    before, skeleton = stream.rubbish, stream.rows.skeleton
+    before, skeleton = stream.invalid_count, stream.rows.skeleton
     assert stream.feed(rubbish) == []
     assert stream.rows.skeleton is skeleton
     assert len(stream.feed((rows_of(text)[0] + "\n").encode())) == 1
-    assert stream.rubbish > before or rubbish.startswith((b"||", b"MOTION"))
+    assert stream.invalid_count > before or rubbish.startswith((b"||", b"MOTION"))
 
 
 def test_a_thousand_spoilt_streams_raise_nothing(text):
@@ -131,34 +131,34 @@ def test_a_line_without_an_end_does_not_fill_the_memory():
     stream = BvhStream()
     for _ in range(40):
         stream.feed(b"1 " * 50000)
-    assert stream.rubbish and len(stream._waiting) <= 2 << 20
+    assert stream.invalid_count and len(stream._partial) <= 2 << 20
 
 
 @pytest.mark.parametrize("way, protocol", [("udp", "udp"), ("tcp", "tcp"), ("serve", "call")])
 @pytest.mark.parametrize("form", ["bvh", "neuron"])
 def test_what_is_sent_arrives(clip, port, way, protocol, form):
     sender = Sender(clip, port, way, form, rate=400.0)
-    thread = threading.Thread(target=sender.run, args=(lambda: False,))
+    thread = threading.Thread(target=sender.send_file, args=(lambda: False,))
     if way == "serve":
         thread.start()
         time.sleep(0.1)
-    listener = Listener(port, protocol, hierarchy_of(clip) if form == "neuron" else None).start()
+    listener = Listener(port, protocol, read_hierarchy(clip) if form == "neuron" else None).start()
     try:
         if way != "serve":
             thread.start()
         thread.join(10.0)
-        wait_for(lambda: listener.status().frames >= len(sender.rows))
-        motion, status = bvh.read(clip).motion, listener.status()
-        skeleton, root, rotations = poses(listener.since(0))
+        wait_for(lambda: listener.measure_status().frames >= len(sender.rows))
+        motion, status = bvh.read_bvh(clip).motion, listener.measure_status()
+        skeleton, root, rotations = convert_poses(listener.frames_since(0))
         np.testing.assert_allclose(root, motion.root_positions, atol=1e-5)
-        assert status.rubbish == 0 and skeleton.same_bones(motion.skeleton)
-        assert (status.way is not None and status.way < 0.5) == (form == "bvh")
-        assert [one.number for one in listener.since(status.frames - 3)] == list(
+        assert status.invalid_count == 0 and skeleton.has_same_bones(motion.skeleton)
+        assert (status.delay is not None and status.delay < 0.5) == (form == "bvh")
+        assert [one.number for one in listener.frames_since(status.frames - 3)] == list(
             range(status.frames - 2, status.frames + 1)
         )
     finally:
         listener.stop()
-    assert not listener.running and listener.status().state == "stopped"
+    assert not listener.is_running and listener.measure_status().state == "stopped"
 
 
 def test_it_listens_to_this_machine_only(port):
@@ -181,7 +181,7 @@ def test_a_port_is_free_again_after_stop(port):
         listener = Listener(port, protocol).start()
         listener.stop()
         listener.stop()
-        assert not listener.running
+        assert not listener.is_running
 
 
 @pytest.mark.parametrize("arguments, said", [(dict(port=80), "1024"), (dict(protocol="smoke"), "udp, tcp")])
@@ -192,18 +192,18 @@ def test_bad_input_is_told(arguments, said):
 
 def test_nobody_listening_is_told(clip, port):
     with pytest.raises(InputError, match="no listener"):
-        Sender(clip, port, "tcp").run(lambda: False)
+        Sender(clip, port, "tcp").send_file(lambda: False)
 
 
 def test_a_sender_that_goes_and_comes_again(clip, port):
     listener = Listener(port, "tcp").start()
     try:
-        Sender(clip, port, "tcp", rate=600.0).run(lambda: False)
-        wait_for(lambda: listener.status().state == "ended")
-        assert "closed" in listener.status().line
-        before = listener.status().frames
-        Sender(clip, port, "tcp", rate=600.0).run(lambda: False)
-        wait_for(lambda: listener.status().frames == 2 * before)
+        Sender(clip, port, "tcp", rate=600.0).send_file(lambda: False)
+        wait_for(lambda: listener.measure_status().state == "ended")
+        assert "closed" in listener.measure_status().line
+        before = listener.measure_status().frames
+        Sender(clip, port, "tcp", rate=600.0).send_file(lambda: False)
+        wait_for(lambda: listener.measure_status().frames == 2 * before)
     finally:
         listener.stop()
 
@@ -212,9 +212,9 @@ def test_a_stream_that_stops_is_told(clip, port, monkeypatch):
     monkeypatch.setattr("beyond_mocap.passes.stream.listener.STALLED", 0.1)
     listener = Listener(port).start()
     try:
-        Sender(clip, port, rate=600.0).run(lambda: False)
-        wait_for(lambda: listener.status().state == "stalled")
-        assert "no frame for" in listener.status().line
+        Sender(clip, port, rate=600.0).send_file(lambda: False)
+        wait_for(lambda: listener.measure_status().state == "stalled")
+        assert "no frame for" in listener.measure_status().line
     finally:
         listener.stop()
 
@@ -225,8 +225,8 @@ def test_rubbish_over_the_network_hangs_nothing(port):
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as out:
             for _ in range(50):
                 out.sendto(b"x" + random.Random(6).randbytes(500), (LOOPBACK, port))
-        wait_for(lambda: listener.status().rubbish >= 50)
-        assert "invalid pieces" in listener.status().line and listener.running
+        wait_for(lambda: listener.measure_status().invalid_count >= 50)
+        assert "invalid pieces" in listener.measure_status().line and listener.is_running
     finally:
         listener.stop()
 
@@ -240,8 +240,8 @@ def test_another_hierarchy_takes_no_frame_from_the_body_that_is_shown(port, text
             out.connect((LOOPBACK, port))
             for piece in (text.split("MOTION")[0], rows_of(text)[0], rows_of(text)[1], other, "1 2"):
                 out.send(piece.encode())
-        wait_for(lambda: listener.status().rubbish == 1)
-        skeleton, root, _ = poses(listener.since(0))
+        wait_for(lambda: listener.measure_status().invalid_count == 1)
+        skeleton, root, _ = convert_poses(listener.frames_since(0))
         assert len(root) == 2 and len(skeleton.names) > 10
     finally:
         listener.stop()
@@ -252,8 +252,8 @@ def test_a_second_connection_takes_over(clip, port):
     try:
         with socket.create_connection((LOOPBACK, port)):
             time.sleep(0.1)
-            Sender(clip, port, "tcp", rate=600.0).run(lambda: False)
-            wait_for(lambda: listener.status().frames == 121)
+            Sender(clip, port, "tcp", rate=600.0).send_file(lambda: False)
+            wait_for(lambda: listener.measure_status().frames == 121)
     finally:
         listener.stop()
 
@@ -266,24 +266,24 @@ class Played:
         self.frames, self.now = stream.feed(path.read_bytes()), 0.0
         self.step = stream.frame_time
 
-    def since(self, number):
-        from beyond_mocap.passes.stream.listener import Arrived
+    def frames_since(self, number):
+        from beyond_mocap.passes.stream.listener import StreamFrame
 
         count = min(int(self.now / self.step) + 1, len(self.frames))
         some = enumerate(self.frames[number:count], start=number)
-        return [Arrived(
+        return [StreamFrame(
             number=n + 1, time=n * self.step, sent=None, values=frame.values, rows=frame.rows,
         ) for n, frame in some]
 
 
 @pytest.mark.parametrize("fps", [30.0, 60.0, 120.0])
 def test_a_kick_is_recognised_once_while_it_arrives(tmp_path, fps):
-    made = strike("kick low top", fps=fps)
-    bvh.write(tmp_path / "kick.bvh", made.motion)
+    made = build_strike("kick low top", fps=fps)
+    bvh.write_bvh(tmp_path / "kick.bvh", made.motion)
     played = Played(tmp_path / "kick.bvh")
     watch, found = LiveHits(played), []
     for played.now in np.arange(0.0, made.motion.duration, 0.05):
-        hit = watch.look()
+        hit = watch.find_new_hit()
         found += [(*hit, played.now)] if hit else []
     assert len(found) == 1
     hit, moment, now = found[0]
@@ -294,7 +294,7 @@ def test_walking_is_no_hit(tmp_path, clip):
     played = Played(clip)
     watch = LiveHits(played)
     for played.now in np.arange(0.0, 2.0, 0.1):
-        assert watch.look() is None
+        assert watch.find_new_hit() is None
 
 
 def test_the_verb_sends_a_clip(clip, port, capsys):

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from beyond_mocap.cli.main import main
-from beyond_mocap.cli.outputs import Told
+from beyond_mocap.cli.outputs import ProgressReporter
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.synthesis.provenance import read_provenance
-from beyond_mocap.synthetic.gait import gait
+from beyond_mocap.synthetic.gait import build_gait
 
 STICK = """HIERARCHY
 ROOT a { OFFSET 0 0 0 CHANNELS 6 Yposition Xposition Zposition Yrotation Xrotation Zrotation
@@ -31,9 +31,9 @@ def arc(radius: float, degrees: float, rise: float = 0.0) -> str:
 def place(tmp_path_factory):
     """A folder with a walk, a jog, a stick, one frame, and a few curves."""
     folder = tmp_path_factory.mktemp("ride")
-    bvh.write(folder / "walk.bvh", gait(1.4, 4.0, 60.0))
-    bvh.write(folder / "stand.bvh", gait(0.0, 2.0, 30.0))
-    bvh.write(folder / "one.bvh", gait(1.4, 1.0, 30.0).frames(0, 1))
+    bvh.write_bvh(folder / "walk.bvh", build_gait(1.4, 4.0, 60.0))
+    bvh.write_bvh(folder / "stand.bvh", build_gait(0.0, 2.0, 30.0))
+    bvh.write_bvh(folder / "one.bvh", build_gait(1.4, 1.0, 30.0).frames(0, 1))
     (folder / "stick.bvh").write_text(STICK)
     (folder / "bend.csv").write_text(arc(3.0, 180.0))
     (folder / "short.csv").write_text(arc(3.0, 40.0))
@@ -64,7 +64,7 @@ def test_rate_names_channels_and_form_stay(run, place, tmp_path):
     status, out, _ = run("--provenance", tmp_path / "p.csv", "--report", tmp_path / "r.json")
     assert status == 0 and "out.bvh: 241 frames, 4.0 s, 5." in out and len(out.splitlines()) == 1
     assert rows((tmp_path / "out.bvh").read_text()) == rows((place / "walk.bvh").read_text())
-    ridden = bvh.read(tmp_path / "out.bvh", 0.01).motion
+    ridden = bvh.read_bvh(tmp_path / "out.bvh", 0.01).motion
     from_middle = np.linalg.norm(ridden.root_positions[:, :2] - [0.0, 3.0], axis=1)
     assert np.abs(from_middle - 3.0).max() < 0.06
     came_from = read_provenance(tmp_path / "p.csv")
@@ -113,7 +113,7 @@ def test_the_unit_is_told_where_it_is_not_the_inputs(run):
 def test_a_motion_that_stands_still_is_placed_and_told(run, tmp_path):
     status, _, error = run(recording="stand")
     assert status == 0 and any("stays in place" in line for line in error)
-    assert np.isfinite(bvh.read(tmp_path / "out.bvh", 0.01).motion.root_positions).all()
+    assert np.isfinite(bvh.read_bvh(tmp_path / "out.bvh", 0.01).motion.root_positions).all()
 
 
 @pytest.mark.parametrize("more, curve", [
@@ -125,15 +125,15 @@ def test_a_motion_that_stands_still_is_placed_and_told(run, tmp_path):
 def test_every_option_gives_a_sound_motion(run, tmp_path, more, curve):
     status, _, error = run(*more, curve=curve)
     assert status == 0, error
-    motion = bvh.read(tmp_path / "out.bvh", 0.01).motion
+    motion = bvh.read_bvh(tmp_path / "out.bvh", 0.01).motion
     assert np.isfinite(motion.rotations).all() and len(motion) > 30
 
 
 def test_the_ground_lifts_the_body(run, place, tmp_path):
     assert run()[0] == 0
-    flat = bvh.read(tmp_path / "out.bvh", 0.01).motion.root_positions[:, 2]
+    flat = bvh.read_bvh(tmp_path / "out.bvh", 0.01).motion.root_positions[:, 2]
     assert run("--ground", place / "flat.obj")[0] == 0
-    raised = bvh.read(tmp_path / "out.bvh", 0.01).motion.root_positions[:, 2]
+    raised = bvh.read_bvh(tmp_path / "out.bvh", 0.01).motion.root_positions[:, 2]
     assert np.abs(raised - flat - 0.5).max() < 0.03
     (place / "away.obj").write_text("v 90 0 90\nv 91 0 90\nv 90 0 91\nf 1 2 3\n")
     status, _, error = run("--ground", place / "away.obj")
@@ -144,7 +144,7 @@ def test_a_path_that_ends_stops_the_motion_and_cycling_goes_on(run, tmp_path):
     counts = {}
     for name, more in (("stop", ()), ("cycle", ("--cycle",))):
         assert run(*more, curve="short" if name == "stop" else "bend")[0] == 0
-        counts[name] = len(bvh.read(tmp_path / "out.bvh", 0.01).motion)
+        counts[name] = len(bvh.read_bvh(tmp_path / "out.bvh", 0.01).motion)
     assert counts["stop"] < 120 and counts["cycle"] > 380
 
 
@@ -152,11 +152,11 @@ def test_a_rider_goes_round_a_body_that_moves_already(run, place, tmp_path):
     (place / "along.csv").write_text("x_m,y_m\n0,0\n6,0\n")
     (place / "back.csv").write_text("x_m,y_m\n6,0.1\n0,0.1\n")
     assert run(curve="along", out="first.bvh")[0] == 0
-    first = bvh.read(tmp_path / "first.bvh", 0.01).motion.root_positions
+    first = bvh.read_bvh(tmp_path / "first.bvh", 0.01).motion.root_positions
     gaps = {}
     for name, more in (("through", ()), ("round", ("--avoid", tmp_path / "first.bvh", "--distance", 0.8))):
         status, _, error = run(*more, curve="back", out="second.bvh")
-        second = bvh.read(tmp_path / "second.bvh", 0.01).motion.root_positions
+        second = bvh.read_bvh(tmp_path / "second.bvh", 0.01).motion.root_positions
         count = min(len(first), len(second))
         gaps[name] = np.linalg.norm((first[:count] - second[:count])[:, :2], axis=1).min()
         assert status == 0 and any("walk.bvh goes" in line or "walk.bvh waits" in line for line in error) == bool(more)
@@ -236,7 +236,7 @@ def test_who_cannot_cycle_is_named_also_where_others_are_avoided(capfd, place, t
 
 
 def test_ctrl_c_ends_it_without_a_file(run, tmp_path, monkeypatch):
-    monkeypatch.setattr(Told, "cancelled", lambda self: True)
+    monkeypatch.setattr(ProgressReporter, "cancelled", lambda self: True)
     status, said, error = run()
     assert (status, said) == (130, "") and error == ["beyond-mocap: cancelled"]
     assert not list(tmp_path.iterdir())

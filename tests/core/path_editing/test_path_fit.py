@@ -7,10 +7,10 @@ import pytest
 
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.motion import contacts
-from beyond_mocap.motion.motion import place
+from beyond_mocap.motion.motion import place_motion
 from beyond_mocap.motion.path.arc_length import ArcLength
-from beyond_mocap.path_editing.path_frame import fit_path, fit_polynomial, fit_spline, places_on_ground
-from beyond_mocap.synthetic.gait import gait
+from beyond_mocap.path_editing.path_frame import fit_path, fit_polynomial, fit_spline, project_to_ground
+from beyond_mocap.synthetic.gait import build_gait
 
 TIMES = np.arange(600) / 60.0
 WAY = np.stack([1.4 * TIMES, 2.0 * np.sin(0.4 * TIMES), 0.1 * TIMES], axis=1)
@@ -47,11 +47,11 @@ def test_a_line_is_its_own_fit():
 @pytest.mark.parametrize("height, floor", [(0.0, 0.0), (0.03, 0.0), (2.0, 2.0), (-0.5, -0.5)])
 def test_the_path_of_a_flat_walk_lies_on_its_ground(height, floor):
     """A floor at height 0 is where recordings have it; toe joints are some centimetres over it."""
-    motion = place(gait(1.4, 4.0, 30.0), offset=(0.0, 0.0, height))
-    assert contacts.recorded_floor(motion)[0] == pytest.approx(floor, abs=0.025)
-    standing = contacts.points(motion)
-    places = places_on_ground(motion, standing)
-    assert np.ptp(places[:, 2]) == 0.0 and abs(places[0, 2] - contacts.recorded_floor(motion)[0]) < 1e-9
+    motion = place_motion(build_gait(1.4, 4.0, 30.0), offset=(0.0, 0.0, height))
+    assert contacts.estimate_recorded_floor(motion)[0] == pytest.approx(floor, abs=0.025)
+    standing = contacts.detect_heel_toe_contacts(motion)
+    places = project_to_ground(motion, standing)
+    assert np.ptp(places[:, 2]) == 0.0 and abs(places[0, 2] - contacts.estimate_recorded_floor(motion)[0]) < 1e-9
     for path in (fit_path(motion, standing), fit_path(motion, standing, "polynomial", 5)):
         assert path.domain == pytest.approx((0.0, motion.duration))
         assert np.linalg.norm(path.at(np.arange(len(motion)) / 30.0) - places, axis=1).max() < 0.1
@@ -85,14 +85,14 @@ def test_the_heading_of_a_fitted_walk_does_not_wobble():
 
 @pytest.mark.parametrize("slope", (0.3, -0.2))
 def test_the_ground_under_a_walk_up_a_hill_rises_with_it(slope):
-    motion = gait(1.4, 6.0, 30.0)
-    standing = contacts.points(motion)
-    floor = contacts.recorded_floor(motion)[0]
+    motion = build_gait(1.4, 6.0, 30.0)
+    standing = contacts.detect_heel_toe_contacts(motion)
+    floor = contacts.estimate_recorded_floor(motion)[0]
     root = motion.root_positions.copy()
     root[:, 2] += slope * (root[:, 0] - root[0, 0])
     hill = replace(motion, root_positions=root)
     truth = floor + slope * (root[:, 0] - root[0, 0])
-    assert np.abs(places_on_ground(hill, standing)[:, 2] - truth).max() < 0.12
+    assert np.abs(project_to_ground(hill, standing)[:, 2] - truth).max() < 0.12
     path = fit_path(hill, standing)
     times = np.arange(len(hill)) / 30.0
     assert np.abs(path.at(times)[:, 2] - truth)[15:-15].max() < 0.08
@@ -100,8 +100,8 @@ def test_the_ground_under_a_walk_up_a_hill_rises_with_it(slope):
 
 @pytest.mark.parametrize("frames, degree", ((90, 45), (360, 120), (30, 29)))
 def test_a_high_degree_does_not_swing_between_few_frames(frames, degree):
-    motion = gait(1.4, frames / 30.0, 30.0).frames(0, frames)
-    path = fit_path(motion, contacts.points(motion), "polynomial", degree)
+    motion = build_gait(1.4, frames / 30.0, 30.0).frames(0, frames)
+    path = fit_path(motion, contacts.detect_heel_toe_contacts(motion), "polynomial", degree)
     places = path.at(np.arange(frames) / 30.0)
     assert ArcLength(path).length < 1.03 * np.linalg.norm(np.diff(places, axis=0), axis=1).sum()
-    assert np.linalg.norm(places - places_on_ground(motion, contacts.points(motion)), axis=1).max() < 0.02
+    assert np.linalg.norm(places - project_to_ground(motion, contacts.detect_heel_toe_contacts(motion)), axis=1).max() < 0.02

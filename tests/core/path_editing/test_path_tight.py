@@ -4,24 +4,24 @@ import numpy as np
 import pytest
 
 from beyond_mocap.motion.motion import forward_kinematics
-from beyond_mocap.path_editing.ground_contact import curvature, share_free
-from beyond_mocap.path_editing.path_line import through
-from beyond_mocap.path_editing.ride import RideSettings, prepare, ride
-from beyond_mocap.synthetic.gait import gait
+from beyond_mocap.path_editing.ground_contact import compute_curvature, compute_free_share
+from beyond_mocap.path_editing.path_line import fit_line
+from beyond_mocap.path_editing.ride import PathEditSettings, prepare_source, edit_path
+from beyond_mocap.synthetic.gait import build_gait
 
 
 @pytest.fixture(scope="module")
 def source():
-    return prepare(gait(1.4, 5.0, 30.0), RideSettings())
+    return prepare_source(build_gait(1.4, 5.0, 30.0), PathEditSettings())
 
 
 def line(*corners):
-    return through(np.array(corners, dtype=float), "line")
+    return fit_line(np.array(corners, dtype=float), "line")
 
 
 def circle(radius, rounds=1.0):
     a = np.linspace(0.0, 2.0 * np.pi * rounds, int(200 * rounds))
-    return through(np.column_stack([radius * np.sin(a), radius - radius * np.cos(a), 0.0 * a]), "circle")
+    return fit_line(np.column_stack([radius * np.sin(a), radius - radius * np.cos(a), 0.0 * a]), "circle")
 
 
 def jittery():
@@ -40,18 +40,18 @@ def bad(ridden):
 
 def test_a_circle_bends_by_one_over_its_radius():
     path = circle(1.25)
-    assert np.allclose(curvature(path, np.linspace(*path.domain, 50)[5:-5]), 0.8, rtol=0.02)
+    assert np.allclose(compute_curvature(path, np.linspace(*path.domain, 50)[5:-5]), 0.8, rtol=0.02)
 
 
 def test_loops_tighter_than_a_foot_are_told_and_nobody_stands_there(source):
-    ridden = ride(source, circle(0.12, 6.0), RideSettings())
+    ridden = edit_path(source, circle(0.12, 6.0), PathEditSettings())
     (told,) = bad(ridden)
     assert told.startswith("the path bends more tightly than 0.3 m radius from 0.0 s to")
     assert not ridden.standing.any() and np.allclose(ridden.miss, 0.0)
 
 
 def test_a_steep_stretch_is_told_with_its_seconds_and_planted_before_and_after(source):
-    ridden = ride(source, line((0, 0, 0), (2, 0, 0), (2, 0, 2), (8, 0, 2)), RideSettings())
+    ridden = edit_path(source, line((0, 0, 0), (2, 0, 0), (2, 0, 2), (8, 0, 2)), PathEditSettings())
     (told,) = bad(ridden)
     ((first, last),) = told.spans
     assert "steeper than 60 degrees" in told and 1.2 < first < 1.7 and 2.5 < last < 3.0  # metres 2 to 4 at 1.4 m/s
@@ -61,22 +61,22 @@ def test_a_steep_stretch_is_told_with_its_seconds_and_planted_before_and_after(s
 
 
 def test_legs_do_not_flail_on_a_pole(source):
-    ridden = ride(source, line((0, 0, 0), (0, 0, 9)), RideSettings())
+    ridden = edit_path(source, line((0, 0, 0), (0, 0, 9)), PathEditSettings())
     assert jolt(ridden.motion) < 1.5 * jolt(source.motion)
 
 
 @pytest.mark.parametrize("path", [circle(2.0), circle(0.6), line((0, 0, 0), (3, 0, 0), (3, 3, 0), (0, 3, 0))])
 def test_bends_and_corners_that_feet_can_follow_are_not_told(source, path):
-    assert not bad(ride(source, path, RideSettings()))
+    assert not bad(edit_path(source, path, PathEditSettings()))
 
 
 def test_a_line_that_jitters_is_told_and_its_own_path_is_not(source):
-    assert len(bad(ride(source, jittery(), RideSettings()))) == 1
-    assert not bad(ride(source, source.path, RideSettings()))
+    assert len(bad(edit_path(source, jittery(), PathEditSettings()))) == 1
+    assert not bad(edit_path(source, source.path, PathEditSettings()))
 
 
 def test_feet_are_let_go_smoothly_within_the_stretch():
     free = np.zeros(90, dtype=bool)
     free[20:70] = True
-    much = share_free(free, 30.0)
+    much = compute_free_share(free, 30.0)
     assert np.all(much[~free] < 1e-9) and np.allclose(much[30:60], 1.0) and np.abs(np.diff(much)).max() < 0.3

@@ -8,14 +8,14 @@ from beyond_mocap.motion.path.path import PolynomialPath
 from beyond_mocap.motion.skeleton import Skeleton
 from beyond_mocap.path_editing.path_frame import Residuals
 from beyond_mocap.path_editing.path_time import (
-    Way,
-    Wishes,
-    asked_length,
-    by_arc_length,
-    by_time,
-    by_way,
-    stretched,
-    take_rows,
+    PathProfile,
+    StepOptions,
+    compute_required_length,
+    build_timing_by_arc_length,
+    build_timing_by_time,
+    build_timing_by_profile,
+    compute_step_scale,
+    resample_residuals,
 )
 
 ROWS, FPS, STEP = 301, 30.0, 0.05
@@ -37,16 +37,16 @@ def residuals():
 
 def level(length, slope=0.0, bend=0.0):
     arc = np.linspace(0.0, length, 400)
-    return Way(arc, np.full(400, slope), np.full(400, bend))
+    return PathProfile(arc, np.full(400, slope), np.full(400, bend))
 
 
 def own(residuals):
-    return Way(np.cumsum(residuals.step), np.zeros(len(residuals)), np.zeros(len(residuals)))
+    return PathProfile(np.cumsum(residuals.step), np.zeros(len(residuals)), np.zeros(len(residuals)))
 
 
 def test_rows_between_rows_are_smooth(residuals):
     at = np.arange(0.0, ROWS - 1, 0.37)
-    rows = take_rows(residuals, at)
+    rows = resample_residuals(residuals, at)
     inside = (at > 1) & (at < ROWS - 2)
     truth = np.stack([np.sin(0.1 * at), 0.0 * at, np.cos(0.1 * at)], axis=1)
     assert np.abs(rows.place - truth)[inside].max() < 1e-4
@@ -55,24 +55,24 @@ def test_rows_between_rows_are_smooth(residuals):
 
 
 def test_whole_rows_are_the_rows_themselves(residuals):
-    timing = by_arc_length(residuals, 1.0, 0.0)
-    assert take_rows(residuals, timing.at).rotations.tobytes() == residuals.rotations.tobytes()
+    timing = build_timing_by_arc_length(residuals, 1.0, 0.0)
+    assert resample_residuals(residuals, timing.at).rotations.tobytes() == residuals.rotations.tobytes()
 
 
 def test_a_level_way_asks_for_nothing(residuals):
-    timing = by_way(residuals, own(residuals), level(30.0), Wishes(True, True, True), 1.0, 0.0, False)
+    timing = build_timing_by_profile(residuals, own(residuals), level(30.0), StepOptions(True, True, True), 1.0, 0.0, False)
     assert np.allclose(timing.at, np.arange(ROWS)) and np.allclose(timing.arc, np.cumsum(residuals.step))
 
 
 def test_slopes_make_steps_shorter_and_quicker_at_one_speed(residuals):
-    timing = by_way(residuals, own(residuals), level(30.0, slope=0.2), Wishes(slopes=True), 1.0, 0.0, False)
+    timing = build_timing_by_profile(residuals, own(residuals), level(30.0, slope=0.2), StepOptions(slopes=True), 1.0, 0.0, False)
     pace, tempo = np.diff(timing.arc), np.diff(timing.at)
     assert np.allclose(pace, STEP, rtol=1e-3) and np.allclose(tempo, 1.0 / (1.0 - 0.4 * 0.2), rtol=1e-3)
 
 
 @pytest.mark.parametrize("slope", [0.15, -0.05, -0.2])
 def test_climbs_follow_toblers_function(residuals, slope):
-    timing = by_way(residuals, own(residuals), level(30.0, slope=slope), Wishes(climbs=True), 1.0, 0.0, False)
+    timing = build_timing_by_profile(residuals, own(residuals), level(30.0, slope=slope), StepOptions(climbs=True), 1.0, 0.0, False)
     tobler = np.exp(-3.5 * abs(slope + 0.05)) / np.exp(-3.5 * 0.05)
     assert np.diff(timing.arc).mean() == pytest.approx(STEP * tobler, rel=1e-3)
     assert np.diff(timing.at).mean() == pytest.approx(np.sqrt(tobler), rel=1e-3)
@@ -81,7 +81,7 @@ def test_climbs_follow_toblers_function(residuals, slope):
 @pytest.mark.parametrize("radius", [3.0, 1.0, 0.25])
 def test_bends_follow_the_two_thirds_law(residuals, radius):
     """Speed goes with the third root of the radius below 2 m; steps and tempo share it."""
-    timing = by_way(residuals, own(residuals), level(30.0, bend=1.0 / radius), Wishes(bends=True), 1.0, 0.0, False)
+    timing = build_timing_by_profile(residuals, own(residuals), level(30.0, bend=1.0 / radius), StepOptions(bends=True), 1.0, 0.0, False)
     law = min((radius / 2.0) ** (1.0 / 3.0), 1.0)
     assert np.diff(timing.arc).mean() == pytest.approx(STEP * law, rel=1e-3)
     assert np.diff(timing.at).mean() == pytest.approx(np.sqrt(law), rel=1e-3)
@@ -91,32 +91,32 @@ def test_bends_follow_the_two_thirds_law(residuals, radius):
 def test_by_time_the_whole_path_is_passed_within_the_motion(residuals, speed):
     """x = u^2 from u = 0 to 3: the place at a share of the time, not of the length."""
     path = PolynomialPath(np.array([[3.0, 0, 0], [4.5, 0, 0], [1.5, 0, 0]]), (0.0, 3.0))
-    timing = by_time(residuals, path, ArcLength(path), speed, 0.5)
+    timing = build_timing_by_time(residuals, path, ArcLength(path), speed, 0.5)
     share = np.maximum(np.arange(len(timing.arc)) - 15.0, 0.0) * speed / (ROWS - 1)
     assert len(timing.arc) == 15 + (ROWS - 1) / speed + 1
     assert np.allclose(timing.arc, 9.0 * share**2, atol=1e-7)
 
 
 def test_what_its_own_path_asked_for_already_is_not_asked_again(residuals):
-    bent = Way(np.cumsum(residuals.step), np.zeros(ROWS), np.full(ROWS, 2.0))
-    timing = by_way(residuals, bent, level(30.0, bend=2.0), Wishes(bends=True), 1.0, 0.0, False)
+    bent = PathProfile(np.cumsum(residuals.step), np.zeros(ROWS), np.full(ROWS, 2.0))
+    timing = build_timing_by_profile(residuals, bent, level(30.0, bend=2.0), StepOptions(bends=True), 1.0, 0.0, False)
     assert np.allclose(timing.at, np.arange(ROWS)) and np.allclose(timing.arc, np.cumsum(residuals.step), atol=1e-9)
 
 
 def test_a_closed_way_is_gone_round(residuals):
-    timing = by_way(residuals, own(residuals), level(4.0, slope=0.1), Wishes(slopes=True), 1.0, 0.0, True)
+    timing = build_timing_by_profile(residuals, own(residuals), level(4.0, slope=0.1), StepOptions(slopes=True), 1.0, 0.0, True)
     assert timing.arc[-1] > 12.0 and np.allclose(np.diff(timing.arc), STEP, rtol=1e-2)
 
 
 def test_a_way_is_as_long_as_the_steps_it_takes(residuals):
-    wishes, climb = Wishes(slopes=True), level(10.0, slope=0.2)
-    assert asked_length(residuals, own(residuals), climb, wishes) == pytest.approx(10.0 / 0.92)
-    climbed = Way(np.cumsum(residuals.step), np.full(ROWS, 0.2), np.zeros(ROWS))
-    assert asked_length(residuals, climbed, climb, wishes) == pytest.approx(10.0)
+    wishes, climb = StepOptions(slopes=True), level(10.0, slope=0.2)
+    assert compute_required_length(residuals, own(residuals), climb, wishes) == pytest.approx(10.0 / 0.92)
+    climbed = PathProfile(np.cumsum(residuals.step), np.full(ROWS, 0.2), np.zeros(ROWS))
+    assert compute_required_length(residuals, climbed, climb, wishes) == pytest.approx(10.0)
 
 
 def test_steps_are_stretched_as_the_speed_is():
     own = np.full(90, STEP)
-    assert stretched(own, own, FPS) is None
-    assert np.allclose(stretched(1.3 * own, own, FPS), 1.3, atol=0.02)
-    assert np.isfinite(stretched(own, 0.0 * own, FPS)).all()
+    assert compute_step_scale(own, own, FPS) is None
+    assert np.allclose(compute_step_scale(1.3 * own, own, FPS), 1.3, atol=0.02)
+    assert np.isfinite(compute_step_scale(own, 0.0 * own, FPS)).all()

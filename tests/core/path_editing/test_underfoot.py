@@ -5,8 +5,8 @@ import pytest
 
 from beyond_mocap.motion.path.arc_length import ArcLength
 from beyond_mocap.motion.path.terrain import Terrain
-from beyond_mocap.path_editing.ground_contact import footing, is_level, mesh_surface, path_surface
-from beyond_mocap.path_editing.path_line import through
+from beyond_mocap.path_editing.ground_contact import compute_footing, is_level, build_mesh_surface, build_path_surface
+from beyond_mocap.path_editing.path_line import fit_line
 
 FPS, COUNT = 30.0, 90
 
@@ -28,14 +28,14 @@ def walking():
 
 
 def slope(rise):
-    return through(np.array([[-2.0, 0.0, -2.0 * rise], [8.0, 0.0, 8.0 * rise]]), "slope")
+    return fit_line(np.array([[-2.0, 0.0, -2.0 * rise], [8.0, 0.0, 8.0 * rise]]), "slope")
 
 
 def test_a_paths_height_is_level_across_it(walking):
     path = slope(0.3)
     arc = ArcLength(path)
     places = np.array([[1.0, 0.0], [1.0, 0.7], [3.0, -0.5]])
-    height, tilt = path_surface(path, arc, np.full(3, 4.0))(places, np.arange(3))
+    height, tilt = build_path_surface(path, arc, np.full(3, 4.0))(places, np.arange(3))
     assert np.allclose(height, [0.3, 0.3, 0.9], atol=1e-4) and np.allclose(tilt, [0.3, 0.0], atol=1e-4)
     assert not is_level(path, arc) and is_level(slope(0.0), ArcLength(slope(0.0)))
 
@@ -43,8 +43,8 @@ def test_a_paths_height_is_level_across_it(walking):
 def test_on_a_slope_feet_are_on_it_all_the_time(walking):
     feet, standing = walking
     path = slope(0.3)
-    surface = path_surface(path, ArcLength(path), np.full(COUNT, 3.0))
-    found = footing(feet, standing, np.zeros((COUNT, 2)), FPS, surface)
+    surface = build_path_surface(path, ArcLength(path), np.full(COUNT, 3.0))
+    found = compute_footing(feet, standing, np.zeros((COUNT, 2)), FPS, surface)
     assert np.allclose(found.height, 0.3 * feet[:, :, 1, 0], atol=1e-3)
     assert np.allclose(found.slope, [0.3, 0.0], atol=1e-3) and found.lift.max() < 0.03
     assert np.allclose(found.normal, np.array([-0.3, 0.0, 1.0]) / np.hypot(0.3, 1.0), atol=1e-3)
@@ -59,8 +59,8 @@ def stairs(height=0.17):
 
 def test_on_stairs_feet_are_level_and_pass_the_edges(walking):
     feet, standing = walking
-    surface = mesh_surface(stairs(), np.zeros((COUNT, 3)))
-    found = footing(feet, standing, np.full((COUNT, 2), 0.03), FPS, surface)
+    surface = build_mesh_surface(stairs(), np.zeros((COUNT, 3)))
+    found = compute_footing(feet, standing, np.full((COUNT, 2), 0.03), FPS, surface)
     stands = standing.any(axis=2)
     assert np.all(np.min(np.abs(found.height[stands, None] - [0.0, 0.17, 0.34]), axis=1) < 1e-6)
     assert np.abs(found.slope[stands]).max() < 1e-6
@@ -73,13 +73,13 @@ def test_where_the_mesh_ends_the_path_goes_on(walking):
     feet, standing = walking
     origin = np.tile([0.0, 0.0, 0.5], (COUNT, 1))
     nothing = Terrain(np.array([[90.0, 90, 0], [91, 90, 0], [90, 91, 0]]), np.array([[0, 1, 2]]))
-    found = footing(feet, standing, np.zeros((COUNT, 2)), FPS, mesh_surface(nothing, origin))
+    found = compute_footing(feet, standing, np.zeros((COUNT, 2)), FPS, build_mesh_surface(nothing, origin))
     assert np.allclose(found.height, 0.5) and np.allclose(found.slope, 0.0)
 
 
 def test_feet_that_never_stand_have_a_ground_too(walking):
     feet, standing = walking
     path = slope(0.2)
-    surface = path_surface(path, ArcLength(path), np.full(COUNT, 3.0))
-    found = footing(feet, np.zeros_like(standing), np.full((COUNT, 2), 0.4), FPS, surface)
+    surface = build_path_surface(path, ArcLength(path), np.full(COUNT, 3.0))
+    found = compute_footing(feet, np.zeros_like(standing), np.full((COUNT, 2), 0.4), FPS, surface)
     assert np.abs(found.height - 0.2 * feet[:, :, 1, 0]).max() < 0.01

@@ -10,11 +10,11 @@ import pytest
 
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.cli.main import main
-from beyond_mocap.study.analysis import analysed, cliffs_delta, holm, welch
+from beyond_mocap.study.analysis import analyse_study, compute_cliffs_delta, adjust_holm, compute_welch_p
 from beyond_mocap.study.answers import read_answers
-from beyond_mocap.study.form import form_page, form_table, questions_of
-from beyond_mocap.study.order import Clip, ordered, read_study, write_study
-from beyond_mocap.study.page import place_bar, study_page
+from beyond_mocap.study.form import build_form_page, build_form_table, list_questions
+from beyond_mocap.study.order import Clip, build_study, read_study, write_study
+from beyond_mocap.study.page import place_bar, build_study_page
 
 SYSTEMS, SCENARIOS = ("ours", "skating", "theirs"), ("s1", "s2", "s3", "s4", "s5")
 CLIPS = (
@@ -44,7 +44,7 @@ def planted(folder, study, shifts, seed=1, skip=()):
 
 
 def test_names_are_neutral_and_training_comes_first():
-    study = ordered(CLIPS, 12, seed=3)
+    study = build_study(CLIPS, 12, seed=3)
     assert len({clip.name for clip in study.clips}) == 17
     for clip in study.clips:
         assert len(clip.name) == 4 and not set(clip.name) & set("aeiou01loi")
@@ -55,14 +55,14 @@ def test_names_are_neutral_and_training_comes_first():
 
 
 def test_orders_are_the_same_again_and_stay_when_raters_are_added():
-    study, more = ordered(CLIPS, 5, seed=3), ordered(CLIPS, 9, seed=3)
-    assert study == ordered(CLIPS, 5, seed=3)
+    study, more = build_study(CLIPS, 5, seed=3), build_study(CLIPS, 9, seed=3)
+    assert study == build_study(CLIPS, 5, seed=3)
     assert list(study.orders.items()) == list(more.orders.items())[:5] and study.id == more.id
-    assert ordered(CLIPS, 5, seed=4).orders != study.orders and ordered(CLIPS, 5, seed=4).id != study.id
+    assert build_study(CLIPS, 5, seed=4).orders != study.orders and build_study(CLIPS, 5, seed=4).id != study.id
 
 
 def test_no_system_has_a_better_place_in_the_order():
-    study = ordered(CLIPS, 400, seed=0)
+    study = build_study(CLIPS, 400, seed=0)
     places = {system: [] for system in SYSTEMS}
     for order in study.orders.values():
         for place, (name,) in enumerate(order[2:]):
@@ -72,7 +72,7 @@ def test_no_system_has_a_better_place_in_the_order():
 
 
 def test_pairs_are_of_one_scenario_and_each_comes_once_either_way_round():
-    study = ordered(CLIPS, 40, seed=1, pairs=True)
+    study = build_study(CLIPS, 40, seed=1, pairs=True)
     left = 0
     for order in study.orders.values():
         assert set(order[0]) == set(study.training) and len(order) == 1 + 15
@@ -93,19 +93,19 @@ def test_pairs_are_of_one_scenario_and_each_comes_once_either_way_round():
 ])
 def test_an_unfair_table_is_refused(clips, words):
     with pytest.raises(InputError, match=words):
-        ordered(clips, 3)
+        build_study(clips, 3)
 
 
 def test_too_many_raters_for_too_few_orders():
     few = (*CLIPS[:2], *(Clip(f"{s}.mp4", s, "s1") for s in SYSTEMS[:2]))
-    assert len(ordered(few, 4).orders) == 4  # two ways round for training, two for the rest
+    assert len(build_study(few, 4).orders) == 4  # two ways round for training, two for the rest
     with pytest.raises(InputError, match="raters"):
-        ordered(few, 5)
+        build_study(few, 5)
 
 
 def test_a_study_comes_back_from_its_file(tmp_path):
     for pairs in (False, True):
-        study = ordered(CLIPS, 3, seed=2, pairs=pairs)
+        study = build_study(CLIPS, 3, seed=2, pairs=pairs)
         write_study(tmp_path, study)
         assert read_study(tmp_path) == study
 
@@ -116,7 +116,7 @@ def test_a_study_comes_back_from_its_file(tmp_path):
     {"clips": [{"name": "../a", "file": "a", "system": "b", "scenario": "c"}], "orders": {}},
 ])
 def test_a_broken_study_file_is_told(tmp_path, change):
-    write_study(tmp_path, ordered(CLIPS, 2))
+    write_study(tmp_path, build_study(CLIPS, 2))
     path = tmp_path / "study.json"
     path.write_text(json.dumps({**json.loads(path.read_text("utf-8")), **change}), "utf-8")
     with pytest.raises(InputError, match="study.json"):
@@ -124,8 +124,8 @@ def test_a_broken_study_file_is_told(tmp_path, change):
 
 
 def test_the_form_shows_neutral_names_in_the_raters_order_and_nothing_of_the_systems():
-    study = ordered(CLIPS, 2)
-    page = form_page(study, "R02", {clip.name: f"../clips/{clip.name}.mp4" for clip in study.clips})
+    study = build_study(CLIPS, 2)
+    page = build_form_page(study, "R02", {clip.name: f"../clips/{clip.name}.mp4" for clip in study.clips})
     shown = [part.split(".mp4")[0] for part in page.split("../clips/")[1:]]
     assert shown == [name for (name,) in study.orders["R02"]]
     assert not any(word in page for word in (*SYSTEMS, "s1", "good.mp4", "http"))
@@ -133,15 +133,15 @@ def test_the_form_shows_neutral_names_in_the_raters_order_and_nothing_of_the_sys
 
 
 def test_a_form_escapes_what_it_is_given():
-    study = ordered(CLIPS, 1)
+    study = build_study(CLIPS, 1)
     sources = {clip.name: f'"><script>{clip.name}' for clip in study.clips}
-    assert form_page(study, "R01", sources).count("<script>") == 1  # its own
+    assert build_form_page(study, "R01", sources).count("<script>") == 1  # its own
 
 
 def test_a_typed_table_comes_back(tmp_path):
-    study = ordered(CLIPS, 2)
-    rows = form_table(study, "R01").replace("\r\n", "\n").splitlines()
-    assert [row.split(",")[2] for row in rows[1:]] == questions_of(study, "R01")
+    study = build_study(CLIPS, 2)
+    rows = build_form_table(study, "R01").replace("\r\n", "\n").splitlines()
+    assert [row.split(",")[2] for row in rows[1:]] == list_questions(study, "R01")
     with pytest.raises(InputError, match="no answers"):
         (tmp_path / "a.csv").write_text("\n".join(rows), "utf-8")
         read_answers(study, [tmp_path])
@@ -157,7 +157,7 @@ def test_a_typed_table_comes_back(tmp_path):
     ("ID,R01,age,12", "12"), ("ID,R01,CLIP,6", "6"), ("ID,R01,CLIP,3\nID,R01,CLIP,4", "R01 answers 4"),
 ])
 def test_answers_that_cannot_be_are_told_with_their_line(tmp_path, row, words):
-    study = ordered(CLIPS, 2)
+    study = build_study(CLIPS, 2)
     row = row.replace("ID", study.id).replace("CLIP", study.orders["R01"][5][0])
     (tmp_path / "a.csv").write_text(f"study,rater,question,answer\n{row}\n", "utf-8")
     with pytest.raises(InputError, match=words) as caught:
@@ -166,7 +166,7 @@ def test_answers_that_cannot_be_are_told_with_their_line(tmp_path, row, words):
 
 
 def test_the_same_answers_as_table_and_as_json_are_one(tmp_path):
-    study = ordered(CLIPS, 1)
+    study = build_study(CLIPS, 1)
     name = study.orders["R01"][7][0]
     (tmp_path / "a.csv").write_text(f"study,rater,question,answer\n{study.id},R01,{name},2\n", "utf-8")
     (tmp_path / "a.json").write_text(json.dumps({"study": study.id, "rater": "R01", "answers": {name: "2"}}), "utf-8")
@@ -175,8 +175,8 @@ def test_the_same_answers_as_table_and_as_json_are_one(tmp_path):
 
 
 def test_a_planted_effect_is_found_and_its_size_and_none_where_there_is_none(tmp_path):
-    study = ordered(CLIPS, 12, seed=5)
-    found = analysed(study, planted(tmp_path / "a", study, {"ours": 1.0, "skating": 1.0}))
+    study = build_study(CLIPS, 12, seed=5)
+    found = analyse_study(study, planted(tmp_path / "a", study, {"ours": 1.0, "skating": 1.0}))
     better, same = {one.old: one for one in found.findings}["theirs"], found.findings[0]
     assert same.old == "skating" and not same.better and abs(same.mean) < 0.4
     assert better.better and abs(better.mean - 1.0) < 0.25 and better.low < 1.0 < better.high
@@ -184,29 +184,29 @@ def test_a_planted_effect_is_found_and_its_size_and_none_where_there_is_none(tmp
 
 
 def test_a_worse_system_is_never_called_better(tmp_path):
-    study = ordered(CLIPS, 12, seed=5)
-    found = analysed(study, planted(tmp_path / "a", study, {"ours": -1.0}), [("ours", "theirs")])
+    study = build_study(CLIPS, 12, seed=5)
+    found = analyse_study(study, planted(tmp_path / "a", study, {"ours": -1.0}), [("ours", "theirs")])
     assert found.findings[0].p > 0.99 and not found.findings[0].better
 
 
 def test_without_an_effect_one_in_twenty_is_rejected(tmp_path):
     rejected = 0
-    study = ordered((*CLIPS[:2], *(c for c in CLIPS[2:] if c.system != "skating" and c.scenario < "s3")), 8, seed=5)
+    study = build_study((*CLIPS[:2], *(c for c in CLIPS[2:] if c.system != "skating" and c.scenario < "s3")), 8, seed=5)
     for seed in range(40):
-        found = analysed(study, planted(tmp_path / "a", study, {}, seed))
+        found = analyse_study(study, planted(tmp_path / "a", study, {}, seed))
         rejected += found.findings[0].better
     assert rejected <= 7  # 2 expected; more than 7 in 40 comes less than once in a thousand times
 
 
 def test_p_of_three_raters_as_by_hand(tmp_path):
     """Differences 1, 2, 3: t = 2 sqrt 3 with two degrees, whose upper tail is (1 - t / sqrt(t^2 + 2)) / 2."""
-    study = ordered((*CLIPS[:2], Clip("a", "ours", "s1"), Clip("b", "theirs", "s1")), 3)
+    study = build_study((*CLIPS[:2], Clip("a", "ours", "s1"), Clip("b", "theirs", "s1")), 3)
     names = {clip.system: clip.name for clip in study.clips}
     (tmp_path / "a.csv").write_text("study,rater,question,answer\n" + "".join(
         f"{study.id},{rater},{names['ours']},{1 + number}\n{study.id},{rater},{names['theirs']},1\n"
         for number, rater in enumerate(study.orders, 1)
     ), "utf-8")  # fmt: skip
-    one = analysed(study, read_answers(study, [tmp_path])).findings[0]
+    one = analyse_study(study, read_answers(study, [tmp_path])).findings[0]
     t = 2.0 * np.sqrt(3.0)
     assert one.t == pytest.approx(t) and one.degrees == 2 and one.d == pytest.approx(2.0)
     assert one.p == pytest.approx((1.0 - t / np.sqrt(t * t + 2.0)) / 2.0) and one.holm_p == one.p
@@ -215,9 +215,9 @@ def test_p_of_three_raters_as_by_hand(tmp_path):
 
 def test_missing_answers_leave_the_rest_paired(tmp_path):
     """Where every clip of scenario s1 by ours is missing, its scenario is left out on both sides."""
-    study = ordered(CLIPS, 6, seed=5)
+    study = build_study(CLIPS, 6, seed=5)
     lost = next(clip.name for clip in study.clips if (clip.system, clip.scenario) == ("ours", "s1"))
-    found = analysed(study, planted(tmp_path / "a", study, {"ours": 1.0}, skip=(lost,)), [("ours", "theirs")])
+    found = analyse_study(study, planted(tmp_path / "a", study, {"ours": 1.0}, skip=(lost,)), [("ours", "theirs")])
     given = found.answers.ratings["R01"]
     marks = {(clip_of(study, name).system, clip_of(study, name).scenario): mark for name, mark in given.items()}
     own = [marks["ours", s] - marks["theirs", s] for s in SCENARIOS[1:]]
@@ -229,13 +229,13 @@ def test_welch_is_scipys():
     from scipy.stats import ttest_ind
 
     a, b = np.array([1.0, 4.0, 3.0, 5.0]), np.array([2.0, 2.0, 1.0])
-    assert welch(a, b) == pytest.approx(ttest_ind(a, b, equal_var=False, alternative="greater").pvalue)
-    assert np.isnan(welch(np.ones(4), np.ones(3))) and welch(b, a) == pytest.approx(1.0 - welch(a, b))
+    assert compute_welch_p(a, b) == pytest.approx(ttest_ind(a, b, equal_var=False, alternative="greater").pvalue)
+    assert np.isnan(compute_welch_p(np.ones(4), np.ones(3))) and compute_welch_p(b, a) == pytest.approx(1.0 - compute_welch_p(a, b))
 
 
 def test_holm_and_cliff_by_hand():
-    assert holm([0.01, 0.04, 0.03, float("nan")]) == pytest.approx([0.03, 0.06, 0.06, float("nan")], nan_ok=True)
-    assert cliffs_delta(np.array([2, 3]), np.array([1, 2])) == pytest.approx((3 - 0) / 4)
+    assert adjust_holm([0.01, 0.04, 0.03, float("nan")]) == pytest.approx([0.03, 0.06, 0.06, float("nan")], nan_ok=True)
+    assert compute_cliffs_delta(np.array([2, 3]), np.array([1, 2])) == pytest.approx((3 - 0) / 4)
 
 
 def test_bars_are_centred_on_the_undecided():
@@ -246,16 +246,16 @@ def test_bars_are_centred_on_the_undecided():
 
 
 def test_pairs_are_analysed_by_who_was_chosen(tmp_path):
-    study = ordered(CLIPS, 10, seed=1, pairs=True)
+    study = build_study(CLIPS, 10, seed=1, pairs=True)
     rng = np.random.default_rng(0)
     lines = ["study,rater,question,answer"]
     for rater, order in study.orders.items():
-        for shown in filter(study.counts, order):
+        for shown in filter(study.is_counted, order):
             by = {clip_of(study, name).system: name for name in shown}
             likes = by.get("ours") if rng.random() < 0.8 and "ours" in by else shown[rng.integers(2)]
             lines.append(f"{study.id},{rater},{'/'.join(shown)},{likes if rng.random() < 0.9 else 'same'}")
     (tmp_path / "a.csv").write_text("\n".join(lines) + "\n", "utf-8")
-    found = analysed(study, read_answers(study, [tmp_path]), [("ours", "theirs"), ("skating", "theirs")])
+    found = analyse_study(study, read_answers(study, [tmp_path]), [("ours", "theirs"), ("skating", "theirs")])
     first, second = found.findings
     assert first.better and first.mean > 0.5 and first.pooled_p < 1e-4 and not second.better
     assert found.by_system == ()
@@ -298,7 +298,7 @@ def test_what_is_wrong_is_one_line(tmp_path, capfd, argv, words):
     rows = "".join(f"{clip.file},{clip.system},{clip.scenario}\n" for clip in CLIPS)
     (tmp_path / "clips.csv").write_text("file,system,scenario\n" + rows, "utf-8")
     (tmp_path / "made").mkdir()
-    study = ordered(CLIPS, 2)
+    study = build_study(CLIPS, 2)
     write_study(tmp_path / "made", study)
     planted(tmp_path / "a", study, {})
     assert main(["study", *(f"{word}/".replace("T/", f"{tmp_path}/").rstrip("/") for word in argv)]) == 2
@@ -319,7 +319,7 @@ def test_only_movies_are_copied_under_neutral_names(tmp_path, capfd):
 
 
 def test_a_report_never_takes_the_place_of_answers(tmp_path, capfd):
-    study = ordered(CLIPS, 2)
+    study = build_study(CLIPS, 2)
     write_study(tmp_path, study)
     planted(tmp_path / "answers", study, {})
     one = tmp_path / "answers" / "R01.csv"
@@ -334,15 +334,15 @@ def test_names_are_drawn_as_they_are(tmp_path):
     clips = [
         replace(clip, system=names.get(clip.system, clip.system), scenario=f"${clip.scenario}_$") for clip in CLIPS
     ]
-    study = ordered(clips, 4)
-    page = study_page(analysed(study, planted(tmp_path / "a", study, {})))
+    study = build_study(clips, 4)
+    page = build_study_page(analyse_study(study, planted(tmp_path / "a", study, {})))
     assert page.count("data:image/png") == 3 and "&lt;c&gt;" in page and "<c>" not in page
 
 
 def test_a_hypothesis_that_is_named_twice_counts_once(tmp_path):
-    study = ordered(CLIPS, 8)
+    study = build_study(CLIPS, 8)
     answers = planted(tmp_path / "a", study, {"ours": 0.5})
-    once, twice = (analysed(study, answers, [("ours", "theirs")] * times) for times in (1, 2))
+    once, twice = (analyse_study(study, answers, [("ours", "theirs")] * times) for times in (1, 2))
     assert len(twice.findings) == 1 and twice.findings[0].holm_p == once.findings[0].holm_p
 
 
@@ -350,10 +350,10 @@ def test_the_forms_script_is_javascript(tmp_path):
     node = shutil.which("node")
     if node is None:
         pytest.skip("node is not here to read the script")
-    study = ordered(CLIPS, 1)
-    page = form_page(study, "R01", {clip.name: "a.mp4" for clip in study.clips})
+    study = build_study(CLIPS, 1)
+    page = build_form_page(study, "R01", {clip.name: "a.mp4" for clip in study.clips})
     (tmp_path / "form.js").write_text(page.split("<script>")[1].split("</script>")[0], "utf-8")
     read = subprocess.run([node, "--check", str(tmp_path / "form.js")], capture_output=True, text=True)
     assert read.returncode == 0, read.stderr
     told = json.loads(page.split('id="study">')[1].split("</script>")[0])
-    assert told["questions"] == questions_of(study, "R01") and told["study"] == study.id
+    assert told["questions"] == list_questions(study, "R01") and told["study"] == study.id

@@ -5,8 +5,8 @@ import pytest
 
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.synthesis.plan import Plan
-from beyond_mocap.synthesis.resynthesize import HAND_OVER, Anew, resynthesize, shown_footage
-from beyond_mocap.synthesis.search.preferences import AGAIN, SAME_CLIP, Used, price
+from beyond_mocap.synthesis.resynthesize import BLEND_SECONDS, VariantStretch, resynthesize, list_shown_stretches
+from beyond_mocap.synthesis.search.preferences import REUSE_COST, SAME_CLIP_COST, UsedStretch, compute_reuse_cost
 from beyond_mocap.synthesis.synthesize import synthesize
 
 
@@ -25,25 +25,25 @@ def footage(one, first, end):
 @pytest.mark.parametrize("start, end", [(8.0, 11.0), (4.0, 6.0), (9.0, 9.2)])
 def test_a_stretch_is_another_one_and_the_rest_is_the_same_to_the_last_bit(library, track, asked, take, start, end):
     plan, fps = Plan(track=track, timeline=asked), take.motion.fps
-    used = shown_footage(library, take, start, end)
-    other = resynthesize(library, plan, take, anew=Anew(start, end, used))
+    used = list_shown_stretches(library, take, start, end)
+    other = resynthesize(library, plan, take, variant=VariantStretch(start, end, used))
     off = np.flatnonzero(changed(take, other)) / fps
     assert len(off) and off.min() < end and off.max() > start
-    reach = HAND_OVER + 0.4 + (1.5 if start == 4.0 else 0.5)  # a kick's own entry and exit; a stretch of some length
+    reach = BLEND_SECONDS + 0.4 + (1.5 if start == 4.0 else 0.5)  # a kick's own entry and exit; a stretch of some length
     assert start - reach < off.min() and off.max() < end + reach, (off.min(), off.max())
     first, last = int(start * fps), int(end * fps)
     shared = footage(take, first, last) & footage(other, first, last)
     assert len(shared) < 0.5 * len(footage(take, first, last))
-    again = resynthesize(library, plan, take, anew=Anew(start, end, used))
+    again = resynthesize(library, plan, take, variant=VariantStretch(start, end, used))
     assert not changed(other, again).any()
     root = np.linalg.norm(np.diff(other.motion.root_positions, axis=0), axis=1) * fps
     assert root.max() < 6.0
-    assert [key.asked for key in other.keys] == [key.asked for key in take.keys]
+    assert [key.requested for key in other.keys] == [key.requested for key in take.keys]
 
 
 def test_a_whole_take_is_another_one(library, track, asked, take):
     plan = Plan(track=track, timeline=asked)
-    used = shown_footage(library, take, 0.0, 20.0)
+    used = list_shown_stretches(library, take, 0.0, 20.0)
     other = synthesize(library, plan, used=used)
     count = len(take.motion)
     assert len(footage(take, 0, count) & footage(other, 0, count)) < 0.6 * len(footage(take, 0, count))
@@ -55,9 +55,9 @@ def test_a_whole_take_is_another_one(library, track, asked, take):
 
 def test_the_price_of_footage_is_paid_where_it_was_shown(library):
     clip = library.clips[0]
-    cost = price(library, (Used(clip.path, clip.mirrored, 20.0, 30.0), Used("nowhere.bvh", False, 0.0, 9.0)))
+    cost = compute_reuse_cost(library, (UsedStretch(clip.path, clip.mirrored, 20.0, 30.0), UsedStretch("nowhere.bvh", False, 0.0, 9.0)))
     first = library.frames.first[0]
-    assert cost[first + 25] == AGAIN and cost[first + 60] == pytest.approx(SAME_CLIP)
+    assert cost[first + 25] == REUSE_COST and cost[first + 60] == pytest.approx(SAME_CLIP_COST)
     others = [number for number, other in enumerate(library.clips) if other.path != clip.path]
     assert not cost[np.isin(library.frames.clip, others)].any()
 
@@ -65,9 +65,9 @@ def test_the_price_of_footage_is_paid_where_it_was_shown(library):
 @pytest.mark.parametrize("start, end", [(-1.0, 3.0), (3.0, 2.0), (19.0, 40.0)])
 def test_a_stretch_that_is_none(library, track, asked, take, start, end):
     with pytest.raises(InputError, match="stretch"):
-        resynthesize(library, Plan(track=track, timeline=asked), take, anew=Anew(start, end))
+        resynthesize(library, Plan(track=track, timeline=asked), take, variant=VariantStretch(start, end))
 
 
 def test_other_methods_have_no_stretches(library, track, asked, take):
     with pytest.raises(InputError, match="method path"):
-        resynthesize(library, Plan(track=track, timeline=asked, method="blocks"), take, anew=Anew(3.0, 4.0))
+        resynthesize(library, Plan(track=track, timeline=asked, method="blocks"), take, variant=VariantStretch(3.0, 4.0))

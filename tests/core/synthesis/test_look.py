@@ -32,10 +32,10 @@ def magenta(path) -> int:
 
 
 def test_a_body_on_the_grass_shows_no_magenta_and_a_sunken_one_does(look, tmp_path):
-    motion = bvh.read(TAKE).motion
+    motion = bvh.read_bvh(TAKE).motion
     sunken = replace(motion, root_positions=motion.root_positions - [0.0, 0.0, 0.5])
     for name, one in (("on", motion), ("in", sunken)):
-        look.sheet(one, [0.0, 10.0], tmp_path / f"{name}.png", columns=2, tile=80)
+        look.write_sheet(one, [0.0, 10.0], tmp_path / f"{name}.png", columns=2, tile=80)
     assert magenta(tmp_path / "on.png") == 0 < magenta(tmp_path / "in.png")
 
 

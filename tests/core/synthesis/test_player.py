@@ -7,12 +7,12 @@ import pytest
 
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.evaluation.report import evaluate
-from beyond_mocap.library.build import build
-from beyond_mocap.motion.humanoid import identify, stature
+from beyond_mocap.library.build import build_library
+from beyond_mocap.motion.humanoid import identify_joints, estimate_stature
 from beyond_mocap.motion.motion import forward_kinematics
 from beyond_mocap.synthesis.plan import METHODS, Pin, Plan
 from beyond_mocap.synthesis.resynthesize import resynthesize
-from beyond_mocap.synthesis.search.preferences import named_by
+from beyond_mocap.synthesis.search.preferences import matches_pattern
 from beyond_mocap.synthesis.synthesize import synthesize
 
 
@@ -32,7 +32,7 @@ def same(a, b):
 
 
 def pin_near(take, seconds, away=(0.1, 0.0, 0.25)):
-    hand = identify(take.motion.skeleton).left.hand
+    hand = identify_joints(take.motion.skeleton).left.hand
     place = forward_kinematics(take.motion)[0][round((seconds - take.start_time) * take.motion.fps), hand]
     return Pin(seconds, "left_hand", tuple(place + away))
 
@@ -56,7 +56,7 @@ def test_pins_come_and_go_and_are_the_same_by_every_way(library, track, take, ti
 
 def test_a_pin_out_of_reach_is_told_and_reported(library, track, take):
     found = resynthesize(
-        library, replace(take.plan, pins=(pin_near(take, 9.0, (0.0, 0.0, 2.0)), Pin(99, "gaze", (0, 0, 1)))), take
+        library, replace(take.plan, pins=(pin_near(take, 9.0, (0.0, 0.0, 2.0)), Pin(99, "turn_gaze", (0, 0, 1)))), take
     )
     assert any("9 s: the pin of left_hand is out of reach by" in line for line in found.warnings)
     assert any("99 s: the pin of gaze is outside the track" in line for line in found.warnings)
@@ -70,7 +70,7 @@ def test_a_pin_out_of_reach_is_told_and_reported(library, track, take):
 def test_a_player_is_as_tall_as_asked_and_on_the_track(library, track, timeline_of, method, height):
     plan = Plan(track=track, timeline=timeline_of((5.0, "kick right")), method=method, height=height)
     tall = synthesize(library, plan)
-    assert stature(tall.motion.skeleton) == pytest.approx(height) and tall.plan is plan
+    assert estimate_stature(tall.motion.skeleton) == pytest.approx(height) and tall.plan is plan
     report = evaluate(tall, track, library)
     if method == "path":
         assert report["root_error_m"]["p95"] < 0.01 and report["skate"]["contact_cm_s"] < 8.0
@@ -100,7 +100,7 @@ def test_a_key_moment_without_a_side_takes_the_strong_foot(library, track, timel
 def test_clips_of_a_style_are_taken_rather_than_others(clip_file, track_of, tmp_path, method):
     clip_file(tmp_path / "a" / "walk.bvh", seconds=6.0, seed=1)
     clip_file(tmp_path / "b" / "walk.bvh", seconds=6.0, seed=2)
-    library, track = build(tmp_path), track_of(1.4)
+    library, track = build_library(tmp_path), track_of(1.4)
     for folder in "ab":
         take = synthesize(library, Plan(track=track, style=(folder,), method=method))
         shown = np.array(take.clips)[take.clip]
@@ -113,9 +113,9 @@ def test_clips_of_a_style_are_taken_rather_than_others(clip_file, track_of, tmp_
 def test_folders_clips_and_patterns_name_clips():
     path = "lmd/Player1/P1_kick.bvh"
     assert all(
-        named_by(path, name) for name in ("lmd", "LMD/player1", "Player1/", "lmd/*", "P1_kick", "*kick.bvh", "p1_*")
+        matches_pattern(path, name) for name in ("lmd", "LMD/player1", "Player1/", "lmd/*", "P1_kick", "*kick.bvh", "p1_*")
     )
-    assert not any(named_by(path, name) for name in ("kick", "player", "1", "."))
+    assert not any(matches_pattern(path, name) for name in ("kick", "player", "1", "."))
 
 
 @pytest.mark.parametrize("wrong", [

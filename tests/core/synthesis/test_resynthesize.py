@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from beyond_mocap.annotation import Span
-from beyond_mocap.base.errors import Cancelled
-from beyond_mocap.motion.humanoid import identify
+from beyond_mocap.base.errors import UserCancelledError
+from beyond_mocap.motion.humanoid import identify_joints
 from beyond_mocap.motion.motion import forward_kinematics
-from beyond_mocap.motion.track import Track, sample, zero_phase_hann
+from beyond_mocap.motion.track import Track, sample_track, smooth_zero_phase_hann
 from beyond_mocap.synthesis.plan import Plan
-from beyond_mocap.synthesis.resynthesize import HAND_OVER, resynthesize
+from beyond_mocap.synthesis.resynthesize import BLEND_SECONDS, resynthesize
 from beyond_mocap.synthesis.search.touched import RUN_UP
 from beyond_mocap.synthesis.synthesize import synthesize
 
@@ -37,7 +37,7 @@ def jerk_and_slide(take, frames):
     places, _ = forward_kinematics(take.motion)
     fps = take.motion.fps
     jerk = np.linalg.norm(np.diff(places, 3, axis=0), axis=2).max(axis=1) * fps**3
-    body, slide = identify(take.motion.skeleton), [0.0]
+    body, slide = identify_joints(take.motion.skeleton), [0.0]
     for side, limb in enumerate((body.left, body.right)):
         speed = np.linalg.norm(np.diff(places[:, limb.toe_or_foot, :2], axis=0), axis=1) * fps
         still = take.contacts[1:, side] & take.contacts[:-1, side]
@@ -75,7 +75,7 @@ def test_words_of_a_span_are_changed(library, take, timeline_of):
     timeline = timeline_of((5.0, "kick right"), (12.0, 14.0, "standing"), (17.0, "kick"))
     after = resynthesize(library, replace(take.plan, timeline=timeline), take)
     off = np.flatnonzero(changed(take, after))
-    margin = (RUN_UP + HAND_OVER + 1.5) * 30
+    margin = (RUN_UP + BLEND_SECONDS + 1.5) * 30
     assert 12.0 * 30 - margin < off[0] and off[-1] < 14.0 * 30 + margin
     assert after.timeline.spans != take.timeline.spans
     shown = [after.words[i] for i in range(int(12.4 * 30), int(13.6 * 30))]
@@ -88,7 +88,7 @@ def test_key_moments_come_and_go(library, take, timeline_of):
     assert len(without.keys) == 1 and without.keys[0] == take.keys[1]
     assert "kick" not in without.words[150]
     again = resynthesize(library, take.plan, without)
-    assert [key.asked for key in again.keys] == [key.asked for key in take.keys]
+    assert [key.requested for key in again.keys] == [key.requested for key in take.keys]
     assert again.keys[0].frame == pytest.approx(150.0, abs=0.5) and "kick" in again.words[150]
     assert not changed(take, again)[int(9 * 30) :].any()
 
@@ -96,8 +96,8 @@ def test_key_moments_come_and_go(library, take, timeline_of):
 def test_a_dragged_track_is_followed(library, take):
     plan = replace(take.plan, track=moved(take.plan.track, 10.0, (0.8, -0.6)))
     after = resynthesize(library, plan, take)
-    pelvis = zero_phase_hann(after.motion.root_positions[:, :2], 30.0, 1.5)
-    error = np.linalg.norm(pelvis - zero_phase_hann(sample(plan.track, 30.0).raw, 30.0, 1.5), axis=1)
+    pelvis = smooth_zero_phase_hann(after.motion.root_positions[:, :2], 30.0, 1.5)
+    error = np.linalg.norm(pelvis - smooth_zero_phase_hann(sample_track(plan.track, 30.0).raw, 30.0, 1.5), axis=1)
     assert error.max() < 0.03
     assert np.linalg.norm((after.motion.root_positions - take.motion.root_positions)[300, :2]) > 0.7
     off = np.flatnonzero(changed(take, after))
@@ -136,7 +136,7 @@ def test_nothing_shows_where_old_and_new_meet(library, take):
 
 def test_feet_that_stand_are_on_the_ground(library, take):
     """Also beside a seam at the end of a stretch, which joins another recording now."""
-    body = identify(library.skeleton)
+    body = identify_joints(library.skeleton)
     toes = [body.left.toe_or_foot, body.right.toe_or_foot]
 
     def highest(made):
@@ -195,7 +195,7 @@ def test_a_take_that_the_library_did_not_show_is_made_anew(library, take):
 
 def test_a_cancelled_edit_is_no_take(library, take):
     plan = replace(take.plan, track=moved(take.plan.track, 10.0, (0.8, 0.0)))
-    with pytest.raises(Cancelled):
+    with pytest.raises(UserCancelledError):
         resynthesize(library, plan, take, cancelled=lambda: True)
 
 

@@ -6,7 +6,7 @@ import pathlib
 import numpy as np
 import pytest
 
-from beyond_mocap.annotation import read_clip_annotations, read_timeline, vocabulary_words
+from beyond_mocap.annotation import read_clip_annotations, read_timeline, list_vocabulary
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.files.tracking.tracking import read_track_csv
 
@@ -26,7 +26,7 @@ def maker():
 
 def annotations():
     for path in sorted((SAMPLE / "library").glob("*.bvh")):
-        motion = bvh.read(path).motion
+        motion = bvh.read_bvh(path).motion
         yield path, motion, read_clip_annotations(path.with_suffix(".txt"), motion.fps)
 
 
@@ -36,7 +36,7 @@ def test_every_kind_of_movement_is_there():
         "standing", "walking", "jogging", "running", "sprinting", "turning", "left", "right", "back", "dribble",
         "receive", "kick", "header", "throwb", "getting_up", "celebration",
     }  # fmt: skip
-    assert found <= vocabulary_words()
+    assert found <= list_vocabulary()
 
 
 def test_words_lie_within_their_clips_and_keys_within_their_words():
@@ -50,8 +50,8 @@ def test_words_lie_within_their_clips_and_keys_within_their_words():
 
 
 def test_one_skeleton_and_at_most_six_megabytes():
-    motions = [bvh.read(path).motion for path in sorted((SAMPLE / "library").glob("*.bvh"))]
-    assert all(m.skeleton.same_bones(motions[0].skeleton) for m in motions)
+    motions = [bvh.read_bvh(path).motion for path in sorted((SAMPLE / "library").glob("*.bvh"))]
+    assert all(m.skeleton.has_same_bones(motions[0].skeleton) for m in motions)
     assert sum(path.stat().st_size for folder in ("library", "match") for path in (SAMPLE / folder).glob("*.*")) < 6.3e6
 
 
@@ -60,12 +60,12 @@ def test_what_ships_is_what_the_script_makes(maker, tmp_path):
     for made in tmp_path.iterdir():
         assert made.read_bytes() == (SAMPLE / "match" / made.name).read_bytes()
     clip = next(c for c in maker.clips() if c.name == "kick_low_top")
-    shipped = bvh.read(SAMPLE / "library" / "kick_low_top.bvh").motion
+    shipped = bvh.read_bvh(SAMPLE / "library" / "kick_low_top.bvh").motion
     assert np.allclose(shipped.root_positions, clip.motion.root_positions, atol=1e-4)
 
 
 def test_the_passage_could_be_played(maker):
-    times, players, ball = maker.true_paths()
+    times, players, ball = maker.compute_true_paths()
     for path in players.values():
         velocity = np.gradient(path, times, axis=0)
         assert np.linalg.norm(velocity, axis=1).max() < 8.2
@@ -86,7 +86,7 @@ def test_the_passage_reads_and_asks_for_what_the_library_has(maker):
         assert timeline.keys
         for key in timeline.keys:
             assert any(set(key.words) <= have for have in words), key
-        true = maker.true_paths()[1][name][::10]
+        true = maker.compute_true_paths()[1][name][::10]
         error = np.linalg.norm(track.positions - true, axis=1)
         assert 0.03 < np.sqrt(np.mean(error**2)) < 0.14  # a tracking system's noise
 
@@ -100,9 +100,9 @@ def test_the_passing_library_is_what_its_script_makes(maker, monkeypatch):
     clips = {clip.name: clip for clip in make_passes.library()}
     assert {path.stem for path in folder.glob("*.bvh")} == set(clips) == {path.stem for path in folder.glob("*.txt")}
     for name in ("volley_attack", "ready_2", "start_stop_walking"):
-        shipped = bvh.read(folder / f"{name}.bvh").motion
+        shipped = bvh.read_bvh(folder / f"{name}.bvh").motion
         assert np.allclose(shipped.root_positions, clips[name].motion.root_positions, atol=1e-4)
-    assert shipped.skeleton.same_bones(bvh.read(SAMPLE / "library" / "standing_1.bvh").motion.skeleton)
+    assert shipped.skeleton.has_same_bones(bvh.read_bvh(SAMPLE / "library" / "standing_1.bvh").motion.skeleton)
     keyed = {
         row.words
         for path in folder.glob("volley_*.bvh")

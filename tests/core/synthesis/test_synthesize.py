@@ -9,14 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from beyond_mocap.annotation.ball_contact import surfaces
+from beyond_mocap.annotation.ball_contact import build_surfaces
 from beyond_mocap.annotation.striking import HEAD_RADIUS
-from beyond_mocap.base.errors import Cancelled, InputError, NotInLibrary
-from beyond_mocap.library.build import build
+from beyond_mocap.base.errors import UserCancelledError, InputError, NotInLibraryError
+from beyond_mocap.library.build import build_library
 from beyond_mocap.motion import quaternion
-from beyond_mocap.motion.humanoid import heading, identify
-from beyond_mocap.motion.motion import pose_kinematics
-from beyond_mocap.motion.track import BALL_RADIUS, Track, clean, sample, zero_phase_hann
+from beyond_mocap.motion.humanoid import compute_heading, identify_joints
+from beyond_mocap.motion.motion import compute_pose
+from beyond_mocap.motion.track import BALL_RADIUS, Track, clean_track, sample_track, smooth_zero_phase_hann
 from beyond_mocap.synthesis.plan import METHODS, Plan
 from beyond_mocap.synthesis.synthesize import synthesize
 
@@ -37,9 +37,9 @@ def take_of(library, track_of, timeline_of):
 def root_error(take, track) -> np.ndarray:
     """(T,) m: pelvis and track behind the same zero-phase Hann window of 1.5 s, as metrics.md defines it."""
     fps = take.motion.fps
-    sampled = sample(track, fps)
-    pelvis = zero_phase_hann(take.motion.root_positions[:, :2], fps, 1.5)
-    return np.linalg.norm(pelvis - zero_phase_hann(sampled.raw, fps, 1.5), axis=1)
+    sampled = sample_track(track, fps)
+    pelvis = smooth_zero_phase_hann(take.motion.root_positions[:, :2], fps, 1.5)
+    return np.linalg.norm(pelvis - smooth_zero_phase_hann(sampled.raw, fps, 1.5), axis=1)
 
 
 def shown_at(take, frame) -> tuple[str, float]:
@@ -181,7 +181,7 @@ def test_key_moments_that_nobody_can_do_both_are_told_as_they_came_out(take_of, 
     take = take_of((4.0, "kick right"), (4.1, "kick left"), method=method)
     assert_whole(take, 241)
     lost = [
-        not ({"kick"} | set(key.asked.words) <= set(key.words))
+        not ({"kick"} | set(key.requested.words) <= set(key.words))
         or abs(shown_at(take, time * 30.0)[1] - key.clip_frame) > 1.0
         for key, time in zip(take.keys, (4.0, 4.1))
     ]
@@ -201,7 +201,7 @@ def test_the_root_is_on_the_track(take_of, track_of, speed, turn):
 def test_the_root_is_on_a_noisy_track_that_speeds_up_and_slows_down(take_of, track_of):
     clear = track_of(lambda t: 2.5 - 2.0 * np.cos(0.9 * t), seconds=12.0, turn=lambda t: np.sin(0.5 * t))
     noise = np.random.default_rng(2).normal(0.0, 0.01, clear.positions.shape)
-    track = clean(Track(clear.times, clear.positions + noise))[0]
+    track = clean_track(Track(clear.times, clear.positions + noise))[0]
     error = root_error(take_of((6.0, "kick right"), track=track), track)
     assert error.mean() <= 0.01 and error.max() <= 0.05
 
@@ -221,7 +221,7 @@ def test_the_body_faces_where_it_goes(take_of, track_of, method):
     if method == "blocks":
         assert np.allclose(take.motion.root_positions[0, :2], track.positions[0], atol=0.15)
         return
-    off = np.exp(1j * (heading(take.motion) - sample(track, 30.0).direction))
+    off = np.exp(1j * (compute_heading(take.motion) - sample_track(track, 30.0).direction))
     assert np.abs(np.angle(off)).mean() < 0.2
 
 
@@ -242,15 +242,15 @@ def test_where_frames_come_from_is_true(take_of, library, method):
             np.array(weight),
         )
         assert abs(np.sum(source * take.motion.rotations[t, joint])) > 1 - 1e-6
-        assert set(take.words[t]) == clip.words_at(round(float(take.clip_frame[t]), 6))
+        assert set(take.words[t]) == clip.labels_at(round(float(take.clip_frame[t]), 6))
         checked += 1
     assert checked > 30
 
 
 def test_feet_do_not_sink_or_slide_by_path(take_of, track_of, library):
     take = take_of(track=track_of(1.6))
-    body = identify(library.skeleton)
-    places, _ = pose_kinematics(library.skeleton, take.motion.root_positions, take.motion.rotations)
+    body = identify_joints(library.skeleton)
+    places, _ = compute_pose(library.skeleton, take.motion.root_positions, take.motion.rotations)
     feet = np.stack([places[:, [limb.foot, limb.toe]] for limb in (body.left, body.right)], axis=1)
     assert feet[..., 1, 2].min() > -0.02
     speed = np.linalg.norm(np.diff(feet[..., :2], axis=0), axis=-1).mean(axis=2) * 30.0
@@ -271,7 +271,7 @@ def fastest_turn(rotations) -> float:
 
 
 def test_the_library_s_lacks_are_told_and_the_nearest_used_on_demand(take_of):
-    with pytest.raises(NotInLibrary) as told:
+    with pytest.raises(NotInLibraryError) as told:
         take_of((4.0, "kick high"))
     assert told.value.exit_status == 3 and any("kick" in words for words in told.value.nearest)
     for method in METHODS:
@@ -305,8 +305,8 @@ def test_who_goes_on_walking_for_want_of_a_header_still_puts_his_head_to_a_ball_
 
 def head_at(take, frame) -> np.ndarray:
     """(3,) m: the middle of the head at an output frame."""
-    posed = pose_kinematics(take.motion.skeleton, take.motion.root_positions[frame], take.motion.rotations[frame])
-    return surfaces(take.motion.skeleton, ("header",))[0].line(*posed)[0]
+    posed = compute_pose(take.motion.skeleton, take.motion.root_positions[frame], take.motion.rotations[frame])
+    return build_surfaces(take.motion.skeleton, ("header",))[0].compute_line(*posed)[0]
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -329,9 +329,9 @@ def test_asked_words_are_what_is_played(take_of, track_of, method, word, speed):
 def test_very_short_tracks(take_of, track_of, method, seconds):
     track = track_of(1.4, seconds)
     take = take_of(track=track, method=method)
-    assert_whole(take, len(sample(track, 30.0)))
+    assert_whole(take, len(sample_track(track, 30.0)))
     take = take_of((seconds / 2, "kick right"), track=track, method=method)
-    assert_whole(take, len(sample(track, 30.0)))
+    assert_whole(take, len(sample_track(track, 30.0)))
     assert take.keys[0].clip == "kick.bvh"
 
 
@@ -362,12 +362,12 @@ def test_faster_than_anybody(take_of, track_of, method):
 @pytest.mark.parametrize("seconds", [0.5, 3.0])
 def test_a_library_of_one_clip(tmp_path, clip_file, take_of, track_of, method, seconds):
     clip_file(tmp_path / "walk.bvh", 1.4, seconds)
-    library = build(tmp_path)
+    library = build_library(tmp_path)
     track = track_of(1.4, 4.0, turn=0.2)
     take = take_of(library=library, track=track, method=method)
     assert_whole(take, 121)
     assert "walk.bvh" in np.array(take.clips)[take.clip]
-    with pytest.raises(NotInLibrary, match="the library has no key moments"):
+    with pytest.raises(NotInLibraryError, match="the library has no key moments"):
         take_of((2.0, "kick"), library=library, track=track, method=method)
 
 
@@ -393,7 +393,7 @@ def test_the_ball_comes_along(take_of, track_of):
 
 def test_it_can_be_stopped(take_of):
     for method in METHODS:
-        with pytest.raises(Cancelled):
+        with pytest.raises(UserCancelledError):
             take_of(method=method, cancelled=lambda: True)
 
 
@@ -431,7 +431,7 @@ def test_in_a_hurry_a_whole_take_comes_out_and_says_from_when_on(take_of):
 
 @pytest.mark.parametrize("method", METHODS)
 def test_in_a_hurry_before_anything_is_found_there_is_no_take(take_of, method):
-    with pytest.raises(Cancelled):
+    with pytest.raises(UserCancelledError):
         take_of((6.0, "kick right"), method=method, hurry=lambda: True)
 
 
@@ -446,6 +446,6 @@ def test_words_that_must_not_be_are_not_shown(take_of, track_of, method):
 @pytest.mark.parametrize("method", METHODS)
 def test_what_every_clip_carries_is_shown_all_the_same_and_told(take_of, clip_file, tmp_path, method):
     clip_file(tmp_path / "walk.bvh", seconds=6.0)
-    take = take_of((2, 5, "-walking"), library=build(tmp_path), method=method)
+    take = take_of((2, 5, "-walking"), library=build_library(tmp_path), method=method)
     assert_whole(take, 241)
     assert "2.0 s: the avoided label 'walking' is shown for 3.0 s: the search found nothing without it" in take.warnings

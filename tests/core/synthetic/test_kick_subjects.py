@@ -2,15 +2,15 @@
 
 import numpy as np
 
-from beyond_mocap.motion.retargeting.neutral import neutral_stance
-from beyond_mocap.synthetic.kicks import BEFORE, KICKS, contact, kicked
-from beyond_mocap.synthetic.subjects import KickManner, make_kicker, style_kick, vary_kick
+from beyond_mocap.motion.retargeting.neutral import build_neutral_stance
+from beyond_mocap.synthetic.kicks import BEFORE, KICKS, compute_contacts, build_kick
+from beyond_mocap.synthetic.subjects import KickManner, build_kicker, style_kick, vary_kick
 
 
 def test_the_same_seed_is_the_same_person():
-    one, same, other = make_kicker(3), make_kicker(3), make_kicker(4)
-    assert one.skeleton.same_bones(same.skeleton, 0.0) and one.manner == same.manner
-    assert not one.skeleton.same_bones(other.skeleton) and one.manner != other.manner
+    one, same, other = build_kicker(3), build_kicker(3), build_kicker(4)
+    assert one.skeleton.has_same_bones(same.skeleton, 0.0) and one.manner == same.manner
+    assert not one.skeleton.has_same_bones(other.skeleton) and one.manner != other.manner
 
 
 def test_the_unstyled_manner_at_full_effort_kicks_as_the_table_does():
@@ -21,23 +21,23 @@ def test_the_unstyled_manner_at_full_effort_kicks_as_the_table_does():
 
 
 def test_a_harder_kick_swings_further_back_and_faster():
-    who = make_kicker(1)
+    who = build_kicker(1)
     feet = []
     for speed in (13.0, 22.0):
         style = vary_kick(who, KICKS["instep"], speed, np.random.default_rng(1))
         feet.append(
-            np.linalg.norm(contact(style, neutral_stance(who.skeleton), "right", [(0.0, 0.0)])[1][0], axis=1).max()
+            np.linalg.norm(compute_contacts(style, build_neutral_stance(who.skeleton), "right", [(0.0, 0.0)])[1][0], axis=1).max()
         )
     assert feet[1] > feet[0]
 
 
 def test_the_contact_told_is_the_one_of_the_whole_kick():
-    neutral = neutral_stance(make_kicker(2).skeleton)
-    ends = contact(KICKS["instep"], neutral, "left", [(0.0, 0.0), (0.03, 4.0)])[0][1]
-    motion = kicked(KICKS["instep"], neutral, "left", 0.03, 4.0, fps=480.0)
-    from beyond_mocap.motion.humanoid import identify
+    neutral = build_neutral_stance(build_kicker(2).skeleton)
+    ends = compute_contacts(KICKS["instep"], neutral, "left", [(0.0, 0.0), (0.03, 4.0)])[0][1]
+    motion = build_kick(KICKS["instep"], neutral, "left", 0.03, 4.0, fps=480.0)
+    from beyond_mocap.motion.humanoid import identify_joints
     from beyond_mocap.motion.motion import forward_kinematics
 
     places, _ = forward_kinematics(motion)
-    limb = identify(motion.skeleton).left
+    limb = identify_joints(motion.skeleton).left
     assert np.abs(places[int(BEFORE * 480), [limb.foot, limb.toe]] - ends).max() < 2e-4

@@ -3,16 +3,16 @@
 import numpy as np
 import pytest
 
-from benchmarks.ball_touches import Reading, ReadTouch, scored
-from beyond_mocap.ball.tracked.solve import solve
-from beyond_mocap.synthetic.ground_truth.planted import planted_match, sample_feed
+from benchmarks.ball_touches import TouchAnnotation, AnnotatedTouch, score_touches
+from beyond_mocap.ball.tracked.solve import solve_samples
+from beyond_mocap.synthetic.ground_truth.planted import build_match, sample_feed
 
 TIMES = np.arange(0.0, 60.0, 0.02)
 
 
 @pytest.fixture(scope="module")
 def match():
-    return planted_match(60.0, seed=3)
+    return build_match(60.0, seed=3)
 
 
 def test_players_meet_the_ball_at_every_touch_and_run_as_men_do(match):
@@ -26,7 +26,7 @@ def test_players_meet_the_ball_at_every_touch_and_run_as_men_do(match):
 def test_the_ball_goes_on_from_touch_to_touch(match):
     for touch, after in zip(match.touches, match.touches[1:]):
         assert after.time > touch.time + 0.3
-        if after.word != "throw-in":
+        if after.label != "throw-in":
             here = match.ball_at(np.array([after.time - 1e-6]))[0]
             np.testing.assert_allclose(here, after.position, atol=1e-3)
         assert np.linalg.norm(touch.after - touch.before) > 0.3
@@ -36,7 +36,7 @@ def test_the_ball_goes_on_from_touch_to_touch(match):
 def test_all_parts_and_both_teams_come_and_the_same_seed_plays_the_same(match):
     assert {touch.part for touch in match.touches} >= {"foot", "head"}
     assert {touch.player.split("_")[0] for touch in match.touches} == {"home", "away"}
-    again = planted_match(20.0, seed=3)
+    again = build_match(20.0, seed=3)
     for touch, other in zip(match.touches, again.touches):
         assert (touch.time, touch.player) == (other.time, other.player)
 
@@ -67,9 +67,9 @@ def test_filled_stretches_are_straight_between_their_corners(match):
 @pytest.mark.parametrize("how", [{"filled": 0.3}, {"fps": 10.0, "heights": False}])
 def test_the_solver_finds_who_touched_it_when(match, how):
     feed = sample_feed(match, **how)
-    solved = solve(feed.times, feed.ball, feed.positions, feed.ids, feed.teams, (feed.length, feed.width))
-    read = tuple(ReadTouch(touch.time, (touch.player,)) for touch in match.touches if 1.2 < touch.time < 59.0)
-    reading = Reading(((1.2, 59.0),), read, (ReadTouch(1.0),))
-    score = scored([touch.time for touch in solved.touches], [touch.player for touch in solved.touches], reading)
+    solved = solve_samples(feed.times, feed.ball, feed.positions, feed.ids, feed.teams, (feed.length, feed.width))
+    read = tuple(AnnotatedTouch(touch.time, (touch.player,)) for touch in match.touches if 1.2 < touch.time < 59.0)
+    reading = TouchAnnotation(((1.2, 59.0),), read, (AnnotatedTouch(1.0),))
+    score = score_touches([touch.time for touch in solved.touches], [touch.player for touch in solved.touches], reading)
     assert score.f1 >= 0.8, (score.missed, score.false)
     assert np.median(np.abs(score.errors)) < 0.03

@@ -7,27 +7,27 @@ import pytest
 
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.motion import quaternion
-from beyond_mocap.motion.motion import forward_kinematics, pose_kinematics
-from beyond_mocap.synthetic.gait import gait
-from beyond_mocap.synthetic.ground_truth.planted_ball import PlantedBall
-from beyond_mocap.synthetic.ground_truth.planted_body import in_marker_axes
-from beyond_mocap.synthetic.ground_truth.planted_markers import mirrored, planted, planted_error
-from beyond_mocap.synthetic.ground_truth.planted_places import SETS, markers_on
-from beyond_mocap.synthetic.throws import throw
+from beyond_mocap.motion.motion import forward_kinematics, compute_pose
+from beyond_mocap.synthetic.gait import build_gait
+from beyond_mocap.synthetic.ground_truth.planted_ball import BallRequest
+from beyond_mocap.synthetic.ground_truth.planted_body import to_marker_axes
+from beyond_mocap.synthetic.ground_truth.planted_markers import mirror_trial, build_trial, measure_trial_error
+from beyond_mocap.synthetic.ground_truth.planted_places import SETS, compute_rigid_markers
+from beyond_mocap.synthetic.throws import build_throw
 
 
 @pytest.fixture(scope="module")
 def walk():
-    return gait(1.4, 3.0, fps=100.0)
+    return build_gait(1.4, 3.0, fps=100.0)
 
 
 @pytest.fixture(scope="module")
 def known(walk):
-    return planted(walk, "driveline", seed=3, occlusion=0.05, swaps=2, jumps=4, unlabeled=2)
+    return build_trial(walk, "driveline", seed=3, occlusion=0.05, swaps=2, jumps=4, unlabeled=2)
 
 
 def test_joints_keep_their_places(walk):
-    truth = in_marker_axes(walk)
+    truth = to_marker_axes(walk)
     before, _ = forward_kinematics(walk)
     after, _ = forward_kinematics(truth)
     for side in ("Left", "Right"):
@@ -37,8 +37,8 @@ def test_joints_keep_their_places(walk):
 
 
 def test_rests_in_a_t_pose_facing_x(walk):
-    skeleton = in_marker_axes(walk).skeleton
-    places, _ = pose_kinematics(skeleton, np.zeros((1, 3)), quaternion.identity(1, len(skeleton)))
+    skeleton = to_marker_axes(walk).skeleton
+    places, _ = compute_pose(skeleton, np.zeros((1, 3)), quaternion.identity(1, len(skeleton)))
     at = dict(zip(skeleton.names, places[0]))
     for side, sign in (("Left", 1.0), ("Right", -1.0)):
         upper, lower = at[side + "ForeArm"] - at[side + "Arm"], at[side + "Hand"] - at[side + "ForeArm"]
@@ -50,7 +50,7 @@ def test_rests_in_a_t_pose_facing_x(walk):
 
 
 def test_knees_and_elbows_bend_about_one_axis(walk):
-    truth = in_marker_axes(walk)
+    truth = to_marker_axes(walk)
     for joint, axis in (("LeftLeg", 1), ("RightLeg", 1)):
         bend = quaternion.to_rotation_vector(truth.rotations[:, truth.skeleton.index(joint)])
         assert np.abs(np.delete(bend, axis, axis=1)).max() < 0.02
@@ -58,23 +58,23 @@ def test_knees_and_elbows_bend_about_one_axis(walk):
 
 
 def test_wrists_do_not_twist(walk):
-    truth = in_marker_axes(walk)
+    truth = to_marker_axes(walk)
     hand = truth.rotations[:, truth.skeleton.index("RightHand")]
     assert np.abs(hand[:, 2]).max() < 1e-9
 
 
 def test_markers_on_bone_are_rigid(walk):
-    known = planted(walk, "plug_in_gait", noise=0.0, softness=0.0)
-    np.testing.assert_allclose(known.trial.positions, markers_on(known.motion, known.markers), atol=1e-12)
+    known = build_trial(walk, "plug_in_gait", noise=0.0, softness=0.0)
+    np.testing.assert_allclose(known.trial.positions, compute_rigid_markers(known.motion, known.markers), atol=1e-12)
     for places in (known.trial.positions, known.static.positions):
-        thigh = [known.trial.index(label) for label in ("LTHI", "LKNE")]
+        thigh = [known.trial.index_of(label) for label in ("LTHI", "LKNE")]
         apart = np.linalg.norm(places[:, thigh[0]] - places[:, thigh[1]], axis=1)
         assert np.ptp(apart) < 1e-9
 
 
 def test_skin_shifts_thighs_more_than_feet(walk):
-    known = planted(walk, "plug_in_gait", noise=0.0)
-    off = np.linalg.norm(known.clean - markers_on(known.motion, known.markers), axis=-1).max(axis=0)
+    known = build_trial(walk, "plug_in_gait", noise=0.0)
+    off = np.linalg.norm(known.clean - compute_rigid_markers(known.motion, known.markers), axis=-1).max(axis=0)
     of = dict(zip(known.markers.labels, off))
     assert 0.004 < of["LTHI"] < 0.03 and of["LHEE"] < 0.006 and of["LFHD"] < 0.005
 
@@ -84,7 +84,7 @@ def test_faults_are_where_they_are_told(known):
     assert kinds.count("swap") == 2 and kinds.count("jump") == 4 and kinds.count("unlabeled") == 2
     for fault in known.faults:
         frames = slice(fault.start, fault.stop)
-        mine = [known.trial.index(label) for label in fault.labels]
+        mine = [known.trial.index_of(label) for label in fault.labels]
         if fault.kind == "gap":
             assert np.isnan(known.trial.positions[frames, mine]).all()
         if fault.kind == "swap":
@@ -103,13 +103,13 @@ def test_all_else_is_untouched(known):
     for fault in known.faults:
         for label in fault.labels:
             if not label.startswith("*"):
-                touched[fault.start : fault.stop, known.trial.index(label)] = True
+                touched[fault.start : fault.stop, known.trial.index_of(label)] = True
     own = known.trial.positions[:, : known.clean.shape[1]]
     np.testing.assert_array_equal(own[~touched], known.clean[~touched])
 
 
 def test_same_seed_same_trial(walk):
-    one, two, other = (planted(walk, seed=seed, occlusion=0.02).trial.positions for seed in (5, 5, 6))
+    one, two, other = (build_trial(walk, seed=seed, occlusion=0.02).trial.positions for seed in (5, 5, 6))
     np.testing.assert_array_equal(one, two)
     assert not np.array_equal(one, other)
 
@@ -122,30 +122,30 @@ def test_static_stands_upright_with_all_markers(known):
 
 
 def test_sprinter_takes_markers_off_after_the_static_trial(walk):
-    known = planted(walk, "sprinter")
+    known = build_trial(walk, "sprinter")
     assert set(known.static.labels) - set(known.trial.labels) == {"LMEPI", "RMEPI", "LMMAL", "RMMAL"}
 
 
 @pytest.mark.parametrize("name", sorted(SETS))
 def test_every_label_finds_its_place(walk, name):
-    assert set(planted(walk, name).static.labels) == set(SETS[name])
+    assert set(build_trial(walk, name).static.labels) == set(SETS[name])
 
 
 def test_mirrors(known):
     trial = known.static
-    assert mirrored(trial).positions[0, 0, 1] == -trial.positions[0, 0, 1]
+    assert mirror_trial(trial).positions[0, 0, 1] == -trial.positions[0, 0, 1]
 
 
 def test_unknown_set_is_told(walk):
     with pytest.raises(InputError, match="plug_in_gait"):
-        planted(walk, "nothing")
+        build_trial(walk, "nothing")
 
 
 class TestBall:
     @pytest.fixture(scope="class")
     def thrown(self):
-        made = throw((15.0, 1.0, 1.0), 24.0, fps=240.0)
-        return made, planted(made.motion, "driveline", ball=PlantedBall(made.release, turns=20.0), noise=0.0)
+        made = build_throw((15.0, 1.0, 1.0), 24.0, fps=240.0)
+        return made, build_trial(made.motion, "driveline", ball=BallRequest(made.release, spin_rate=20.0), noise=0.0)
 
     def test_leaves_with_the_hands_velocity_and_hits_the_target(self, thrown):
         made, known = thrown
@@ -169,43 +169,43 @@ class TestBall:
 
     def test_is_seen_for_a_while(self, thrown):
         made, known = thrown
-        seen = known.trial.seen[:, known.trial.index("BALL")]
+        seen = known.trial.seen[:, known.trial.index_of("BALL")]
         assert seen[: int((made.release + 0.29) * 240)].all() and not seen[int((made.release + 0.32) * 240) :].any()
 
     def test_air_slows_it(self, thrown):
         made, _ = thrown
-        slow = planted(made.motion, "lower_body", ball=PlantedBall(made.release, drag=0.01)).ball
-        free = planted(made.motion, "lower_body", ball=PlantedBall(made.release)).ball
+        slow = build_trial(made.motion, "lower_body", ball=BallRequest(made.release, drag=0.01)).ball
+        free = build_trial(made.motion, "lower_body", ball=BallRequest(made.release)).ball
         frame = int((made.release + 0.3) * 240)
         flown = free.places[frame] - free.position
         assert 0.02 < np.linalg.norm(flown - (slow.places[frame] - slow.position)) / np.linalg.norm(flown) < 0.06
 
     def test_release_outside_is_told(self, thrown):
         with pytest.raises(InputError, match="release"):
-            planted(thrown[0].motion, "lower_body", ball=PlantedBall(60.0))
+            build_trial(thrown[0].motion, "lower_body", ball=BallRequest(60.0))
 
 
 class TestError:
     def test_the_truth_has_none(self, known):
-        error = planted_error(known, known.motion)
+        error = measure_trial_error(known, known.motion)
         assert error.centre < 1e-9 and error.angle < 1e-6 and error.raw_angle < 1e-6
 
     def test_a_constant_turn_of_a_segments_axes_is_raw_error_only(self, known):
         skeleton = known.motion.skeleton
         leg = skeleton.index("LeftLeg")
         turned = known.motion.rotations.copy()
-        twist = quaternion.about_axis([0.0, 0.0, 1.0], 0.2)
+        twist = quaternion.from_axis_angle([0.0, 0.0, 1.0], 0.2)
         turned[:, leg] = quaternion.multiply(turned[:, leg], twist)
         foot = skeleton.index("LeftFoot")
         turned[:, foot] = quaternion.multiply(quaternion.inverse(twist), turned[:, foot])
-        error = planted_error(known, replace(known.motion, rotations=turned))
+        error = measure_trial_error(known, replace(known.motion, rotations=turned))
         assert abs(error.raw["LeftLeg"] - 0.2) < 1e-6 and error.angles["LeftLeg"] < 1e-6
 
     def test_shift_and_wobble_are_measured(self, known):
         moved = replace(known.motion, root_positions=known.motion.root_positions + [0.003, 0.004, 0.0])
-        assert abs(planted_error(known, moved).centre - 0.005) < 1e-9
+        assert abs(measure_trial_error(known, moved).centre - 0.005) < 1e-9
         knee = known.motion.skeleton.index("RightLeg")
         turned = known.motion.rotations.copy()
         sway = 0.1 * np.where(np.arange(len(turned)) % 2, 1.0, -1.0)
-        turned[:, knee] = quaternion.multiply(turned[:, knee], quaternion.about_axis([0.0, 1.0, 0.0], sway))
-        assert abs(planted_error(known, replace(known.motion, rotations=turned)).angles["RightLeg"] - 0.1) < 0.002
+        turned[:, knee] = quaternion.multiply(turned[:, knee], quaternion.from_axis_angle([0.0, 1.0, 0.0], sway))
+        assert abs(measure_trial_error(known, replace(known.motion, rotations=turned)).angles["RightLeg"] - 0.1) < 0.002

@@ -5,9 +5,9 @@ import pytest
 
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.motion import quaternion
-from beyond_mocap.motion.humanoid import identify
+from beyond_mocap.motion.humanoid import identify_joints
 from beyond_mocap.motion.motion import forward_kinematics
-from beyond_mocap.synthetic.throws import STYLES, throw
+from beyond_mocap.synthetic.throws import STYLES, build_throw
 
 
 def landed(made, target):
@@ -23,14 +23,14 @@ def landed(made, target):
     "target, speed", [((18.0, 0.0, 1.0), 32.0), ((12.0, -5.0, 1.6), 18.0), ((6.0, 2.0, 0.6), 12.0)]
 )
 def test_hits_what_it_is_aimed_at(arm, style, target, speed):
-    made = throw(target, speed, arm, style)
+    made = build_throw(target, speed, arm, style)
     assert np.linalg.norm(landed(made, target) - target) < 0.05
     assert abs(np.linalg.norm(made.velocity) - speed) < 1e-6
 
 
 def test_the_hand_carries_the_ball_until_release():
-    made = throw(speed=25.0, fps=480.0)
-    body = identify(made.motion.skeleton)
+    made = build_throw(speed=25.0, fps=480.0)
+    body = identify_joints(made.motion.skeleton)
     places, turns = forward_kinematics(made.motion)
     ball = places[:, body.right.hand] + quaternion.rotate(turns[:, body.right.hand], made.grip)
     frame = int(round(made.release * 480.0))
@@ -40,18 +40,18 @@ def test_the_hand_carries_the_ball_until_release():
 
 
 def test_feet_stand_on_the_ground_and_do_not_slide():
-    made = throw(speed=30.0, fps=120.0)
+    made = build_throw(speed=30.0, fps=120.0)
     places, _ = forward_kinematics(made.motion)
-    toe = places[:, identify(made.motion.skeleton).left.toe]
+    toe = places[:, identify_joints(made.motion.skeleton).left.toe]
     assert places[..., 2].min() > -0.005
     landed_on = toe[int((made.release - 0.05) * 120) :]
     assert np.ptp(landed_on, axis=0).max() < 0.01
 
 
 def test_elbows_and_knees_bend_the_right_way():
-    made = throw(speed=30.0)
+    made = build_throw(speed=30.0)
     places, _ = forward_kinematics(made.motion)
-    body = identify(made.motion.skeleton)
+    body = identify_joints(made.motion.skeleton)
     assert np.linalg.norm(np.diff(places, axis=0), axis=-1).max() * 120.0 < 45.0
     for limb in (body.left, body.right):
         assert (places[:, limb.foot, 2] < places[:, limb.lower_leg, 2]).all()
@@ -60,4 +60,4 @@ def test_elbows_and_knees_bend_the_right_way():
 @pytest.mark.parametrize("wrong", [{"arm": "third"}, {"style": "underhand"}, {"speed": 80.0}, {"target": (90.0, 0, 1)}])
 def test_what_cannot_be_thrown_is_told(wrong):
     with pytest.raises(InputError):
-        throw(**{"speed": 20.0} | wrong)
+        build_throw(**{"speed": 20.0} | wrong)

@@ -3,72 +3,72 @@
 import numpy as np
 import pytest
 
-from beyond_mocap.ball.flight import Launch, find_crossing, fly
+from beyond_mocap.ball.flight import Launch, find_crossing, simulate_flight
 from beyond_mocap.ball.physics import BASEBALL
 from beyond_mocap.base.errors import InputError
-from beyond_mocap.motion.humanoid import identify
+from beyond_mocap.motion.humanoid import identify_joints
 from beyond_mocap.motion.motion import forward_kinematics
-from beyond_mocap.synthetic.throws import throw
-from beyond_mocap.throws.correction import Freedom, corrected
-from beyond_mocap.throws.led_limb import shifts_about
-from beyond_mocap.throws.letting_go import InHand, grip_point
+from beyond_mocap.synthetic.throws import build_throw
+from beyond_mocap.throws.correction import Freedom, correct_motion
+from beyond_mocap.throws.led_limb import solve_shifts
+from beyond_mocap.throws.letting_go import InHand, sample_points
 
 
 def impact(found, target):
-    flight = fly(Launch(0.0, found.position, found.velocity, found.spin), BASEBALL, 3.0)
+    flight = simulate_flight(Launch(0.0, found.position, found.velocity, found.spin), BASEBALL, 3.0)
     return float(np.linalg.norm(find_crossing(flight, target) - target))
 
 
 @pytest.mark.parametrize("freedom", [Freedom(), Freedom.anchored()])
 @pytest.mark.parametrize("speed, arm, aside", [(15.0, "right", (0.2, -0.6, 0.3)), (24.0, "left", (0.5, 0.5, -0.4))])
 def test_hits_another_target(freedom, speed, arm, aside):
-    made = throw((0.8 * speed, 0.0, 1.2), speed, arm, fps=30.0)
+    made = build_throw((0.8 * speed, 0.0, 1.2), speed, arm, fps=30.0)
     target = np.array([0.8 * speed, 0.0, 1.2]) + aside
-    found = corrected(made.motion, InHand(arm, made.grip), made.release * 30.0, target, BASEBALL, freedom)
+    found = correct_motion(made.motion, InHand(arm, made.grip), made.release * 30.0, target, BASEBALL, freedom)
     assert impact(found, target) < 0.02
-    assert found.moved < 0.05
-    if not freedom.turn:
-        assert found.turned == 0.0 and found.pace == 1.0 and len(found.motion) == len(made.motion)
+    assert found.displacement < 0.05
+    if not freedom.rotation:
+        assert found.rotation == 0.0 and found.pace == 1.0 and len(found.motion) == len(made.motion)
 
 
 def test_the_ball_is_where_the_hand_is_and_as_fast():
-    made = throw((16.0, 0.0, 1.2), 20.0, fps=30.0)
+    made = build_throw((16.0, 0.0, 1.2), 20.0, fps=30.0)
     part = InHand("right", made.grip)
-    found = corrected(made.motion, part, made.release * 30.0, np.array([16.0, 0.8, 1.0]), BASEBALL, Freedom.anchored())
+    found = correct_motion(made.motion, part, made.release * 30.0, np.array([16.0, 0.8, 1.0]), BASEBALL, Freedom.anchored())
     near = found.frame + np.array([-1e-3, 0.0, 1e-3])
-    ball = grip_point(found.motion, part, near)[:, 0]
+    ball = sample_points(found.motion, part, near)[:, 0]
     assert np.allclose(ball[1], found.position, atol=1e-9)
     assert np.allclose((ball[2] - ball[0]) * 30.0 / 2e-3, found.velocity, atol=1e-3)
 
 
 def test_only_the_arm_near_the_release_is_changed():
-    made = throw((16.0, 0.0, 1.2), 20.0, fps=30.0)
-    found = corrected(
+    made = build_throw((16.0, 0.0, 1.2), 20.0, fps=30.0)
+    found = correct_motion(
         made.motion, InHand("right", made.grip), made.release * 30.0, np.array([16.0, 0.8, 1.0]), BASEBALL,
         Freedom.anchored(),
     )  # fmt: skip
     changed = np.argwhere(np.any(found.motion.rotations != made.motion.rotations, axis=2))
-    arm = identify(made.motion.skeleton).right
+    arm = identify_joints(made.motion.skeleton).right
     assert set(changed[:, 1]) <= {arm.upper_arm, arm.lower_arm, arm.hand}
     assert np.abs(changed[:, 0] - found.frame).max() <= 0.4 * 30.0 + 1.0
     assert np.array_equal(found.motion.root_positions, made.motion.root_positions)
     places, old = forward_kinematics(found.motion)[0], forward_kinematics(made.motion)[0]
     bones = np.linalg.norm(places[:, arm.hand] - places[:, arm.lower_arm], axis=-1)
     assert np.ptp(bones) < 1e-9
-    assert np.isclose(np.linalg.norm(places[:, arm.hand] - old[:, arm.hand], axis=-1).max(), found.moved)
+    assert np.isclose(np.linalg.norm(places[:, arm.hand] - old[:, arm.hand], axis=-1).max(), found.displacement)
 
 
 def test_a_throw_that_hits_stays_as_it_is():
-    made = throw((12.0, 0.0, 1.2), 15.0, fps=60.0)
+    made = build_throw((12.0, 0.0, 1.2), 15.0, fps=60.0)
     part = InHand("right", made.grip)
-    first = corrected(made.motion, part, made.release * 60.0, np.array([12.0, 0.3, 1.0]), BASEBALL)
-    again = corrected(first.motion, part, first.frame, np.array([12.0, 0.3, 1.0]), BASEBALL)
-    assert again.moved < 0.004 and abs(again.turned) < np.radians(0.3)
+    first = correct_motion(made.motion, part, made.release * 60.0, np.array([12.0, 0.3, 1.0]), BASEBALL)
+    again = correct_motion(first.motion, part, first.frame, np.array([12.0, 0.3, 1.0]), BASEBALL)
+    assert again.displacement < 0.004 and abs(again.rotation) < np.radians(0.3)
 
 
 def test_the_shift_has_the_place_and_velocity_asked():
-    shifts = shifts_about(20.3, 5, 35, 60.0)
-    moves = shifts.of(np.array([0.03, 0.0, -0.01]), np.array([0.0, 1.0, 0.5]))
+    shifts = solve_shifts(20.3, 5, 35, 60.0)
+    moves = shifts.compute_shift(np.array([0.03, 0.0, -0.01]), np.array([0.0, 1.0, 0.5]))
     from scipy.interpolate import CubicSpline
 
     curve = CubicSpline(np.arange(3, 38), np.pad(moves, ((2, 2), (0, 0))))
@@ -78,27 +78,27 @@ def test_the_shift_has_the_place_and_velocity_asked():
 
 
 def test_refuses_what_cannot_be():
-    made = throw((12.0, 0.0, 1.2), 15.0, fps=30.0)
+    made = build_throw((12.0, 0.0, 1.2), 15.0, fps=30.0)
     part, frame = InHand("right", made.grip), made.release * 30.0
     with pytest.raises(InputError, match="frames before and after"):
-        corrected(made.motion, part, 1.0, np.array([12.0, 0.0, 1.0]), BASEBALL)
+        correct_motion(made.motion, part, 1.0, np.array([12.0, 0.0, 1.0]), BASEBALL)
     with pytest.raises(InputError, match="some distance away"):
-        corrected(made.motion, part, frame, grip_point(made.motion, part, np.array([frame]))[0, 0], BASEBALL)
+        correct_motion(made.motion, part, frame, sample_points(made.motion, part, np.array([frame]))[0, 0], BASEBALL)
 
 
 def test_a_joint_that_may_not_turn_further_does_not_and_the_ball_hits_all_the_same():
-    made = throw((16.0, 0.0, 1.2), 20.0, fps=30.0)
+    made = build_throw((16.0, 0.0, 1.2), 20.0, fps=30.0)
     part, target = InHand("right", made.grip), np.array([16.3, -0.6, 1.5])
-    arm = identify(made.motion.skeleton).right
+    arm = identify_joints(made.motion.skeleton).right
 
     def stiff(rotations, given):
         """The wrist stays as it was."""
         return np.concatenate([rotations[:, :2], given[:, 2:]], axis=1)
 
     free, held = (
-        corrected(made.motion, part, made.release * 30.0, target, BASEBALL, Freedom.anchored(), None, hold)
+        correct_motion(made.motion, part, made.release * 30.0, target, BASEBALL, Freedom.anchored(), None, hold)
         for hold in (None, stiff)
     )
     assert np.any(free.motion.rotations[:, arm.hand] != made.motion.rotations[:, arm.hand])
     assert np.array_equal(held.motion.rotations[:, arm.hand], made.motion.rotations[:, arm.hand])
-    assert impact(held, target) < 0.02 and held.moved < 0.05
+    assert impact(held, target) < 0.02 and held.displacement < 0.05

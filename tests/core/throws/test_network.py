@@ -50,7 +50,7 @@ def test_single_frames_answer_as_the_whole_batch_does(points):
     network, random = made(points, dtype=np.float32), np.random.default_rng(2)
     x, phase = random.normal(size=(20, 7)), random.uniform(size=20)
     thetas = weigh_points(phase, points)
-    got = np.array([network.frame(row, theta) for row, theta in zip(x, thetas)])
+    got = np.array([network.frame_network(row, theta) for row, theta in zip(x, thetas)])
     expected = network.predict(x, phase)
     assert np.abs(got - expected).max() < 1e-5 * np.abs(expected).max()
 

@@ -5,25 +5,25 @@ import pytest
 
 from beyond_mocap.motion import quaternion
 from beyond_mocap.motion.motion import Motion
-from beyond_mocap.motion.retargeting.adult import adult_skeleton
+from beyond_mocap.motion.retargeting.adult import build_adult_skeleton
 from beyond_mocap.motion.skeleton import Skeleton
-from beyond_mocap.synthetic.throws import throw
-from beyond_mocap.throws.networks.answers import answered
-from beyond_mocap.throws.networks.chains import HIERARCHY, chains_of
-from beyond_mocap.throws.networks.description import Windows, windows
-from beyond_mocap.throws.networks.example import describe, example_of, poses
-from beyond_mocap.throws.networks.features import network_input, phase_of, widths
-from beyond_mocap.throws.networks.frame_step import OneFrame
-from beyond_mocap.throws.networks.kinematics import Pose, matrices, one_pose, places_and_turns
+from beyond_mocap.synthetic.throws import build_throw
+from beyond_mocap.throws.networks.answers import apply_output
+from beyond_mocap.throws.networks.chains import HIERARCHY, find_chains
+from beyond_mocap.throws.networks.description import Windows, build_windows
+from beyond_mocap.throws.networks.example import build_description, build_example, compute_poses
+from beyond_mocap.throws.networks.features import build_input, compute_phase, count_widths
+from beyond_mocap.throws.networks.frame_step import HierarchyPredictor
+from beyond_mocap.throws.networks.kinematics import Pose, to_matrices, compute_pose_transforms, compute_world_transforms
 from beyond_mocap.throws.networks.model import ModelSettings, ThrowModel
 from beyond_mocap.throws.networks.network import PhaseNetwork
-from beyond_mocap.throws.networks.training_set import leg_reach
-from tests.core.linear_throws import training_set
+from beyond_mocap.throws.networks.training_set import measure_leg_reach
+from tests.core.linear_throws import build_training_set
 
 
 def thrown():
-    made = throw((15.0, 2.0, 1.2), 20.0, "right", skeleton=adult_skeleton(1.8), fps=120.0)
-    return made, example_of("t", "s", made.motion, "right_hand", made.release, (15.0, 2.0, 1.2))
+    made = build_throw((15.0, 2.0, 1.2), 20.0, "right", skeleton=build_adult_skeleton(1.8), fps=120.0)
+    return made, build_example("t", "s", made.motion, "right_hand", made.release, (15.0, 2.0, 1.2))
 
 
 def dressed(motion):
@@ -34,7 +34,7 @@ def dressed(motion):
     parents = [-1, 0, *(parent + 1 for parent in skeleton.parents[1:]), *(hand + 1 for hand in hands)]
     lifted = np.array([[0.0, 0.0, 0.0], [0.1, 0.2, 0.3]])
     offsets = np.concatenate([lifted, skeleton.offsets[1:], np.full((2, 3), 0.03)])
-    turn = quaternion.about_up(np.array(0.4))
+    turn = quaternion.from_up_angle(np.array(0.4))
     rotations = quaternion.identity(len(motion), len(names))
     rotations[:, 0] = turn
     rotations[:, 1:-2] = motion.rotations
@@ -46,34 +46,34 @@ def dressed(motion):
 @pytest.fixture(scope="module")
 def plain_and_dressed():
     made, plain = thrown()
-    other = example_of("d", "s", dressed(made.motion), "right_hand", made.release, (15.0, 2.0, 1.2))
+    other = build_example("d", "s", dressed(made.motion), "right_hand", made.release, (15.0, 2.0, 1.2))
     return plain, other
 
 
 def random_model(example, settings, seed=0):
     """Networks of random weights that answer near the example's mean pose."""
-    random, rows = np.random.default_rng(seed), training_set([example], settings)
+    random, rows = np.random.default_rng(seed), build_training_set([example], settings)
     networks = {}
-    for name, (inputs, outputs) in widths(chains_of(example.motion.skeleton), settings).items():
+    for name, (inputs, outputs) in count_widths(find_chains(example.motion.skeleton), settings).items():
         sizes = [inputs, *[settings.units] * settings.layers, outputs]
         pairs = list(zip(sizes, sizes[1:]))
         networks[name] = PhaseNetwork(
             tuple(random.normal(size=(settings.points, b, a)) / np.sqrt(a) for a, b in pairs),
             tuple(random.normal(size=(settings.points, b)) for _, b in pairs),
             rows[name].inputs.mean(0), rows[name].inputs.std(0) + 0.1,
-            rows[name].answers.mean(0), rows[name].answers.std(0) + 0.02,
+            rows[name].outputs.mean(0), rows[name].outputs.std(0) + 0.02,
         )  # fmt: skip
     return ThrowModel(settings=settings, skeleton=example.motion.skeleton, networks=networks,
-                      leg_reach=leg_reach([example]), examples=(example,))
+                      leg_reach=measure_leg_reach([example]), examples=(example,))
 
 
 def plainly(model, chains, pose, window):
     """The loop that the docstring of `features` shows, in float64."""
     after = pose
     for name in HIERARCHY:
-        phase = phase_of(name, chains, after, window, model.leg_reach)
-        x = network_input(name, chains, model.settings, pose, after, window)
-        after = answered(name, chains, model.settings, model.networks[name].predict(x, phase), pose, after, window)
+        phase = compute_phase(name, chains, after, window, model.leg_reach)
+        x = build_input(name, chains, model.settings, pose, after, window)
+        after = apply_output(name, chains, model.settings, model.networks[name].predict(x, phase), pose, after, window)
     return after
 
 
@@ -84,9 +84,9 @@ def row(arrays, frame):
 @pytest.mark.parametrize("which", [0, 1])
 def test_one_pose_at_once_is_the_same_kinematics(plain_and_dressed, which):
     motion = plain_and_dressed[which].motion
-    skeleton, local = motion.skeleton, matrices(motion)[40]
-    expected = places_and_turns(skeleton.offsets, skeleton.parents, motion.root_positions[40], local)
-    got = one_pose(skeleton.offsets, skeleton.parents, motion.root_positions[40], local)
+    skeleton, local = motion.skeleton, to_matrices(motion)[40]
+    expected = compute_world_transforms(skeleton.offsets, skeleton.parents, motion.root_positions[40], local)
+    got = compute_pose_transforms(skeleton.offsets, skeleton.parents, motion.root_positions[40], local)
     for one, other in zip(got, expected):
         np.testing.assert_allclose(one, other, atol=1e-12)
 
@@ -101,8 +101,8 @@ def test_one_pose_at_once_is_the_same_kinematics(plain_and_dressed, which):
 def test_it_says_what_the_plain_functions_say(plain_and_dressed, which, settings):
     example = plain_and_dressed[which]
     model = random_model(example, ModelSettings(layers=2, units=8, **settings))
-    chains = chains_of(example.motion.skeleton)
-    fast, states, seen = OneFrame(model, chains), poses(example), windows(describe(example))
+    chains = find_chains(example.motion.skeleton)
+    fast, states, seen = HierarchyPredictor(model, chains), compute_poses(example), build_windows(build_description(example))
     for frame in (0, 20, len(example.motion) - 2):
         pose, window = Pose(*row(states, frame)), Windows(*row(seen, frame))
         before = [array.copy() for array in pose]

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from beyond_mocap.annotation import read_clip_annotations
-from beyond_mocap.ball.flight import meet_wall
+from beyond_mocap.ball.flight import find_wall_impact
 from beyond_mocap.ball.physics import BASEBALL
-from beyond_mocap.base.errors import Cancelled, InputError
+from beyond_mocap.base.errors import UserCancelledError, InputError
 from beyond_mocap.cli.main import main
 from beyond_mocap.files.bvh import bvh
-from beyond_mocap.motion.humanoid import identify
+from beyond_mocap.motion.humanoid import identify_joints
 from beyond_mocap.motion.motion import forward_kinematics
-from beyond_mocap.throws.planted_examples import planted, write_planted
+from beyond_mocap.throws.planted_examples import generate_example, write_examples
 
 
 @pytest.fixture(scope="module")
@@ -40,20 +40,20 @@ def test_every_recording_has_its_row_and_its_words(folder):
 
 def test_the_ball_leaves_near_the_hand_and_flies_through_the_impact(folder):
     for row in rows(folder):
-        motion = bvh.read(folder / row["file"]).motion
+        motion = bvh.read_bvh(folder / row["file"]).motion
         places, _ = forward_kinematics(motion)
         frame = int(round(float(row["release_s"]) * motion.fps))
-        hand = places[frame, identify(motion.skeleton).right.hand]
+        hand = places[frame, identify_joints(motion.skeleton).right.hand]
         launch = np.array([float(row[f"launch_{axis}_m_s"]) for axis in "xyz"])
         impact = np.array([float(row[f"target_{axis}_m"]) for axis in "xyz"])
         assert abs(np.linalg.norm(launch) - float(row["speed_m_s"])) < 1e-4
         ahead = launch[:2] / np.linalg.norm(launch[:2])
-        place, _ = meet_wall(hand, launch, BASEBALL, impact[:2], ahead)
+        place, _ = find_wall_impact(hand, launch, BASEBALL, impact[:2], ahead)
         assert np.linalg.norm(place - impact) < 0.5  # the ball lies in the fingers, not in the wrist
 
 
 def test_the_same_seed_and_number_make_the_same_throw():
-    (name, made), (_, again), (_, other) = (planted("throw", 7, order) for order in (1, 1, 2))
+    (name, made), (_, again), (_, other) = (generate_example("throw", 7, order) for order in (1, 1, 2))
     assert name == "subject07"
     assert np.array_equal(made.motion.rotations, again.motion.rotations)
     assert np.array_equal(made.impact, again.impact) and not np.array_equal(made.impact, other.impact)
@@ -67,22 +67,22 @@ def test_a_folder_in_use_is_left_alone(folder, capsys):
 
 def test_an_unknown_action_and_cancelling(tmp_path):
     with pytest.raises(InputError, match="throw"):
-        write_planted(tmp_path, "header", 1, 1)
+        write_examples(tmp_path, "header", 1, 1)
     asked = iter((False, True))
-    with pytest.raises(Cancelled):
-        write_planted(tmp_path / "new", "throw", 1, 2, cancelled=lambda: next(asked))
+    with pytest.raises(UserCancelledError):
+        write_examples(tmp_path / "new", "throw", 1, 2, cancelled=lambda: next(asked))
     assert not list(tmp_path.iterdir())
 
 
 def test_a_folder_comes_whole_or_not_at_all(tmp_path, monkeypatch):
     (tmp_path / "mine.txt").write_text("mine")
     with pytest.raises(InputError, match="mine.txt: a file"):
-        write_planted(tmp_path / "mine.txt", "throw", 1, 1)
+        write_examples(tmp_path / "mine.txt", "throw", 1, 1)
     with pytest.raises(InputError, match="cannot be written"):
-        write_planted(tmp_path / "mine.txt" / "new", "throw", 1, 1)
-    monkeypatch.setattr(bvh, "write", full)
+        write_examples(tmp_path / "mine.txt" / "new", "throw", 1, 1)
+    monkeypatch.setattr(bvh, "write_bvh", full)
     with pytest.raises(InputError, match="^[^ ]*/new/adult/adult_throw001.bvh: cannot be written .No space"):
-        write_planted(tmp_path / "new", "throw", 1, 1)
+        write_examples(tmp_path / "new", "throw", 1, 1)
     assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
 
 
@@ -91,16 +91,16 @@ def full(path, motion):
 
 
 def test_an_empty_folder_is_filled_by_one_run(tmp_path):
-    assert write_planted(tmp_path / "a" / "new", "throw", 1, 1) == 1
+    assert write_examples(tmp_path / "a" / "new", "throw", 1, 1) == 1
     (tmp_path / "empty").mkdir()
 
     def other(share, text):  # a second run into the same folder
         with pytest.raises(InputError, match="not empty"):
-            write_planted(tmp_path / "empty", "throw", 1, 1)
+            write_examples(tmp_path / "empty", "throw", 1, 1)
 
-    assert write_planted(tmp_path / "empty", "throw", 1, 1, progress=other) == 1
+    assert write_examples(tmp_path / "empty", "throw", 1, 1, progress=other) == 1
     for place in (tmp_path / "a" / "new", tmp_path / "empty"):
         assert sorted(path.name for path in place.iterdir()) == ["adult", "throws.csv"]
-    with pytest.raises(Cancelled):
-        write_planted(tmp_path / "a" / "other", "throw", 1, 1, cancelled=lambda: True)
+    with pytest.raises(UserCancelledError):
+        write_examples(tmp_path / "a" / "other", "throw", 1, 1, cancelled=lambda: True)
     assert [path.name for path in (tmp_path / "a").iterdir()] == ["new"]

@@ -6,18 +6,18 @@ import numpy as np
 import pytest
 
 from beyond_mocap.base.errors import InputError
-from beyond_mocap.motion.retargeting.adult import adult_skeleton
-from beyond_mocap.synthetic.subjects import make_thrower
-from beyond_mocap.throws.evaluate_throws import deviations
-from beyond_mocap.throws.network_npz import WEIGHTS, shipped_model
-from beyond_mocap.throws.networks.description import scaled
-from beyond_mocap.throws.networks.example import describe, example_of
-from beyond_mocap.throws.networks.generate import Options, generate
-from beyond_mocap.throws.networks.kinematics import matrices
+from beyond_mocap.motion.retargeting.adult import build_adult_skeleton
+from beyond_mocap.synthetic.subjects import build_thrower
+from beyond_mocap.throws.evaluate_throws import measure_deviations
+from beyond_mocap.throws.network_npz import WEIGHTS, read_shipped_model
+from beyond_mocap.throws.networks.description import scale_description
+from beyond_mocap.throws.networks.example import build_description, build_example
+from beyond_mocap.throws.networks.generate import Options, generate_motion
+from beyond_mocap.throws.networks.kinematics import to_matrices
 from beyond_mocap.throws.networks.limits import JointLimits
-from beyond_mocap.throws.planted_examples import planted
+from beyond_mocap.throws.planted_examples import generate_example
 from beyond_mocap.throws.throw import throw_at
-from beyond_mocap.throws.throw_order import Order
+from beyond_mocap.throws.throw_order import ThrowRequest
 
 ACTIONS = ("throw", "kick")
 TARGETS = {"throw": ((8.0, 0.0, 1.0), (15.0, 4.0, 1.5)), "kick": ((11.0, 0.0, 1.0), (20.0, -3.0, 1.8))}
@@ -28,8 +28,8 @@ _LARGEST = 3_000_000
 @pytest.mark.parametrize("action", ACTIONS)
 def test_they_are_small_and_of_the_projects_own_adult(action):
     assert (WEIGHTS / f"{action}.npz").stat().st_size <= _LARGEST
-    model = shipped_model(action)
-    adult, skeleton = adult_skeleton(), model.skeleton
+    model = read_shipped_model(action)
+    adult, skeleton = build_adult_skeleton(), model.skeleton
     assert model.settings.action == action and set(skeleton.names) == set(adult.names)
     order = [adult.index(name) for name in skeleton.names]
     assert np.abs(skeleton.offsets - adult.offsets[order]).max() < 1e-3
@@ -39,73 +39,73 @@ def test_they_are_small_and_of_the_projects_own_adult(action):
 @pytest.mark.parametrize("action", ACTIONS)
 def test_networks_alone_follow_what_they_never_saw(action):
     """Of the adult numbers above 40, and people whose seeds no training had: 3 cm in the mean, 1 cm with correction."""
-    model = shipped_model(action)
+    model = read_shipped_model(action)
     alone, whole = [], []
     for seed, number in ((0, 41), (9, 0), (10, 0)):
-        _, made = planted(action, seed, number)
-        example = example_of("kept back", "", made.motion, made.limb, made.release, made.impact, made.velocity, 30.0)
-        wanted = scaled(describe(example), model.stature / example.stature)
+        _, made = generate_example(action, seed, number)
+        example = build_example("kept back", "", made.motion, made.limb, made.release, made.impact, made.velocity, 30.0)
+        wanted = scale_description(build_description(example), model.stature / example.stature)
         networks = Options(pose_iterations=0, ik=False, blend=False, limits=False)
-        alone.append(deviations(generate(model, wanted, options=networks).effectors, wanted.effectors))
-        whole.append(deviations(generate(model, wanted).effectors, wanted.effectors))
+        alone.append(measure_deviations(generate_motion(model, wanted, options=networks).effectors, wanted.effectors))
+        whole.append(measure_deviations(generate_motion(model, wanted).effectors, wanted.effectors))
     assert np.mean(alone, axis=0).max() <= 0.03
     assert np.mean(whole, axis=0).max() <= 0.01
 
 
 @pytest.mark.parametrize("action", ACTIONS)
 def test_they_hit_what_is_aimed_at(action):
-    model = shipped_model(action)
+    model = read_shipped_model(action)
     for target in TARGETS[action]:
-        thrown = throw_at(model, Order(np.array(target)))
-        assert thrown.impact_error <= 0.10 and thrown.moved <= 0.05 and not thrown.beyond > 0.01
-    other = throw_at(model, Order(np.array(TARGETS[action][0]), limb=LIMBS[action]))
+        thrown = throw_at(model, ThrowRequest(np.array(target)))
+        assert thrown.impact_error <= 0.10 and thrown.displacement <= 0.05 and not thrown.limit_excess > 0.01
+    other = throw_at(model, ThrowRequest(np.array(TARGETS[action][0]), limb=LIMBS[action]))
     assert other.limb == LIMBS[action] and other.impact_error <= 0.10
 
 
 @pytest.mark.parametrize("action, order, says", [
-    ("throw", Order((1.6, 0.0, 0.2)), "wrist moved"),
-    ("throw", Order((1.6, 0.0, 0.2), limb="left_hand"), "wrist moved"),
-    ("kick", Order((2.0, 0.0, 2.4)), "degrees"), ("throw", Order((10.0, 0.0, 40.0)), "degrees"),
+    ("throw", ThrowRequest((1.6, 0.0, 0.2)), "wrist moved"),
+    ("throw", ThrowRequest((1.6, 0.0, 0.2), limb="left_hand"), "wrist moved"),
+    ("kick", ThrowRequest((2.0, 0.0, 2.4)), "degrees"), ("throw", ThrowRequest((10.0, 0.0, 40.0)), "degrees"),
 ])
 def test_no_body_is_bent_out_of_shape_for_a_target(action, order, says):
     with pytest.raises(InputError, match=says):
-        throw_at(shipped_model(action), order)
+        throw_at(read_shipped_model(action), order)
 
 
 @pytest.mark.parametrize("order, moved", [
-    (Order((40.0, 0.0, 1.0)), 0.05), (Order((40.0, 0.0, 1.0), limb="left_hand"), 0.05), (Order((6.0, 0.0, 4.5)), 0.05),
-    (Order((6.0, 0.0, 5.0)), 0.06),
+    (ThrowRequest((40.0, 0.0, 1.0)), 0.05), (ThrowRequest((40.0, 0.0, 1.0), limb="left_hand"), 0.05), (ThrowRequest((6.0, 0.0, 4.5)), 0.05),
+    (ThrowRequest((6.0, 0.0, 5.0)), 0.06),
 ])  # fmt: skip
 def test_no_joint_of_the_arm_leaves_its_limits(order, moved):
     """Targets far from the examples', which are at most 26 m away and 2.4 m high."""
-    thrown = throw_at(shipped_model("throw"), order)
-    assert thrown.beyond < 1e-6 and thrown.impact_error <= 0.10 and thrown.moved <= moved
+    thrown = throw_at(read_shipped_model("throw"), order)
+    assert thrown.limit_excess < 1e-6 and thrown.impact_error <= 0.10 and thrown.displacement <= moved
 
 
 def test_joints_of_a_generated_kick_are_within_limits():
-    model = shipped_model("kick")
-    thrown = throw_at(model, Order((9.0, 0.0, 0.11)))
-    assert JointLimits(model.skeleton, model.joint_limits).beyond(matrices(thrown.motion)).max() < 1e-6
+    model = read_shipped_model("kick")
+    thrown = throw_at(model, ThrowRequest((9.0, 0.0, 0.11)))
+    assert JointLimits(model.skeleton, model.joint_limits).measure_excess(to_matrices(thrown.motion)).max() < 1e-6
 
 
 def test_limits_of_other_bones_are_judged():
-    thrown = throw_at(shipped_model("throw"), Order((15.0, 4.0, 1.5)), make_thrower(5).skeleton)
-    assert thrown.beyond < 1e-6
+    thrown = throw_at(read_shipped_model("throw"), ThrowRequest((15.0, 4.0, 1.5)), build_thrower(5).skeleton)
+    assert thrown.limit_excess < 1e-6
 
 
 def test_where_the_nearest_examples_do_not_hit_others_do():
     """Near and high, the slowest kicks of the model leave a foot that cannot come under the ball."""
-    thrown = throw_at(shipped_model("kick"), Order((11.0, 0.0, 2.3)))
-    assert thrown.impact_error <= 0.02 and thrown.moved <= 0.05
+    thrown = throw_at(read_shipped_model("kick"), ThrowRequest((11.0, 0.0, 2.3)))
+    assert thrown.impact_error <= 0.02 and thrown.displacement <= 0.05
 
 
 def test_a_rate_that_shows_no_throw_is_refused():
     with pytest.raises(InputError, match="10 to 480"):
-        Order((9.0, 0.0, 1.0), fps=5.0)
+        ThrowRequest((9.0, 0.0, 1.0), fps=5.0)
 
 
 def test_a_ball_faster_than_any_human_throws_is_told():
-    small = adult_skeleton()
+    small = build_adult_skeleton()
     giant = replace(small, offsets=small.offsets * 5.0, end_offsets=small.end_offsets * 5.0)
     assert any("human limit" in line
-               for line in throw_at(shipped_model("throw"), Order((30.0, 0.0, 1.0)), giant).warnings)  # fmt: skip
+               for line in throw_at(read_shipped_model("throw"), ThrowRequest((30.0, 0.0, 1.0)), giant).warnings)  # fmt: skip

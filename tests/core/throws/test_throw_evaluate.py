@@ -6,16 +6,16 @@ import pytest
 
 from beyond_mocap.cli.main import main
 from beyond_mocap.throws.network_npz import write_model
-from beyond_mocap.throws.planted_examples import write_planted
-from tests.core.linear_throws import linear_model, planted_examples
+from beyond_mocap.throws.planted_examples import write_examples
+from tests.core.linear_throws import build_linear_model, build_throw_examples
 
 
 @pytest.fixture(scope="module")
 def place(tmp_path_factory):
     """A model and a folder with a throw of each of two people."""
     folder = tmp_path_factory.mktemp("evaluate")
-    write_model(linear_model(planted_examples(4), ridge=100.0), folder / "w.npz")
-    write_planted(folder / "throws", "throw", 2, 1, 5)
+    write_model(build_linear_model(build_throw_examples(4), ridge=100.0), folder / "w.npz")
+    write_examples(folder / "throws", "throw", 2, 1, 5)
     return folder
 
 

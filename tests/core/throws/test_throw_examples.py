@@ -14,11 +14,11 @@ from hypothesis import strategies as st
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.motion import quaternion
-from beyond_mocap.motion.humanoid import identify
-from beyond_mocap.motion.motion import forward_kinematics, place
+from beyond_mocap.motion.humanoid import identify_joints
+from beyond_mocap.motion.motion import forward_kinematics, place_motion
 from beyond_mocap.motion.skeleton import Skeleton
-from beyond_mocap.throws.planted_examples import COLUMNS, planted, write_planted
-from beyond_mocap.throws.throw_examples import examples_in
+from beyond_mocap.throws.planted_examples import COLUMNS, generate_example, write_examples
+from beyond_mocap.throws.throw_examples import read_examples
 
 HEAD = ",".join(COLUMNS[:11])
 
@@ -26,7 +26,7 @@ HEAD = ",".join(COLUMNS[:11])
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     out = tmp_path_factory.mktemp("planted") / "throws"
-    write_planted(out, "throw", 2, 1, seed=3)
+    write_examples(out, "throw", 2, 1, seed=3)
     return out
 
 
@@ -40,15 +40,15 @@ def clip(folder, who="subject03"):
 
 
 def test_planted_throws_come_back(folder):
-    found = examples_in(folder, "throw", 60.0)
+    found = read_examples(folder, "throw", 60.0)
     assert [example.subject for example in found] == ["subject03", "subject04"]
     for seed, example in zip((3, 4), found):
-        _, truth = planted("throw", seed, 0)
+        _, truth = generate_example("throw", seed, 0)
         assert example.limb == 1 and example.motion.fps == 60.0
         assert abs(example.impact[1]) < 1e-9 and abs(example.impact[2] - truth.impact[2]) < 1e-4
         assert abs(np.linalg.norm(example.launch) - np.linalg.norm(truth.velocity)) < 1e-3
         places, _ = forward_kinematics(example.motion)
-        body = identify(example.motion.skeleton)
+        body = identify_joints(example.motion.skeleton)
         assert np.abs(places[0, body.hips, :2]).max() < 1e-6
         hand = np.array(
             [np.interp(example.release, np.arange(len(places)), way) for way in places[:, body.right.hand].T]
@@ -59,8 +59,8 @@ def test_planted_throws_come_back(folder):
 
 def test_what_only_annotations_tell(own):
     (own / "throws.csv").unlink()
-    for seed, example in zip((3, 4), examples_in(own)):
-        _, truth = planted("throw", seed, 0)
+    for seed, example in zip((3, 4), read_examples(own)):
+        _, truth = generate_example("throw", seed, 0)
         assert example.limb == 1 and example.subject == f"subject{seed:02d}"
         speed = np.linalg.norm(truth.velocity)
         assert abs(np.linalg.norm(example.launch) - speed) < 0.1 * speed
@@ -71,64 +71,64 @@ def test_the_hand_is_found_where_no_word_names_it(own):
     (own / "throws.csv").unlink()
     words = clip(own).with_suffix(".txt")
     words.write_text(words.read_text().replace(" right", ""))
-    assert [example.limb for example in examples_in(own)] == [1, 1]
+    assert [example.limb for example in read_examples(own)] == [1, 1]
 
 
 def test_the_place_in_the_world_changes_nothing(own):
-    before = examples_in(own)[0]
+    before = read_examples(own)[0]
     moved = clip(own)
-    motion = bvh.read(moved).motion
-    bvh.write(moved, place(motion, 2.0, (7.0, -3.0, 0.0)))
+    motion = bvh.read_bvh(moved).motion
+    bvh.write_bvh(moved, place_motion(motion, 2.0, (7.0, -3.0, 0.0)))
     table = (own / "throws.csv").read_text().splitlines()
     cells = table[1].split(",")
-    turn = quaternion.about_up(np.array(2.0))
+    turn = quaternion.from_up_angle(np.array(2.0))
     target, launch = (quaternion.rotate(turn, np.array(cells[a:b], float)) for a, b in ((4, 7), (8, 11)))
     cells[4:7], cells[8:11] = map(str, target + [7.0, -3.0, 0.0]), map(str, launch)
     (own / "throws.csv").write_text("\n".join([table[0], ",".join(cells), *table[2:]]))
-    after = examples_in(own)[0]
+    after = read_examples(own)[0]
     assert np.allclose(after.impact, before.impact, atol=1e-4) and np.allclose(after.launch, before.launch, atol=1e-4)
     ways = [forward_kinematics(example.motion)[0] for example in (before, after)]
     assert np.abs(ways[0] - ways[1]).max() < 1e-3
 
 
 def test_a_floor_elsewhere_is_brought_to_zero(own):
-    before = examples_in(own)[0]
-    motion = bvh.read(clip(own)).motion
-    bvh.write(clip(own), place(motion, 0.0, (0.0, 0.0, 0.5)))
-    after = examples_in(own)[0]
+    before = read_examples(own)[0]
+    motion = bvh.read_bvh(clip(own)).motion
+    bvh.write_bvh(clip(own), place_motion(motion, 0.0, (0.0, 0.0, 0.5)))
+    after = read_examples(own)[0]
     assert np.abs(after.motion.root_positions - before.motion.root_positions).max() < 0.03
 
 
 def test_mirrored_copies_are_thrown_with_the_other_hand(folder):
-    first, other = examples_in(folder, mirror=True)[:2]
+    first, other = read_examples(folder, mirror=True)[:2]
     assert (first.limb, other.limb) == (1, 0) and "mirrored" in other.name
     assert np.allclose(other.launch, first.launch * [1, -1, 1])
 
 
 def test_all_on_one_skeleton(folder):
-    skeleton = bvh.read(clip(folder)).motion.skeleton
-    own = examples_in(folder)[1]
-    there = examples_in(folder, skeleton=skeleton)[1]
-    assert there.motion.skeleton.same_bones(skeleton)
+    skeleton = bvh.read_bvh(clip(folder)).motion.skeleton
+    own = read_examples(folder)[1]
+    there = read_examples(folder, skeleton=skeleton)[1]
+    assert there.motion.skeleton.has_same_bones(skeleton)
     assert np.allclose(np.linalg.norm(there.launch), np.linalg.norm(own.launch), atol=0.5)
 
 
 def test_the_report_of_a_release_beside_it(own):
     (own / "throws.csv").unlink()
     clip(own).with_suffix(".txt").unlink()
-    _, truth = planted("throw", 3, 0)
+    _, truth = generate_example("throw", 3, 0)
     speed = float(np.linalg.norm(truth.velocity))
     report = {"release_time_s": truth.release, "speed_m_s": speed, "direction": (truth.velocity / speed).tolist(),
               "hand": "right", "impact_m": truth.impact.tolist()}
     beside = clip(own).with_suffix(".release.json")
     beside.write_text(json.dumps(report))
-    first = examples_in(own)[0]
+    first = read_examples(own)[0]
     assert abs(first.impact[2] - truth.impact[2]) < 1e-4 and abs(np.linalg.norm(first.launch) - speed) < 1e-6
     wrong = [json.dumps(report | {"impact_m": impact}) for impact in (["a", 2, None], [np.nan, 2, 3])]
     for text in ("{}", "[" * 100000, *wrong):
         beside.write_text(text)
         told = []
-        assert len(examples_in(own, told=told.append)) == 1 and "not a release report" in told[0]
+        assert len(read_examples(own, report=told.append)) == 1 and "not a release report" in told[0]
 
 
 def test_odd_recordings_are_told_and_left_out(own):
@@ -138,7 +138,7 @@ def test_odd_recordings_are_told_and_left_out(own):
     (own / "throws.csv").write_text("\n".join([table[0], ",".join(late), *table[2:]]))
     shutil.copy(clip(own), own / "walk.bvh")
     told = []
-    assert len(examples_in(own, told=told.append)) == 1
+    assert len(read_examples(own, report=told.append)) == 1
     assert any("99" in line for line in told) and any("1 of 3" in line and "walk.bvh" in line for line in told)
 
 
@@ -155,7 +155,7 @@ def test_a_wrong_table_is_told_with_its_line(own, change):
     cells[change[0]] = change[1]
     path.write_text("\n".join([table[0], ",".join(cells.values()), *table[2:]]))
     with pytest.raises(InputError, match="throws.csv:2"):
-        examples_in(own)
+        read_examples(own)
 
 
 @pytest.mark.parametrize("target, said", [
@@ -172,7 +172,7 @@ def test_a_target_that_no_ball_flies_through_leaves_its_throw_out(own, target, s
     cells |= {f"target_{axis}_m": f"{value:.6f}" for axis, value in zip("xyz", there)}
     path.write_text("\n".join([table[0], ",".join(cells.values()), *table[2:]]))
     told = []
-    assert len(examples_in(own, told=told.append)) == 1 and "target" in told[0] and said in told[0]
+    assert len(read_examples(own, report=told.append)) == 1 and "target" in told[0] and said in told[0]
 
 
 def test_annotations_of_what_is_not_there_are_told(own):
@@ -180,19 +180,19 @@ def test_annotations_of_what_is_not_there_are_told(own):
         "file,start_frame,end_frame,key_frame,labels\nnobody.bvh,0,300,100,throwb right\n"
     )
     told = []
-    assert len(examples_in(own, told=told.append)) == 2
+    assert len(read_examples(own, report=told.append)) == 2
     assert len(told) == 1 and "annotations.csv: names 1" in told[0] and "nobody.bvh" in told[0]
 
 
 def test_folders_without_examples(own, tmp_path):
     with pytest.raises(InputError, match="none with a kick, 2 with a throw"):
-        examples_in(own, "kick")
+        read_examples(own, "kick")
     for order in (1, 2):
         clip(own, f"subject{order + 2:02d}").write_text("HIERARCHY")
     with pytest.raises(InputError, match="every throw in it is left out"):
-        examples_in(own)
+        read_examples(own)
     with pytest.raises(InputError, match="no such folder"):
-        examples_in(tmp_path / "nowhere")
+        read_examples(tmp_path / "nowhere")
 
 
 def test_a_skeleton_without_hands_is_refused_before_anything_is_read(own):
@@ -200,7 +200,7 @@ def test_a_skeleton_without_hands_is_refused_before_anything_is_read(own):
                     (-1, 0, 1, 2, 0, 4, 5), [[0, 0, 0], *[[0, 0.1, 0], [0, 0, -0.4], [0, 0, -0.4]] * 2])  # fmt: skip
     told = []
     with pytest.raises(InputError, match="^skeleton: no"):
-        examples_in(own, skeleton=legs, told=told.append)
+        read_examples(own, skeleton=legs, report=told.append)
     assert not told
 
 
@@ -223,7 +223,7 @@ def test_any_table_is_read_or_told_in_one_line(table):
         Path(place, "throws.csv").write_text(table, "utf-8")
         told = []
         try:
-            for example in examples_in(place, told=told.append):
+            for example in read_examples(place, report=told.append):
                 assert np.isfinite(example.impact).all() and np.isfinite(example.launch).all()
         except InputError as error:
             told.append(str(error))
@@ -233,18 +233,18 @@ def test_any_table_is_read_or_told_in_one_line(table):
 @lru_cache
 def recording() -> bytes:
     with tempfile.TemporaryDirectory() as place:
-        bvh.write(Path(place, "throw.bvh"), planted("throw", 3, 0)[1].motion)
+        bvh.write_bvh(Path(place, "throw.bvh"), generate_example("throw", 3, 0)[1].motion)
         return Path(place, "throw.bvh").read_bytes()
 
 
 def test_kicks_come_back_by_the_table_and_by_the_foot_alone(tmp_path):
     out = tmp_path / "kicks"
-    write_planted(out, "kick", 1, 1, seed=3)
-    _, truth = planted("kick", 3, 0)
-    told = examples_in(out, "kick")[0]
+    write_examples(out, "kick", 1, 1, seed=3)
+    _, truth = generate_example("kick", 3, 0)
+    told = read_examples(out, "kick")[0]
     assert told.limb == 3 and abs(told.impact[2] - truth.impact[2]) < 1e-4
     (out / "throws.csv").unlink()
-    found = examples_in(out, "kick")[0]
+    found = read_examples(out, "kick")[0]
     assert found.limb == 3 and abs(found.release - told.release) <= 0.03 * 30.0 + 0.5
     assert abs(np.linalg.norm(found.launch) / np.linalg.norm(truth.velocity) - 1.0) < 0.25
     assert found.impact[2] >= 0.1
@@ -253,4 +253,4 @@ def test_kicks_come_back_by_the_table_and_by_the_foot_alone(tmp_path):
 def test_a_broken_recording_is_left_out(own):
     clip(own).write_text("HIERARCHY\nROOT")
     told = []
-    assert len(examples_in(own, told=told.append)) == 1 and "subject03_throw001.bvh" in told[0]
+    assert len(read_examples(own, report=told.append)) == 1 and "subject03_throw001.bvh" in told[0]

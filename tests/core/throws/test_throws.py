@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 
 from beyond_mocap.ball.physics import BASEBALL, PAPER
-from beyond_mocap.evaluation.paired_tests import judged, kept
-from beyond_mocap.motion.humanoid import identify
-from beyond_mocap.synthetic.throws import throw
-from beyond_mocap.throws.evaluate_throws import deviations, find_impact, let_go
+from beyond_mocap.evaluation.paired_tests import compare_differences, find_inliers
+from beyond_mocap.motion.humanoid import identify_joints
+from beyond_mocap.synthetic.throws import build_throw
+from beyond_mocap.throws.evaluate_throws import measure_deviations, find_impact, release_ball
 
 # Fredriksson's tables 8.1, 8.2, 8.5, 8.6 (m: left arm, right arm, left leg, right leg, impact; a row for each subject)
 SINGLE = np.array([
@@ -45,7 +45,7 @@ SECOND = (
 @pytest.mark.parametrize("old, new, printed", [(SINGLE, HIERARCHY_RAW, FIRST), (FEED_FORWARD, HIERARCHY, SECOND)])
 def test_his_p_values_come_back_from_his_tables(old, new, printed):
     _, mean, spread, p = printed
-    for k, one in enumerate(map(judged, (new - old).T)):
+    for k, one in enumerate(map(compare_differences, (new - old).T)):
         slack = 0.02 if k == 4 else 2e-4  # the impact of subject 3 in table 8.4 is not that of 8.1 and 8.2
         assert one.mean == pytest.approx(mean[k], abs=slack)
         assert one.spread == pytest.approx(spread[k], abs=slack)
@@ -57,7 +57,7 @@ def test_his_p_values_come_back_from_his_tables(old, new, printed):
 def test_his_p_values_come_back_from_his_differences_but_for_the_left_leg_of_8_7():
     for (differences, _, _, p), wrong in ((FIRST, ()), (SECOND, (2,))):
         for k in range(5):
-            one = judged(differences[:, k])
+            one = compare_differences(differences[:, k])
             if np.isfinite(p[k]):
                 assert (one.p == pytest.approx(p[k], abs=1.1e-4)) == (k not in wrong)
 
@@ -65,55 +65,55 @@ def test_his_p_values_come_back_from_his_differences_but_for_the_left_leg_of_8_7
 def test_planted_differences_are_found_and_none_where_there_are_none():
     rng = np.random.default_rng(3)
     old = rng.normal(0.1, 0.02, 12)
-    better = judged(old - 0.01 + rng.normal(0.0, 0.004, 12) - old)
+    better = compare_differences(old - 0.01 + rng.normal(0.0, 0.004, 12) - old)
     assert better.p < 0.025 and better.test == "t" and better.mean < 0.0
-    assert judged(old + 0.01 + rng.normal(0.0, 0.004, 12) - old).p > 0.025
-    assert np.isnan(judged(old - old).p)
-    chances = [judged(rng.normal(0.0, 1.0, 4)).t_p < 0.025 for _ in range(400)]
+    assert compare_differences(old + 0.01 + rng.normal(0.0, 0.004, 12) - old).p > 0.025
+    assert np.isnan(compare_differences(old - old).p)
+    chances = [compare_differences(rng.normal(0.0, 1.0, 4)).t_p < 0.025 for _ in range(400)]
     assert 0.005 < np.mean(chances) < 0.05
 
 
 def test_ranks_stand_in_where_normality_is_rejected():
     off = -np.array([1.0, 1.1, 0.9, 1.05, 0.95, 1.0, 1.02, 40.0])
-    one = judged(off)
+    one = compare_differences(off)
     assert one.normal < 0.05 and one.test == "Wilcoxon" and one.p == one.wilcoxon_p == one.least_p == 2.0**-8
     assert one.p < 0.025 and not np.isclose(one.t_p, one.p)
-    few = judged(np.array([-1.0, -1.0001, -1.0002, -9.0]))
+    few = compare_differences(np.array([-1.0, -1.0001, -1.0002, -9.0]))
     assert few.test == "Wilcoxon" and few.least_p == 0.0625 and few.p > 0.025
 
 
 def test_throws_beyond_three_standard_deviations_are_left_out():
     values = np.array([*np.full(30, 0.5) + np.linspace(0.0, 0.1, 30), 9.0, np.nan])
-    assert kept(values).tolist() == [True] * 30 + [False, False]
-    assert kept(np.array([0.0] * 9 + [100.0])).all()  # ten can have none beyond three
-    assert not kept(np.array([np.nan])).any()
+    assert find_inliers(values).tolist() == [True] * 30 + [False, False]
+    assert find_inliers(np.array([0.0] * 9 + [100.0])).all()  # ten can have none beyond three
+    assert not find_inliers(np.array([np.nan])).any()
 
 
 def test_planted_deviations():
     wanted = np.random.default_rng(0).normal(size=(20, 4, 3))
     off = np.array([0.01, 0.02, 0.03, 0.04])[:, None] * [0.6, 0.0, 0.8]
-    assert deviations(wanted + off, wanted) == pytest.approx([0.01, 0.02, 0.03, 0.04])
+    assert measure_deviations(wanted + off, wanted) == pytest.approx([0.01, 0.02, 0.03, 0.04])
 
 
 def hand_and_grip(made):
-    return identify(made.motion.skeleton).right.hand, made.grip
+    return identify_joints(made.motion.skeleton).right.hand, made.grip
 
 
 def test_a_ball_is_let_go_with_its_own_velocity_even_at_30_frames_a_second():
     for fps, slack in ((240.0, 0.01), (30.0, 0.03)):
-        made = throw((18.0, 0.0, 1.0), 25.0, fps=fps)
-        place, velocity = let_go(made.motion, *hand_and_grip(made), made.release * fps)
+        made = build_throw((18.0, 0.0, 1.0), 25.0, fps=fps)
+        place, velocity = release_ball(made.motion, *hand_and_grip(made), made.release * fps)
         assert np.linalg.norm(place - made.position) < 0.01
         assert np.linalg.norm(velocity - made.velocity) < slack * 25.0
 
 
 def test_floating_hands_carry_the_ball_along():
-    made = throw((18.0, 0.0, 1.0), 25.0, fps=60.0)
+    made = build_throw((18.0, 0.0, 1.0), 25.0, fps=60.0)
     joint, grip = hand_and_grip(made)
     times = np.arange(len(made.motion))[:, None] / 60.0
     at = made.release * 60.0
-    place, velocity = let_go(made.motion, joint, grip, at)
-    other, faster = let_go(made.motion, joint, grip, at, times * [0.0, 2.0, -1.0] + [0.1, 0.0, 0.0])
+    place, velocity = release_ball(made.motion, joint, grip, at)
+    other, faster = release_ball(made.motion, joint, grip, at, times * [0.0, 2.0, -1.0] + [0.1, 0.0, 0.0])
     assert faster - velocity == pytest.approx([0.0, 2.0, -1.0], abs=1e-6)
     assert other - place == pytest.approx(
         np.array([0.1, 0.0, 0.0]) + made.release * np.array([0.0, 2.0, -1.0]), abs=1e-6
@@ -132,7 +132,7 @@ def test_impact_is_where_the_plane_is_crossed_or_the_ground_met():
 
 
 def test_a_made_throw_hits_what_it_was_aimed_at():
-    made = throw((4.0, 0.3, 1.2), 16.0, fps=60.0)
+    made = build_throw((4.0, 0.3, 1.2), 16.0, fps=60.0)
     vacuum = type(BASEBALL)("vacuum", 0.0366, 0.145, 9.81)
-    found = find_impact(*let_go(made.motion, *hand_and_grip(made), made.release * 60.0), (4.0, 0.3, 1.2), vacuum)
+    found = find_impact(*release_ball(made.motion, *hand_and_grip(made), made.release * 60.0), (4.0, 0.3, 1.2), vacuum)
     assert np.linalg.norm(found - (4.0, 0.3, 1.2)) < 0.05

@@ -16,25 +16,25 @@ STANDING = {
 FRAMES = 12
 
 
-def parameter(group, name, data, kind, dimensions=(), order="<"):
+def encode_parameter(group, name, data, kind, dimensions=(), order="<"):
     """The bytes of one C3D parameter; kind -1 text, 1, 2 or 4 bytes a number."""
     body = struct.pack("b", kind) + bytes([len(dimensions), *dimensions]) + data + b"\0"
     return struct.pack("bb", len(name), group) + name.encode() + struct.pack(f"{order}h", len(body) + 2) + body
 
 
-def vax(values):
+def encode_vax(values):
     """Single precision numbers as DEC writes them."""
     bits = (np.asarray(values, np.float32) * 4).view(np.uint32)
     return ((bits >> 16) | (bits << 16)).astype("<u4").tobytes()
 
 
-def c3d_bytes(positions, labels, scale=-1.0, fps=100.0, processor=84, unit="m", residual=0.0, more=(), analog=0,
+def build_c3d(positions, labels, scale=-1.0, fps=100.0, processor=84, unit="m", residual=0.0, more=(), analog=0,
               first=1, header=None, groups=(), width=16, split=None):  # fmt: skip
     """A whole C3D file. positions: (T, M, 3) in the file's unit, NaN where not seen. scale: negative for floats. more:
     (group, name, data, kind, dimensions) of other parameters; groups: names of groups 3, 4 ...; header: {byte: value}
     written over the 16-bit words of the header. split: labels from there on stand in LABELS2."""
     order = ">" if processor == 86 else "<"
-    floats = vax if processor == 85 else lambda values: np.asarray(values, f"{order}f4").tobytes()
+    floats = encode_vax if processor == 85 else lambda values: np.asarray(values, f"{order}f4").tobytes()
     count, points = len(positions), len(labels)
     section = b""
     for number, name in enumerate(["POINT", "ANALOG", *groups], 1):
@@ -50,9 +50,9 @@ def c3d_bytes(positions, labels, scale=-1.0, fps=100.0, processor=84, unit="m", 
     ]  # fmt: skip
     rows += [(1, "LABELS2", b"".join(lists[1]), -1, (width, len(lists[1])))] if split else []
     start = lambda blocks: (1, "DATA_START", word(2 + blocks), 2, ())  # noqa: E731
-    size = len(section) + sum(len(parameter(*row, order)) for row in [*rows, start(0)]) + 6
+    size = len(section) + sum(len(encode_parameter(*row, order)) for row in [*rows, start(0)]) + 6
     blocks = -(-size // 512)
-    section += b"".join(parameter(*row, order) for row in [*rows, start(blocks)])
+    section += b"".join(encode_parameter(*row, order) for row in [*rows, start(blocks)])
     section = bytes([1, 80, blocks, processor]) + section
     head = struct.pack(f"{order}BBHHHHH", 2, 80, points, analog, first & 0xFFFF, (first + count - 1) & 0xFFFF, 10)
     head += floats([scale]) + struct.pack(f"{order}HH", 2 + blocks, 1) + floats([fps])
@@ -67,7 +67,7 @@ def c3d_bytes(positions, labels, scale=-1.0, fps=100.0, processor=84, unit="m", 
     return bytes(head) + section.ljust(blocks * 512, b"\0") + data.ljust(-(-len(data) // 512) * 512, b"\0")
 
 
-def trc_lines(positions, labels, fps=100.0, unit="mm", start=0.0):
+def build_trc_lines(positions, labels, fps=100.0, unit="mm", start=0.0):
     """The lines of a TRC file. positions: (T, M, 3) in the file's unit and axes."""
     count = len(labels)
     head = ["PathFileType\t4\t(X/Y/Z)\tmade.trc", "DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits",
@@ -86,4 +86,4 @@ def body():
     positions += 0.01 * np.sin(np.arange(FRAMES))[:, None, None] + [[[1.0, 2.0, 0.0]]]
     positions[5, list(STANDING).index("LKNE")] = np.nan
     labels = tuple(STANDING)
-    return SimpleNamespace(labels=labels, positions=positions, c3d=c3d_bytes, trc=trc_lines, index=labels.index)
+    return SimpleNamespace(labels=labels, positions=positions, c3d=build_c3d, trc=build_trc_lines, index=labels.index)

@@ -134,7 +134,7 @@ def test_what_is_up(body, read, up, said):
     np.testing.assert_allclose(apart, np.linalg.norm(body.positions - body.positions[:, :1], axis=-1), atol=1e-5)
 
 
-def test_a_header_that_has_the_body_lying_is_told(body, read):
+def test_a_header_that_has_the_body_lying_is_reported(body, read):
     trial = read(body.c3d(body.positions, body.labels, more=[(1, "Y_SCREEN", *texts("+Y"))]))
     assert any("check which way is up" in note for note in trial.notes)
 
@@ -151,7 +151,7 @@ def test_a_lying_body_is_left_lying_where_one_says_so(body, read):
             read(body.c3d(lying, body.labels), up=wrong)
 
 
-def test_mirrored_bodies_are_told(body, read):
+def test_mirrored_bodies_are_reported(body, read):
     trial = read(body.c3d(body.positions * [1, -1, 1], body.labels))
     assert any("mirrored" in note for note in trial.notes)
 
@@ -211,7 +211,7 @@ def test_labels_that_go_on_in_a_second_list(body, read):
     assert read(body.c3d(body.positions, body.labels, split=10)).labels == body.labels
 
 
-def test_points_without_labels_are_told(body, read):
+def test_points_without_labels_are_reported(body, read):
     data = body.c3d(body.positions, body.labels, split=10).replace(b"LABELS2", b"LABELSX")
     trial = read(data)
     assert trial.labels[9:12] == (body.labels[9], "*1", "*2")
@@ -317,7 +317,7 @@ def test_headers_that_promise_too_much_cost_nothing(body, read):
 
 @settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.lists(st.tuples(st.integers(0, 4000), st.integers(0, 255)), min_size=1, max_size=12), st.integers(0, 3))
-def test_any_damage_is_read_or_told(body, read, changes, kind):
+def test_any_damage_is_read_or_reported(body, read, changes, kind):
     more = [(3, "TIMES", np.array([0, 7.31], "<f4").tobytes(), 4, (2, 1)), (3, "LABELS", *texts("Foot"))]
     scale, processor = ((-1.0, 84), (0.01, 84), (-1.0, 86), (0.01, 85))[kind]
     data = bytearray(body.c3d(body.positions, body.labels, scale, processor=processor, more=more, groups=["EVENT"]))

@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.markers.files.marker_set_text import (
     SHIPPED,
-    chosen_set,
-    marker_set_text,
+    choose_set,
+    format_marker_set,
     parse_marker_set,
     read_marker_set,
-    shipped_sets,
+    read_shipped_sets,
 )
 from beyond_mocap.markers.model.marker_set import MarkerSet
 
@@ -46,10 +46,10 @@ def test_line_ends_and_a_mark_at_the_start_do_not_matter(tmp_path):
 
 
 def test_ours_come_back_as_they_are(tmp_path):
-    sets = shipped_sets()
+    sets = read_shipped_sets()
     assert len(sets) == len(list(SHIPPED.glob("*.txt"))) >= 4
     for one in sets:
-        (tmp_path / "one.txt").write_text(marker_set_text(one), encoding="utf-8")
+        (tmp_path / "one.txt").write_text(format_marker_set(one), encoding="utf-8")
         assert read_marker_set(tmp_path / "one.txt") == one
 
 
@@ -61,10 +61,10 @@ def test_ours_go_into_the_wheel():
 
 def test_a_set_is_chosen_by_name_or_file(tmp_path):
     (tmp_path / "mine.txt").write_text(TEXT)
-    assert chosen_set("Plug_in_Gait").name == "plug_in_gait"
-    assert chosen_set(str(tmp_path / "mine.txt")).name == "mine"
+    assert choose_set("Plug_in_Gait").name == "plug_in_gait"
+    assert choose_set(str(tmp_path / "mine.txt")).name == "mine"
     with pytest.raises(InputError, match="marker set: no marker set 'yours'.*plug_in_gait"):
-        chosen_set("yours")
+        choose_set("yours")
 
 
 @pytest.mark.parametrize("line, said", [
@@ -81,7 +81,7 @@ def test_a_set_is_chosen_by_name_or_file(tmp_path):
     ("segment Head: LASI", "'LASI' on two segments"),
     ("also LASI: LPSI", "'LPSI' for 'Left PSI' and 'LASI'"),
 ])  # fmt: skip
-def test_what_is_wrong_is_told_with_its_line(line, said):
+def test_what_is_wrong_is_reported_with_its_line(line, said):
     with pytest.raises(InputError, match=said):
         parse_marker_set(TEXT + line, "x")
 
@@ -91,7 +91,7 @@ def test_what_is_wrong_is_told_with_its_line(line, said):
     ("marker set: a b\n", "x:1: name 'a b'"),
     ("marker set: a\n", "no segment"),
 ])  # fmt: skip
-def test_what_is_missing_is_told(text, said):
+def test_what_is_missing_is_reported(text, said):
     with pytest.raises(InputError, match=said):
         parse_marker_set(text, "x")
 
@@ -104,14 +104,14 @@ def test_files_that_are_none(tmp_path):
 
 
 @pytest.mark.parametrize("label", ["A,B", "A:B", "A #1", " A", "A  B"])
-def test_labels_that_cannot_be_written_are_told(label):
+def test_labels_that_cannot_be_written_are_reported(label):
     with pytest.raises(InputError, match="rename it"):
-        marker_set_text(MarkerSet("a", {"Hips": (label,)}))
+        format_marker_set(MarkerSet("a", {"Hips": (label,)}))
 
 
 @settings(max_examples=200, deadline=None)
 @given(st.lists(st.text(alphabet="segment: Hips,ALRmark#\n\t\r about", max_size=30), max_size=8))
-def test_any_text_is_a_set_or_told(lines):
+def test_any_text_is_a_set_or_reported(lines):
     try:
         parse_marker_set("marker set: a\nsegment Hips: A\n" + "\n".join(lines))
     except InputError as error:

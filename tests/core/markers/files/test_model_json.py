@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from beyond_mocap.base.errors import InputError
-from beyond_mocap.files.json_values import number
-from beyond_mocap.markers.files.model_json import model_text, parse_model, read_model, write_model
+from beyond_mocap.files.json_values import check_number
+from beyond_mocap.markers.files.model_json import format_model, parse_model, read_model, write_model
 from beyond_mocap.markers.model.model import BallMarker, Freedom, MarkerModel
 from beyond_mocap.motion.skeleton import Skeleton
 
@@ -48,7 +48,7 @@ def test_a_model_comes_back_number_for_number(tmp_path, ball):
     model = small_model(ball)
     write_model(model, tmp_path / "model.json")
     assert same(read_model(tmp_path / "model.json"), model)
-    assert model_text(read_model(tmp_path / "model.json")) == model_text(model)
+    assert format_model(read_model(tmp_path / "model.json")) == format_model(model)
 
 
 def test_a_small_file_is_enough():
@@ -61,7 +61,7 @@ def test_a_small_file_is_enough():
 
 def test_a_number_that_is_none_in_a_text():
     with pytest.raises(InputError, match="NaN"):
-        parse_model(model_text(small_model()).replace("0.037", "NaN"))
+        parse_model(format_model(small_model()).replace("0.037", "NaN"))
 
 
 @pytest.mark.parametrize("path, value, said", [
@@ -88,8 +88,8 @@ def test_a_number_that_is_none_in_a_text():
     (["ball", "centre"], None, "ball: centre"),
     (["notes"], [1], "notes: 1; expected a text"),
 ])  # fmt: skip
-def test_what_is_wrong_is_told_with_its_place(path, value, said):
-    whole = json.loads(model_text(small_model()))
+def test_what_is_wrong_is_reported_with_its_place(path, value, said):
+    whole = json.loads(format_model(small_model()))
     at = whole
     for step in path[:-1]:
         at = at[step]
@@ -98,12 +98,12 @@ def test_what_is_wrong_is_told_with_its_place(path, value, said):
         parse_model(json.dumps(whole), "m.json")
 
 
-def test_a_value_that_is_too_deep_to_be_shown_is_told():
+def test_a_value_that_is_too_deep_to_be_shown_is_reported():
     deep = []
     for _ in range(100000):
         deep = [deep]
     with pytest.raises(InputError, match="player 1: a value nested too deeply; expected a number"):
-        number(deep, "player 1")
+        check_number(deep, "player 1")
 
 
 def test_files_that_are_none(tmp_path):
@@ -125,8 +125,8 @@ VALUES = st.recursive(
 
 @settings(max_examples=300, deadline=None)
 @given(st.data())
-def test_any_value_in_any_place_is_read_or_told(data):
-    whole = json.loads(model_text(small_model()))
+def test_any_value_in_any_place_is_read_or_reported(data):
+    whole = json.loads(format_model(small_model()))
     at, path = whole, []
     while True:
         keys = list(at) if isinstance(at, dict) else list(range(len(at)))

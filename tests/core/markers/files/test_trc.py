@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.markers.files.marker_files import read_markers
-from beyond_mocap.markers.files.trc import trc_text, write_trc
+from beyond_mocap.markers.files.trc import format_trc, write_trc
 from beyond_mocap.markers.trial import MarkerTrial
 
 
@@ -93,7 +93,7 @@ def test_z_up_is_seen(body, read):
     assert same(trial, body) and "Z is up, heads above feet" in trial.notes
 
 
-def test_y_is_up_where_nobody_stands(read, body):
+def test_y_is_up_where_no_body_stands(read, body):
     trial = read(body.trc(body.positions[:, :3], ["A", "B", "D"], unit="m"), unit="m")
     np.testing.assert_allclose(trial.positions[..., 2], body.positions[:, :3, 1], atol=1e-5)
     assert "Y is up, as such files usually are" in trial.notes
@@ -104,7 +104,7 @@ def test_markers_without_a_label(body, lines, read):
     assert read(lines).labels == (*body.labels[:-1], "*1")
 
 
-def test_more_markers_than_said_are_told(body, lines, read):
+def test_more_markers_than_said_are_reported(body, lines, read):
     lines[2] = lines[2].replace("\t17\t", "\t16\t")
     assert "17 markers, not 16 as in the header" in read(lines).notes
 
@@ -170,7 +170,7 @@ def set_line(number, change):
     (lambda lines: [line.replace("100.0\t", "0\t") for line in lines[:5]] + lines[6:7], "nan frames per second"),
     (set_line(2, lambda line: line.replace("mm", "m")), "a body of 1507 m in the header's unit 'm'.*set the unit"),
 ])  # fmt: skip
-def test_what_is_wrong_is_told(lines, read, change, said):
+def test_what_is_wrong_is_reported(lines, read, change, said):
     with pytest.raises(InputError, match=said):
         read(change(lines))
 
@@ -181,7 +181,7 @@ def test_a_written_trial_is_read_as_it_was(body, tmp_path):
     again = read_markers(tmp_path / "there.trc")
     assert (again.labels, again.fps, again.start, again.name) == (trial.labels, 240.0, 1.5, "there")
     np.testing.assert_allclose(again.positions, trial.positions, atol=1e-7)
-    assert trc_text(trial).isascii()
+    assert format_trc(trial).isascii()
     with pytest.raises(InputError, match="cannot be written"):
         write_trc(trial, tmp_path / "missing" / "there.trc")
 
@@ -191,7 +191,7 @@ CHARACTERS = st.sampled_from([*"\t\n\r -,.09eX#\0é", "nan", "\t\t\t"])
 
 @settings(max_examples=300, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.lists(st.tuples(st.floats(0, 1), st.integers(0, 3), CHARACTERS), min_size=1, max_size=6))
-def test_any_damage_is_read_or_told(lines, read, changes):
+def test_any_damage_is_read_or_reported(lines, read, changes):
     text = "\n".join(lines)
     for share, length, put in changes:
         at = int(share**2 * len(text))

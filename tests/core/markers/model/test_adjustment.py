@@ -35,13 +35,13 @@ def adjusted(motion, places, seen, shift):
     offsets, places = OFFSETS.copy(), places - (JOINT >= 1)[:, None] * shift
     offsets[1] += shift
     body = Body(names=NAMES, parents=PARENTS, offsets=offsets, joint=JOINT, places=places.copy(),
-                held=np.zeros(3, bool), limb=np.array([-1, -1, 2]))
+                is_fixed=np.zeros(3, bool), limb=np.array([-1, -1, 2]))
     prior = Prior(offsets=offsets.copy(), offset_sigma=np.array([0.01, 0.02, 0.02]), places=places.copy(),
                   place_sigma=np.full(len(JOINT), 0.008))
-    task = Adjustment(body, prior, Pull({}), seen, np.full(len(JOINT), 0.001), worth=FRAMES)
-    task.start(motion)
-    before = task.cost()
-    task.run(30)
+    task = Adjustment(body, prior, Pull({}), seen, np.full(len(JOINT), 0.001), effective_frames=FRAMES)
+    task.start_from(motion)
+    before = task.compute_cost()
+    task.run_steps(30)
     return task, before
 
 
@@ -49,7 +49,7 @@ def test_a_wrong_hip_is_found_by_the_motion():
     motion, places, seen = leg(1)
     shift = np.array([0.02, -0.015, 0.01])
     task, before = adjusted(motion, places, seen, shift)
-    assert task.cost() < 0.1 * before
+    assert task.compute_cost() < 0.1 * before
     assert np.linalg.norm(task.body.offsets[1] - OFFSETS[1]) < 0.2 * np.linalg.norm(shift)
 
 
@@ -79,9 +79,9 @@ def test_the_step_is_downhill_of_the_exact_slope():
     task, _ = adjusted(motion, places, seen, np.zeros(3))
     task.body.offsets[1] += [0.004, -0.002, 0.003]
     task.sigma = np.full(len(JOINT), 1.0)  # nothing is far off, so that the cost is plain squares
-    before, step = task.cost(), 1e-5
-    error, rows = task._priors()
-    world, _, markers = task.placed()
+    before, step = task.compute_cost(), 1e-5
+    error, rows = task._build_prior_errors()
+    world, _, markers = task.compute_places()
     away = (markers - task.seen) * task.share
     slope = 2.0 * rows.T @ error
     for axis in range(3):
@@ -89,5 +89,5 @@ def test_the_step_is_downhill_of_the_exact_slope():
         moved = np.broadcast_to(world[:, :1, :, axis], away.shape) * (JOINT >= 1)[:, None]
         slope[column] += 2.0 * np.sum(away * moved)
         task.body.offsets[1, axis] += step
-        assert (task.cost() - before) / step == pytest.approx(slope[column], rel=1e-2, abs=1e-2)
+        assert (task.compute_cost() - before) / step == pytest.approx(slope[column], rel=1e-2, abs=1e-2)
         task.body.offsets[1, axis] -= step

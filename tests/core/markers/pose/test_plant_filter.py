@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from beyond_mocap.base.errors import InputError
-from beyond_mocap.markers.pose.plant_filter import plant_filter, stances
-from beyond_mocap.motion.humanoid import identify
-from beyond_mocap.motion.motion import Motion, pose_kinematics
-from beyond_mocap.synthetic.gait import gait
+from beyond_mocap.markers.pose.plant_filter import filter_foot_plants, detect_contacts
+from beyond_mocap.motion.humanoid import identify_joints
+from beyond_mocap.motion.motion import Motion, compute_pose
+from beyond_mocap.synthetic.gait import build_gait
 
 FPS = 200.0
 
@@ -17,15 +17,15 @@ FPS = 200.0
 @pytest.fixture(scope="module")
 def standing():
     """Three seconds of one pose."""
-    pose = gait(1.4, 1.0, FPS)
+    pose = build_gait(1.4, 1.0, FPS)
     frames = np.full(600, 40)
     return Motion(pose.skeleton, pose.root_positions[frames], pose.rotations[frames], FPS)
 
 
 def feet(motion):
     """Ankles and toes (T, 2, 2, 3)."""
-    body = identify(motion.skeleton)
-    places, _ = pose_kinematics(motion.skeleton, motion.root_positions, motion.rotations)
+    body = identify_joints(motion.skeleton)
+    places, _ = compute_pose(motion.skeleton, motion.root_positions, motion.rotations)
     return np.stack([places[:, [limb.foot, limb.toe_or_foot]] for limb in (body.left, body.right)], axis=1)
 
 
@@ -36,7 +36,7 @@ def floating(motion, reach=0.002, hertz=0.4):
 
 
 def test_floating_feet_stand_still(standing):
-    out = plant_filter(floating(standing))
+    out = filter_foot_plants(floating(standing))
     travel = [np.ptp(feet(m)[..., :2], axis=0).max() for m in (floating(standing), out.motion)]
     assert out.held.all() and travel[0] > 0.003 and travel[1] < 2e-4
     assert np.array_equal(out.motion.root_positions, floating(standing).root_positions)
@@ -44,8 +44,8 @@ def test_floating_feet_stand_still(standing):
 
 def test_bones_keep_their_length_and_the_rest_of_the_body_its_pose(standing):
     before = floating(standing)
-    out = plant_filter(before).motion
-    body = identify(out.skeleton)
+    out = filter_foot_plants(before).motion
+    body = identify_joints(out.skeleton)
     legs = [j for limb in (body.left, body.right) for j in (limb.upper_leg, limb.lower_leg, limb.foot)]
     others = [j for j in range(len(out.skeleton)) if j not in legs]
     assert np.array_equal(out.rotations[:, others], before.rotations[:, others])
@@ -53,14 +53,14 @@ def test_bones_keep_their_length_and_the_rest_of_the_body_its_pose(standing):
 
 
 def test_a_walk_whose_stances_are_shorter_than_the_window_stays_as_it_is():
-    walk = gait(1.4, 3.0, FPS)
-    out = plant_filter(walk, window=1.5)
+    walk = build_gait(1.4, 3.0, FPS)
+    out = filter_foot_plants(walk, window=1.5)
     assert not out.held.any() and np.array_equal(out.motion.rotations, walk.rotations)
 
 
 def test_it_comes_and_goes_without_a_jump():
-    walk = floating(gait(0.8, 4.0, FPS), 0.004, 1.0)
-    out = plant_filter(walk, window=0.3, still=0.004)
+    walk = floating(build_gait(0.8, 4.0, FPS), 0.004, 1.0)
+    out = filter_foot_plants(walk, window=0.3, max_drift=0.004)
     assert 0 < out.held.mean() < 1
     steps = [np.linalg.norm(np.diff(feet(m), n=2, axis=0), axis=-1).max() for m in (walk, out.motion)]
     assert steps[1] < steps[0] + 3e-4 and out.miss.max() < 0.008
@@ -69,17 +69,17 @@ def test_it_comes_and_goes_without_a_jump():
 def test_a_foot_that_swings_to_and_fro_does_not_stand():
     place = np.zeros((400, 3))
     place[:, 0] = 0.3 * np.cos(2.0 * np.pi * np.arange(400) / 50.0)  # both halves of a window have the same mean
-    assert stances(place, 50, 0.0015, 0.01) == []
+    assert detect_contacts(place, 50, 0.0015, 0.01) == []
 
 
 def test_what_drifts_slowly_for_long_is_held_in_pieces():
     place = np.zeros((4000, 3))
     place[:, 0] = np.arange(4000) * 5e-3 / FPS  # 5 mm a second, 10 cm in all
-    spans = stances(place, 50, 0.0015, 0.01)
+    spans = detect_contacts(place, 50, 0.0015, 0.01)
     assert len(spans) > 4 and spans[0][0] == 0 and spans[-1][1] == 4000
     assert all(np.abs(place[a:b] - place[a:b].mean(axis=0)).max() <= 0.01 for a, b in spans)
 
 
 def test_numbers_that_are_none_are_refused(standing):
     with pytest.raises(InputError, match="positive"):
-        plant_filter(standing, window=0.0)
+        filter_foot_plants(standing, window=0.0)

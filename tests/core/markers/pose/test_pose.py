@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from beyond_mocap.base.errors import Cancelled, InputError
-from beyond_mocap.markers.model.model import MarkerModel, freedom_of
+from beyond_mocap.base.errors import UserCancelledError, InputError
+from beyond_mocap.markers.model.model import MarkerModel, build_freedom
 from beyond_mocap.markers.pose import pose
-from beyond_mocap.markers.pose.pose import HeldBall, PoseSettings, solve
+from beyond_mocap.markers.pose.pose import HeldBall, PoseSettings, solve_poses
 from beyond_mocap.motion import quaternion
 from beyond_mocap.motion.motion import forward_kinematics
-from beyond_mocap.synthetic.gait import gait
-from beyond_mocap.synthetic.ground_truth.planted_markers import planted
+from beyond_mocap.synthetic.gait import build_gait
+from beyond_mocap.synthetic.ground_truth.planted_markers import build_trial
 
 
 def model_of(known):
@@ -21,7 +21,7 @@ def model_of(known):
     kept = [markers.labels.index(label) for label in known.trial.labels]
     joint, places = np.array(markers.joint)[kept], np.array(markers.places)[kept]
     counts = {name: int(np.sum(joint == index)) for index, name in enumerate(skeleton.names)}
-    freedom, stiffness = freedom_of(skeleton.names, skeleton.parents, counts)
+    freedom, stiffness = build_freedom(skeleton.names, skeleton.parents, counts)
     usual, unsure = np.full(len(kept), 0.005), np.full(len(skeleton), 0.01)
     return MarkerModel(skeleton=skeleton, markers=known.trial.labels, joint=joint, places=places, sigma=usual,
                        edge_sigma=np.full(len(kept), 0.03), freedom=freedom, stiffness=stiffness, centre_sigma=unsure)
@@ -30,13 +30,13 @@ def model_of(known):
 @pytest.fixture(scope="module")
 def run():
     """A run of two seconds with markers on bone, seen exactly."""
-    return planted(gait(3.0, 2.0, fps=100.0), "driveline", seed=1, noise=0.0, softness=0.0)
+    return build_trial(build_gait(3.0, 2.0, fps=100.0), "driveline", seed=1, noise=0.0, softness=0.0)
 
 
 @pytest.fixture(scope="module")
 def soft():
     """The same with skin, noise and hidden markers."""
-    return planted(gait(3.0, 2.0, fps=100.0), "driveline", seed=1, occlusion=0.05)
+    return build_trial(build_gait(3.0, 2.0, fps=100.0), "driveline", seed=1, occlusion=0.05)
 
 
 def joint_errors(known, solved):
@@ -54,7 +54,7 @@ def world_errors(known, solved, part):
 
 
 def test_markers_on_bone_give_the_motion_back(run):
-    solved = solve(model_of(run), run.trial)
+    solved = solve_poses(model_of(run), run.trial)
     assert np.sqrt(np.mean(joint_errors(run, solved) ** 2)) < 1e-3
     assert np.nanmax(solved.residual) < 2e-3 and np.nanmean(solved.residual) < 3e-4
     assert max(world_errors(run, solved, part).max() for part in ("Hips", "UpLeg", "ForeArm", "Head")) < 1.0
@@ -62,7 +62,7 @@ def test_markers_on_bone_give_the_motion_back(run):
 
 
 def test_skin_and_hidden_markers_are_borne(soft):
-    solved = solve(model_of(soft), soft.trial)
+    solved = solve_poses(model_of(soft), soft.trial)
     assert np.sqrt(np.mean(joint_errors(soft, solved) ** 2)) < 6e-3
     assert np.isnan(solved.residual).sum() == np.isnan(soft.trial.positions[..., 0]).sum()
     # one segment alone is laid nearer to its own markers than the whole chain can be
@@ -72,14 +72,14 @@ def test_skin_and_hidden_markers_are_borne(soft):
 
 def test_the_same_input_gives_the_same_bits(soft):
     model = model_of(soft)
-    one, two = solve(model, soft.trial), solve(model, soft.trial)
+    one, two = solve_poses(model, soft.trial), solve_poses(model, soft.trial)
     assert np.array_equal(one.motion.rotations, two.motion.rotations)
 
 
 def test_frames_that_show_nothing_lie_between_those_beside_them(run):
     positions = run.trial.positions.copy()
     positions[80:90] = np.nan
-    solved = solve(model_of(run), replace(run.trial, positions=positions))
+    solved = solve_poses(model_of(run), replace(run.trial, positions=positions))
     assert np.all(solved.iterations[80:90] == 0) and any("10 of" in note for note in solved.notes)
     way = solved.motion.root_positions[79:91]
     assert np.allclose(np.diff(way, 2, axis=0), 0.0, atol=1e-9)
@@ -88,12 +88,12 @@ def test_frames_that_show_nothing_lie_between_those_beside_them(run):
 def test_an_unknown_label_is_no_harm_but_a_strange_trial_is_refused(run):
     model = model_of(run)
     more = replace(run.trial, labels=(*run.trial.labels[:-1], "stick"))
-    assert np.isnan(solve(model, more).residual[:, -1]).all()
+    assert np.isnan(solve_poses(model, more).residual[:, -1]).all()
     strange = replace(run.trial, labels=tuple(f"x{label}" for label in run.trial.labels))
     with pytest.raises(InputError, match="0 of the model's"):
-        solve(model, strange)
-    with pytest.raises(Cancelled):
-        solve(model, run.trial, cancelled=lambda: True)
+        solve_poses(model, strange)
+    with pytest.raises(UserCancelledError):
+        solve_poses(model, run.trial, cancelled=lambda: True)
 
 
 def test_a_held_ball_turns_a_hand_that_its_markers_leave_open(run):
@@ -107,7 +107,7 @@ def test_a_held_ball_turns_a_hand_that_its_markers_leave_open(run):
     trial = replace(run.trial, positions=hidden)
     ball = HeldBall(joint="RightHand", centre=centre, radius=radius, seen=on_surface,
                     held=np.ones(len(hidden), dtype=bool))
-    without, held = solve(model, trial), solve(model, trial, PoseSettings(ball=ball))
+    without, held = solve_poses(model, trial), solve_poses(model, trial, PoseSettings(ball=ball))
     joints, turns = forward_kinematics(held.motion)
     distance = np.linalg.norm(joints[:, hand] + quaternion.rotate(turns[:, hand], centre) - on_surface, axis=-1)
     assert np.abs(distance - radius).max() < 2e-3
@@ -119,7 +119,7 @@ def test_a_spine_that_is_too_long_does_not_flip(run):
     offsets = model.skeleton.offsets.copy()
     chest = model.skeleton.index("Chest")
     offsets[chest] *= 1.0 + 0.015 / np.linalg.norm(offsets[chest])
-    solved = solve(replace(model, skeleton=replace(model.skeleton, offsets=offsets)), run.trial)
+    solved = solve_poses(replace(model, skeleton=replace(model.skeleton, offsets=offsets)), run.trial)
     spine = [model.skeleton.index(name) for name in ("Spine", "Spine1", "Chest")]
     steps = quaternion.multiply(quaternion.inverse(solved.motion.rotations[:-1]), solved.motion.rotations[1:])
     turned = np.degrees(np.linalg.norm(quaternion.to_rotation_vector(steps[:, spine]), axis=-1))
@@ -133,7 +133,7 @@ def test_a_joint_whose_markers_are_hidden_goes_on_between_its_neighbours(run):
     arm = ("LeftForeArm", "LeftHand")
     hidden = [index for index, label in enumerate(run.trial.labels) if run.segments[label] in arm]
     positions[60:75, hidden] = np.nan
-    solved = solve(model_of(run), replace(run.trial, positions=positions))
+    solved = solve_poses(model_of(run), replace(run.trial, positions=positions))
     errors = world_errors(run, solved, "LeftForeArm")[:, 0]
     assert errors[60:75].max() < 15.0 and errors[:58].max() < 1.0 and errors[77:].max() < 1.0
     arm = solved.motion.rotations[58:78, run.motion.skeleton.index("LeftForeArm")]
@@ -144,7 +144,7 @@ def test_a_joint_whose_markers_are_hidden_goes_on_between_its_neighbours(run):
 def test_a_short_flip_is_solved_again_from_the_frames_around(run, monkeypatch):
     model = model_of(run)
     arm = run.motion.skeleton.index("LeftArm")
-    right, flipped = pose._Solving._unflip, []
+    right, flipped = pose._PoseSolver._resolve_flips, []
 
     def flip_first(solving, known):
         """Turn the arm out for three frames, as if that cost no more."""
@@ -154,6 +154,6 @@ def test_a_short_flip_is_solved_again_from_the_frames_around(run, monkeypatch):
         flipped.append(known)
         right(solving, known)
 
-    monkeypatch.setattr(pose._Solving, "_unflip", flip_first)
-    solved = solve(model, run.trial)
+    monkeypatch.setattr(pose._PoseSolver, "_resolve_flips", flip_first)
+    solved = solve_poses(model, run.trial)
     assert flipped and world_errors(run, solved, "LeftArm")[59:64].max() < 1.0

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from beyond_mocap.markers.pose import smooth as module
-from beyond_mocap.markers.pose.chain import place, poses
-from beyond_mocap.markers.pose.descent import HeldPoint, Task, descend
-from beyond_mocap.markers.pose.smooth import smooth
+from beyond_mocap.markers.pose.chain import compute_world_poses, build_poses
+from beyond_mocap.markers.pose.descent import HeldPoint, PoseTask, descend
+from beyond_mocap.markers.pose.smooth import smooth_poses
 from beyond_mocap.motion import quaternion
-from tests.core.markers.small_chain import HINGE, SKELETON, small_chain
+from tests.core.markers.small_chain import HINGE, SKELETON, build_small_chain
 
 FPS = 100.0
 
@@ -19,14 +19,14 @@ def swinging(made, count=90):
     phase = np.linspace(0.0, 3.0, 3 * len(SKELETON)).reshape(len(SKELETON), 3)
     turns = quaternion.from_rotation_vector(0.4 * np.sin(4.0 * seconds + phase))
     turns[:, HINGE] = quaternion.from_euler(0.5 + 0.3 * np.sin(4.0 * seconds[:, 0, 0])[:, None], made.order[HINGE][:1])
-    return poses(made, np.stack([np.linspace(0.0, 1.0, count), np.zeros(count), np.ones(count)], axis=1), turns)
+    return build_poses(made, np.stack([np.linspace(0.0, 1.0, count), np.zeros(count), np.ones(count)], axis=1), turns)
 
 
 def task_of(made, truth, noise=0.004, **more):
-    placed = place(made, truth)
+    placed = compute_world_poses(made, truth)
     seen = placed.markers + placed.origin + np.random.default_rng(2).normal(0.0, noise, placed.markers.shape)
     weights = np.ones((len(made.joint), seen.shape[-1]))
-    return Task(chain=made, seen=seen, weights=weights, drawn=np.full((len(SKELETON), 3), 1e-3), **more)
+    return PoseTask(chain=made, seen=seen, weights=weights, stiffness=np.full((len(SKELETON), 3), 1e-3), **more)
 
 
 def off(truth, found):
@@ -37,55 +37,55 @@ def off(truth, found):
 
 
 def test_noise_goes_and_the_motion_stays():
-    made = small_chain()
+    made = build_small_chain()
     truth = swinging(made)
     task = task_of(made, truth)
     rough = descend(task, truth).poses
-    found, held = smooth(task, rough, 0.03, FPS)
+    found, held = smooth_poses(task, rough, 0.03, FPS)
     assert off(truth, found) < 0.6 * off(truth, rough)
     assert not held.any()
     assert np.all(found.angles[HINGE, 1:] == 0.0)
 
 
 def test_windows_leave_no_seam(monkeypatch):
-    made = small_chain()
+    made = build_small_chain()
     truth = swinging(made)
     task = task_of(made, truth)
     rough = descend(task, truth).poses
-    whole, _ = smooth(task, rough, 0.02, FPS)
+    whole, _ = smooth_poses(task, rough, 0.02, FPS)
     monkeypatch.setattr(module, "_KEPT", 25)
     monkeypatch.setattr(module, "_AHEAD", 25)
-    pieces, _ = smooth(task, rough, 0.02, FPS)
+    pieces, _ = smooth_poses(task, rough, 0.02, FPS)
     assert off(whole, pieces) < 0.05
 
 
 def test_frames_without_markers_are_bridged():
-    made = small_chain()
+    made = build_small_chain()
     truth = swinging(made)
     task = task_of(made, truth, noise=0.0)
     task.weights[:, 40:50] = 0.0
-    start = truth.copy()
+    start = truth.copy_arrays()
     start.local[..., 40:50] = truth.local[..., 39:40]
-    found, _ = smooth(task, start, 0.02, FPS)
-    assert off(truth.frames(slice(40, 50)), found.frames(slice(40, 50))) < 1.0
+    found, _ = smooth_poses(task, start, 0.02, FPS)
+    assert off(truth.select_frames(slice(40, 50)), found.select_frames(slice(40, 50))) < 1.0
 
 
 def test_a_held_point_takes_part():
-    made = small_chain()
+    made = build_small_chain()
     truth = swinging(made, 30)
-    placed = place(made, truth)
+    placed = compute_world_poses(made, truth)
     spot = np.array([0.0, 0.1, 0.0])
     there = placed.joints[4] + np.einsum("abf,b->af", placed.world[4], spot) + placed.origin
     seen = there + np.array([0.0, 0.0, 0.04])[:, None]
     point = HeldPoint(joint=4, place=spot, radius=0.02, seen=seen, weight=np.full(30, 100.0))
     task = task_of(made, truth, noise=0.0, point=point)
-    found, alone = smooth(task, truth, 1e-4, FPS)[0], descend(task, truth).poses
+    found, alone = smooth_poses(task, truth, 1e-4, FPS)[0], descend(task, truth).poses
     assert off(alone, found) < 0.2 < off(truth, found)
 
 
 @pytest.mark.parametrize("count", [1, 2, 3])
 def test_a_few_frames_are_no_harm(count):
-    made = small_chain()
+    made = build_small_chain()
     truth = swinging(made, count)
-    found, _ = smooth(task_of(made, truth), truth, 0.02, FPS)
+    found, _ = smooth_poses(task_of(made, truth), truth, 0.02, FPS)
     assert np.isfinite(found.local).all() and found.root.shape == (3, count)

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from beyond_mocap.ball.physics import BASEBALL
-from beyond_mocap.markers.release.launch_fit import Held, fit_launch
-from beyond_mocap.markers.release.throwing_hand import ball_in_hand, by_distance, fastest
+from beyond_mocap.markers.release.launch_fit import HeldMarker, fit_launch
+from beyond_mocap.markers.release.throwing_hand import fit_hand_ball, find_release_by_distance, find_fastest_frame
 from beyond_mocap.motion import quaternion
 
 RADIUS, RELEASE = 0.0366, 0.5037
@@ -25,15 +25,15 @@ def planted(fps, speed, spin, seen=0.3, noise=0.0007, seed=0):
     turn = CubicSpline(fine, 3.0 * angle)
     offset = rng.normal(size=3)
     offset *= RADIUS / np.linalg.norm(offset)
-    held = centre(times) + quaternion.rotate(quaternion.about_up(turn(times)), np.broadcast_to(offset, (len(times), 3)))
+    held = centre(times) + quaternion.rotate(quaternion.from_up_angle(turn(times)), np.broadcast_to(offset, (len(times), 3)))
     start, velocity = centre(RELEASE), centre(RELEASE, 1)
-    first = quaternion.rotate(quaternion.about_up(turn(RELEASE)), offset)
+    first = quaternion.rotate(quaternion.from_up_angle(turn(RELEASE)), offset)
     since = np.maximum(times - RELEASE, 0.0)[:, None]
     turned = quaternion.rotate(quaternion.from_rotation_vector(np.asarray(spin, float) * since), first)
     flying = start + velocity * since + 0.5 * GRAVITY * since**2 + turned
     marker = np.where(times[:, None] > RELEASE, flying, held) + rng.normal(0.0, noise, held.shape)
     marker[times > RELEASE + seen] = np.nan
-    return marker, Held(held, centre(times), centre(times, 1)), velocity, centre(times)
+    return marker, HeldMarker(held, centre(times), centre(times, 1)), velocity, centre(times)
 
 
 @pytest.mark.parametrize("guess", [-0.06, 0.05])
@@ -64,9 +64,9 @@ def test_a_ball_that_is_never_seen_to_fly_is_none():
 
 def test_the_first_guess_is_near():
     marker, _, _, centre = planted(200.0, 25.0, (0.0, -50.0, 0.0))
-    assert abs(by_distance(centre, marker, 200.0) / 200.0 - RELEASE) < 0.03
-    assert abs(fastest(centre, 200.0) / 200.0 - RELEASE) < 0.02
-    assert by_distance(centre, np.full_like(marker, np.nan), 200.0) is None
+    assert abs(find_release_by_distance(centre, marker, 200.0) / 200.0 - RELEASE) < 0.03
+    assert abs(find_fastest_frame(centre, 200.0) / 200.0 - RELEASE) < 0.02
+    assert find_release_by_distance(centre, np.full_like(marker, np.nan), 200.0) is None
 
 
 def test_the_centre_and_the_radius_come_back_from_several_throws():
@@ -74,16 +74,16 @@ def test_the_centre_and_the_radius_come_back_from_several_throws():
     centre = np.array([0.02, -0.12, -0.035])
     around = rng.normal(size=(40, 3))
     points = centre + 0.047 * around / np.linalg.norm(around, axis=-1)[:, None] + rng.normal(0.0, 0.0005, (40, 3))
-    found = ball_in_hand(points, 0.0366, centre + 0.02, fit_radius=True)
-    assert found.fitted and abs(found.radius - 0.047) < 0.001
+    found = fit_hand_ball(points, 0.0366, centre + 0.02, fit_radius=True)
+    assert found.is_radius_fitted and abs(found.radius - 0.047) < 0.001
     assert np.linalg.norm(found.centre - centre) < 0.001
 
 
 def test_one_place_of_the_marker_leaves_the_centre_to_what_is_usual():
     usual = np.array([0.0, -0.12, -0.03])
     marker = usual + [0.0, 0.0, -0.05]
-    found = ball_in_hand(np.repeat(marker[None], 30, axis=0), 0.0366, usual, fit_radius=True)
-    assert not found.fitted and found.radius == 0.0366
+    found = fit_hand_ball(np.repeat(marker[None], 30, axis=0), 0.0366, usual, fit_radius=True)
+    assert not found.is_radius_fitted and found.radius == 0.0366
     assert abs(np.linalg.norm(found.centre - marker) - 0.0366) < 0.002
     assert found.sigma > 0.01
-    assert np.array_equal(ball_in_hand(np.full((3, 3), np.nan), 0.0366, usual).centre, usual)
+    assert np.array_equal(fit_hand_ball(np.full((3, 3), np.nan), 0.0366, usual).centre, usual)

@@ -2,7 +2,7 @@
 
 import pytest
 
-from beyond_mocap.markers.release.release import radar_speed
+from beyond_mocap.markers.release.release import parse_radar_speed
 
 
 @pytest.mark.parametrize("name, speed", [
@@ -15,7 +15,7 @@ from beyond_mocap.markers.release.release import radar_speed
     ("s1_95_KPH", 26.39),
 ])
 def test_speeds_are_read(name, speed):
-    assert radar_speed(name) == pytest.approx(speed, abs=0.01)
+    assert parse_radar_speed(name) == pytest.approx(speed, abs=0.01)
 
 
 @pytest.mark.parametrize("name", [
@@ -23,4 +23,4 @@ def test_speeds_are_read(name, speed):
     "a_81mph_90mph", "000870_003252_74_195_002_FF_010", "", "throw_3ms",
 ])
 def test_other_numbers_are_no_speed(name):
-    assert radar_speed(name) is None
+    assert parse_radar_speed(name) is None

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from beyond_mocap.motion.humanoid import identify
-from beyond_mocap.motion.motion import place, pose_kinematics
-from beyond_mocap.synthesis.construct.on_track import LEGS_LEAN, MOST_LEAN, TRUNK_LEAN, lean_into_curves, missing_lean
-from beyond_mocap.synthetic.gait import gait
+from beyond_mocap.motion.humanoid import identify_joints
+from beyond_mocap.motion.motion import place_motion, compute_pose
+from beyond_mocap.synthesis.construct.on_track import LEGS_LEAN, MAX_LEAN, TRUNK_LEAN, lean_into_curves, compute_missing_lean
+from beyond_mocap.synthetic.gait import build_gait
 
 FPS, COUNT = 30.0, 90
 NO_SEAM = np.zeros(0, int)
@@ -24,38 +24,38 @@ def footage(speed, radius):
 
 @pytest.mark.parametrize("radius", [12.0, -12.0])
 def test_a_straight_recording_on_a_curve_lacks_all_of_it(radius):
-    lean = missing_lean(*curve(5.0, radius), *footage(5.0, np.inf), NO_SEAM, FPS)
+    lean = compute_missing_lean(*curve(5.0, radius), *footage(5.0, np.inf), NO_SEAM, FPS)
     asked = 5.0**2 / radius / 9.81
-    limit = MOST_LEAN / LEGS_LEAN
+    limit = MAX_LEAN / LEGS_LEAN
     assert np.allclose(lean[15:-15], limit * np.tanh(asked / limit), rtol=0.02)
     assert np.abs(lean).max() < 1.05 * abs(asked)
 
 
 def test_a_recording_of_the_same_curve_lacks_nothing():
-    lean = missing_lean(*curve(5.0, 12.0), *footage(5.0, 12.0), NO_SEAM, FPS)
+    lean = compute_missing_lean(*curve(5.0, 12.0), *footage(5.0, 12.0), NO_SEAM, FPS)
     assert np.abs(lean[15:-15]).max() < 1e-6
 
 
 def test_no_lean_when_slow_and_never_too_much():
-    assert np.abs(missing_lean(*curve(1.4, 0.5), *footage(1.4, np.inf), NO_SEAM, FPS)).max() < 1e-9
-    assert LEGS_LEAN * np.abs(missing_lean(*curve(8.0, 3.0), *footage(8.0, np.inf), NO_SEAM, FPS)).max() <= MOST_LEAN
+    assert np.abs(compute_missing_lean(*curve(1.4, 0.5), *footage(1.4, np.inf), NO_SEAM, FPS)).max() < 1e-9
+    assert LEGS_LEAN * np.abs(compute_missing_lean(*curve(8.0, 3.0), *footage(8.0, np.inf), NO_SEAM, FPS)).max() <= MAX_LEAN
 
 
 def test_a_seam_is_no_turn():
     velocity, turn = footage(4.0, np.inf)
     velocity[40:] = [0.0, 4.0]
-    lean = missing_lean(*curve(4.0, np.inf), velocity, turn, np.array([40]), FPS)
+    lean = compute_missing_lean(*curve(4.0, np.inf), velocity, turn, np.array([40]), FPS)
     assert np.abs(lean).max() < 1e-9
 
 
 @pytest.mark.parametrize("heading", [0.0, 2.0])
 def test_legs_lean_by_their_share_and_the_trunk_by_less(heading):
-    motion = place(gait(4.0, 3.0, FPS), heading)
+    motion = place_motion(build_gait(4.0, 3.0, FPS), heading)
     lean = np.full(len(motion), 0.3)
     out = lean_into_curves(motion.skeleton, motion.rotations, np.full(len(motion), heading), lean)
-    body, across = identify(motion.skeleton), np.array([-np.sin(heading), np.cos(heading), 0.0])
-    places, _ = pose_kinematics(motion.skeleton, motion.root_positions, motion.rotations)
-    after, _ = pose_kinematics(motion.skeleton, motion.root_positions, out)
+    body, across = identify_joints(motion.skeleton), np.array([-np.sin(heading), np.cos(heading), 0.0])
+    places, _ = compute_pose(motion.skeleton, motion.root_positions, motion.rotations)
+    after, _ = compute_pose(motion.skeleton, motion.root_positions, out)
 
     def tilt(p, low, high):
         up = (p[:, high] - p[:, low]).mean(axis=0)
@@ -69,7 +69,7 @@ def test_legs_lean_by_their_share_and_the_trunk_by_less(heading):
 
 
 def test_who_does_not_lean_stays_as_he_is():
-    motion = gait(4.0, 1.0, FPS)
+    motion = build_gait(4.0, 1.0, FPS)
     still = lean_into_curves(motion.skeleton, motion.rotations, np.zeros(len(motion)), np.zeros(len(motion)))
     assert np.allclose(still, motion.rotations, atol=1e-12)
 
@@ -78,5 +78,5 @@ def test_who_does_not_lean_stays_as_he_is():
 def test_few_frames(count):
     speed, direction = curve(5.0, 12.0)
     velocity, turn = footage(5.0, np.inf)
-    lean = missing_lean(speed[:count], direction[:count], velocity[:count], turn[:count], NO_SEAM, FPS)
+    lean = compute_missing_lean(speed[:count], direction[:count], velocity[:count], turn[:count], NO_SEAM, FPS)
     assert lean.shape == (count,) and np.isfinite(lean).all()

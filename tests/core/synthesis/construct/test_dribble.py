@@ -6,28 +6,28 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from beyond_mocap.annotation.ball_contact import surfaces
-from beyond_mocap.annotation.striking import ball_gap
-from beyond_mocap.ball.roll import ROLLING, rolls, speeds_of
-from beyond_mocap.motion.contacts import detect
-from beyond_mocap.motion.humanoid import identify
-from beyond_mocap.motion.motion import pose_kinematics
+from beyond_mocap.annotation.ball_contact import build_surfaces
+from beyond_mocap.annotation.striking import measure_ball_gap
+from beyond_mocap.ball.roll import ROLLING, simulate_rolls, compute_roll_speeds
+from beyond_mocap.motion.contacts import detect_contacts
+from beyond_mocap.motion.humanoid import identify_joints
+from beyond_mocap.motion.motion import compute_pose
 from beyond_mocap.motion.track import BALL_RADIUS
-from beyond_mocap.synthesis.construct.dribble import dribble
-from beyond_mocap.synthesis.construct.meeting import lead, led
-from beyond_mocap.synthetic.gait import gait
+from beyond_mocap.synthesis.construct.dribble import plan_dribbles
+from beyond_mocap.synthesis.construct.meeting import move_ball_at, lead_ball_through
+from beyond_mocap.synthetic.gait import build_gait
 
 FPS = 30.0
 
 
 @pytest.fixture(scope="module", params=[1.4, 2.8, 5.0])
 def run(request):
-    return gait(request.param, 4.0, FPS)
+    return build_gait(request.param, 4.0, FPS)
 
 
 def pelvis(motion):
-    return pose_kinematics(motion.skeleton, motion.root_positions, motion.rotations)[0][
-        :, identify(motion.skeleton).hips
+    return compute_pose(motion.skeleton, motion.root_positions, motion.rotations)[0][
+        :, identify_joints(motion.skeleton).hips
     ]
 
 
@@ -39,16 +39,16 @@ def planted_ball(motion, ahead=0.0):
 
 
 def dribbled(motion, ball, stretches=((15.0, 105.0),), held=(), **known):
-    return dribble(
-        motion.skeleton, motion.root_positions, motion.rotations, detect(motion), ball, stretches, held, FPS, **known
+    return plan_dribbles(
+        motion.skeleton, motion.root_positions, motion.rotations, detect_contacts(motion), ball, stretches, held, FPS, **known
     )
 
 
 def gaps(motion, ball):
     """(T, 2) m, left and right foot."""
-    places, world = pose_kinematics(motion.skeleton, motion.root_positions, motion.rotations)
+    places, world = compute_pose(motion.skeleton, motion.root_positions, motion.rotations)
     return np.stack(
-        [ball_gap(f.line(places, world), f.radius, ball) for f in surfaces(motion.skeleton, {"dribble"})], 1
+        [measure_ball_gap(f.compute_line(places, world), f.radius, ball) for f in build_surfaces(motion.skeleton, {"dribble"})], 1
     )
 
 
@@ -85,7 +85,7 @@ def test_it_stays_near_samples_that_are_where_a_ball_can_be(run):
 
 
 def test_key_moments_stay_where_the_ball_was_met():
-    motion = gait(2.8, 4.0, FPS)
+    motion = build_gait(2.8, 4.0, FPS)
     ball = planted_ball(motion, ahead=0.5)
     found = dribbled(motion, ball, stretches=[(20.0, 90.0)], held=[(19, 20), (88, 89)])
     for frame in (19, 20, 88, 89):
@@ -96,7 +96,7 @@ def test_key_moments_stay_where_the_ball_was_met():
 
 @pytest.mark.parametrize("held", [[(19, 20)], [(88, 89)], [(50, 51)], [(20, 20), (40, 41), (89, 89)]])
 def test_wherever_the_ball_is_met_the_dribble_goes_on_around_it(held):
-    motion = gait(2.8, 4.0, FPS)
+    motion = build_gait(2.8, 4.0, FPS)
     ball = planted_ball(motion, ahead=0.5)
     found = dribbled(motion, ball, stretches=[(20.0, 90.0)], held=held)
     assert all(np.array_equal(found.ball[list(pair)], ball[list(pair)]) for pair in held)
@@ -106,7 +106,7 @@ def test_wherever_the_ball_is_met_the_dribble_goes_on_around_it(held):
 
 @pytest.mark.parametrize("held, moves", [([(19, 20), (60, 61)], True), ([], False), ([(19, 20)], False)])
 def test_where_no_foot_comes_near_the_ball_only_rolls(held, moves):
-    motion = gait(2.8, 4.0, FPS)
+    motion = build_gait(2.8, 4.0, FPS)
     motion = replace(motion, root_positions=motion.root_positions + [0.0, 0.0, 5.0])
     ball = planted_ball(motion, ahead=0.5) + np.sin(np.arange(len(motion)))[:, None] * [0.0, 0.1, 0.0]
     found = dribbled(motion, ball, stretches=[(20.0, 60.0)], held=held)
@@ -114,7 +114,7 @@ def test_where_no_foot_comes_near_the_ball_only_rolls(held, moves):
 
 
 def test_outside_of_the_stretches_the_ball_only_comes_and_goes():
-    motion = gait(2.8, 4.0, FPS)
+    motion = build_gait(2.8, 4.0, FPS)
     ball = planted_ball(motion)
     found = dribbled(motion, ball, stretches=[(45.0, 90.0)], turns=[30.2, 110.0])
     assert np.array_equal(found.ball[:30], ball[:30]) and np.array_equal(found.ball[111:], ball[111:])
@@ -137,25 +137,25 @@ def test_a_roll_slows_evenly_and_arrives():
     ends = np.array([[3.0, 1.0, BALL_RADIUS], [0.05, 0.0, BALL_RADIUS]])
     frames = np.array([30, 45])
     starts = np.tile([0.0, 0.0, BALL_RADIUS], (2, 1))
-    found, speeds = rolls(starts, ends, frames, FPS), speeds_of(starts, ends, frames / FPS)
+    found, speeds = simulate_rolls(starts, ends, frames, FPS), compute_roll_speeds(starts, ends, frames / FPS)
     for number, (end, frame) in enumerate(zip(ends, frames)):
         assert np.allclose(found.balls[number, frame - 1], end, atol=1e-9)
-    lost = np.linalg.norm(speeds.leaves[0]) - np.linalg.norm(speeds.arrives[0])
+    lost = np.linalg.norm(speeds.start_velocity[0]) - np.linalg.norm(speeds.end_velocity[0])
     assert lost == pytest.approx(ROLLING * 1.0)
-    assert np.linalg.norm(speeds.arrives[1]) == pytest.approx(0.0, abs=1e-9)  # it lies there and waits
+    assert np.linalg.norm(speeds.end_velocity[1]) == pytest.approx(0.0, abs=1e-9)  # it lies there and waits
 
 
 def test_a_ball_from_the_chest_falls_and_hops():
-    found = rolls(np.array([[0.0, 0.0, 1.0]]), np.array([[1.0, 0.0, BALL_RADIUS]]), np.array([60]), FPS)
+    found = simulate_rolls(np.array([[0.0, 0.0, 1.0]]), np.array([[1.0, 0.0, BALL_RADIUS]]), np.array([60]), FPS)
     height = found.balls[0, :, 2]
-    assert height.min() >= BALL_RADIUS and found.missed[0] == 0.0
+    assert height.min() >= BALL_RADIUS and found.height_error[0] == 0.0
     assert np.flatnonzero(height <= BALL_RADIUS + 0.05)[0] / FPS == pytest.approx(np.sqrt(2 * 0.89 / 9.81), abs=0.05)
 
 
 def test_led_through_a_place_a_flight_stays_a_flight():
     times = np.arange(60) / FPS
     flight = np.stack([8.0 * times, 0.0 * times, 3.0 + 9.0 * times - 4.905 * times**2], axis=1)
-    out = led(flight, (20, 20), flight[[20, 20]] + [0.2, -0.1, 0.15], (0, 59))
+    out = lead_ball_through(flight, (20, 20), flight[[20, 20]] + [0.2, -0.1, 0.15], (0, 59))
     bends = np.diff(out, 2, axis=0) - np.diff(flight, 2, axis=0)
     assert np.abs(np.delete(bends, 19, axis=0)).max() < 1e-9
     assert np.array_equal(out[[0, 59]], flight[[0, 59]])
@@ -163,6 +163,6 @@ def test_led_through_a_place_a_flight_stays_a_flight():
 
 def test_led_a_rolling_ball_stays_on_the_ground():
     roll = np.stack([np.linspace(0.0, 5.0, 40), np.zeros(40), np.full(40, BALL_RADIUS)], axis=1)
-    out = lead(roll, 30, 10, np.array([0.3, 0.1, 0.2]))
+    out = move_ball_at(roll, 30, 10, np.array([0.3, 0.1, 0.2]))
     assert out[30, 2] == pytest.approx(BALL_RADIUS + 0.2)
     assert np.allclose(out[:30, 2], BALL_RADIUS) and np.allclose(out[:11], roll[:11])

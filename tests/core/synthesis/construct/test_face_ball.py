@@ -3,20 +3,20 @@
 import numpy as np
 import pytest
 
-from beyond_mocap.annotation.ball_contact import surfaces
-from beyond_mocap.motion.motion import pose_kinematics
+from beyond_mocap.annotation.ball_contact import build_surfaces
+from beyond_mocap.motion.motion import compute_pose
 from beyond_mocap.synthesis.construct.construction import apply_heading
-from beyond_mocap.synthesis.construct.on_track import MOST_TURN_TO_BALL, turn_to_ball
+from beyond_mocap.synthesis.construct.on_track import MAX_TURN_TO_BALL, compute_turn_to_ball
 from beyond_mocap.synthesis.construct.strike import Touch
-from beyond_mocap.synthetic.gestures import strike as made_strike
+from beyond_mocap.synthetic.gestures import build_strike as made_strike
 
 KICK = made_strike("kick low inside", fps=60.0)
 WORDS = frozenset({"kick", "low", "inside", "right"})
 
 
 def foot_at(rotations, frame):
-    places, world = pose_kinematics(KICK.motion.skeleton, KICK.motion.root_positions, rotations)
-    line = surfaces(KICK.motion.skeleton, WORDS)[0].line(places[frame], world[frame])
+    places, world = compute_pose(KICK.motion.skeleton, KICK.motion.root_positions, rotations)
+    line = build_surfaces(KICK.motion.skeleton, WORDS)[0].compute_line(places[frame], world[frame])
     return np.mean(line, axis=0)
 
 
@@ -31,7 +31,7 @@ def turn_for(degrees, distance=1.0):
         (len(root), 1),
     )
     touch = Touch(float(frame), tuple(WORDS), 20.0, 20.0)
-    return turn_to_ball(KICK.motion.skeleton, root, KICK.motion.rotations, ball, [touch], 60.0), ball[frame], frame
+    return compute_turn_to_ball(KICK.motion.skeleton, root, KICK.motion.rotations, ball, [touch], 60.0), ball[frame], frame
 
 
 @pytest.mark.parametrize("degrees", [50.0, -50.0, 75.0])
@@ -46,7 +46,7 @@ def test_the_foot_comes_near_the_ball(degrees):
 
 def test_a_ball_near_enough_turns_nobody_and_one_behind_only_so_far():
     assert not np.any(turn_for(5.0)[0])
-    assert np.abs(turn_for(170.0)[0]).max() == pytest.approx(MOST_TURN_TO_BALL)
+    assert np.abs(turn_for(170.0)[0]).max() == pytest.approx(MAX_TURN_TO_BALL)
 
 
 def test_without_a_ball_or_a_foot_nothing_turns():
@@ -55,5 +55,5 @@ def test_without_a_ball_or_a_foot_nothing_turns():
     ball = np.full((len(root), 3), 1.0)
     for words, path in ((tuple(WORDS), np.full((len(root), 3), np.nan)), (("header",), ball)):
         assert not np.any(
-            turn_to_ball(skeleton, root, rotations, path, [Touch(float(frame), words, 20.0, 20.0)], 60.0)
+            compute_turn_to_ball(skeleton, root, rotations, path, [Touch(float(frame), words, 20.0, 20.0)], 60.0)
         )

@@ -4,29 +4,29 @@ import numpy as np
 import pytest
 
 from beyond_mocap.motion import quaternion
-from beyond_mocap.motion.humanoid import identify
+from beyond_mocap.motion.humanoid import identify_joints
 from beyond_mocap.motion.motion import forward_kinematics
-from beyond_mocap.synthesis.construct.gaze import MOST_YAW, following, head_angles
-from beyond_mocap.synthesis.construct.pins import look_axis
-from beyond_mocap.synthetic.gait import gait
+from beyond_mocap.synthesis.construct.gaze import MAX_YAW, follow_with_gaze, compute_head_angles
+from beyond_mocap.synthesis.construct.pins import estimate_look_axis
+from beyond_mocap.synthetic.gait import build_gait
 
 FPS = 30.0
 
 
 @pytest.fixture(scope="module")
 def standing():
-    return gait(0.0, 6.0, FPS, seed=4)
+    return build_gait(0.0, 6.0, FPS, seed=4)
 
 
 @pytest.fixture(scope="module")
 def look(standing):
-    return look_axis(standing.skeleton, standing.rotations)
+    return estimate_look_axis(standing.skeleton, standing.rotations)
 
 
 def sight(motion, look):
     """(T, 3) unit where the head looks, and (T, 3) m where it is."""
     places, world = forward_kinematics(motion)
-    head = identify(motion.skeleton).head
+    head = identify_joints(motion.skeleton).head
     return quaternion.rotate(world[:, head], np.broadcast_to(look, (len(motion), 3))), places[:, head]
 
 
@@ -43,7 +43,7 @@ def test_the_gaze_is_on_a_ball_ahead(standing, look):
     angle, height = 0.8 * np.sin(0.9 * times), 1.6 + 1.2 * np.sin(0.7 * times)
     ball = np.column_stack([5.0 * np.cos(angle), 5.0 * np.sin(angle), height])
     assert off(standing, look, ball).max() > 0.6
-    assert np.degrees(off(following(standing, ball, look), look, ball)).max() < 3.0
+    assert np.degrees(off(follow_with_gaze(standing, ball, look), look, ball)).max() < 3.0
 
 
 @pytest.mark.parametrize("way", ["overhead", "behind", "beside"])
@@ -55,7 +55,7 @@ def test_nothing_snaps(standing, look, way):
         "behind": np.column_stack([-2.0 + 0 * x, 0.6 * x, 0.4 + 0 * x]),
         "beside": np.column_stack([x, 1.0 + 0 * x, 1.0 + 0 * x]),
     }[way]
-    way, _ = sight(following(standing, ball, look), look)
+    way, _ = sight(follow_with_gaze(standing, ball, look), look)
     speed = np.linalg.norm(np.diff(way, axis=0), axis=1) * FPS
     assert np.degrees(speed.max()) < 330.0
     assert np.degrees(np.abs(np.diff(speed)).max() * FPS) < 2500.0
@@ -66,11 +66,11 @@ def test_head_angles_have_no_edge_but_straight_up():
     turn = np.radians(np.arange(-180.0, 180.5, 0.5))
     for up in np.radians(np.arange(-70.0, 71.0, 10.0)):
         seen = np.column_stack([np.cos(up) * np.cos(turn), np.cos(up) * np.sin(turn), np.sin(up) + 0 * turn])
-        angles = head_angles(seen)
+        angles = compute_head_angles(seen)
         assert np.abs(np.diff(angles, axis=0)).max() < np.radians(2.5)
         np.testing.assert_allclose(angles[0], angles[-1], atol=1e-6)
-        assert np.abs(angles[:, 0]).max() <= MOST_YAW + 1e-9
-    mirrored = head_angles(seen * [1.0, -1.0, 1.0])
+        assert np.abs(angles[:, 0]).max() <= MAX_YAW + 1e-9
+    mirrored = compute_head_angles(seen * [1.0, -1.0, 1.0])
     np.testing.assert_allclose(mirrored * [-1.0, 1.0], angles, atol=1e-12)
 
 
@@ -78,18 +78,18 @@ def test_only_head_neck_and_chest_turn_and_only_by_their_share(standing, look):
     ball = np.tile([2.0, 4.0, 1.0], (len(standing), 1))
     share = np.zeros(len(standing))
     share[60:] = 1.0
-    found, body = following(standing, ball, look, share), identify(standing.skeleton)
+    found, body = follow_with_gaze(standing, ball, look, share), identify_joints(standing.skeleton)
     assert found.rotations[:60].tobytes() == standing.rotations[:60].tobytes()
     changed = np.flatnonzero(np.abs(found.rotations - standing.rotations).max(axis=(0, 2)) > 1e-9)
     assert set(changed) == {body.chest, body.neck, body.head}
-    still = following(standing, ball, look, chest=0.0)
+    still = follow_with_gaze(standing, ball, look, chest=0.0)
     np.testing.assert_allclose(still.rotations[:, body.chest], standing.rotations[:, body.chest], atol=1e-12)
 
 
 def test_nothing_to_see_changes_nothing(standing, look):
     ball = np.full((len(standing), 3), np.nan)
-    assert following(standing, ball, look) is standing
+    assert follow_with_gaze(standing, ball, look) is standing
     ball[:60] = [3.0, 2.0, 1.0]
-    found = following(standing, ball, look)
+    found = follow_with_gaze(standing, ball, look)
     assert np.all(np.isfinite(found.rotations))
     assert found.rotations[60:].tobytes() == standing.rotations[60:].tobytes()

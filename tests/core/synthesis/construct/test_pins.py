@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 
 from beyond_mocap.motion import quaternion
-from beyond_mocap.motion.humanoid import heading, identify
+from beyond_mocap.motion.humanoid import compute_heading, identify_joints
 from beyond_mocap.motion.motion import forward_kinematics
-from beyond_mocap.synthesis.construct.pins import FADE, MOST_SHIFT, look_axis, pinned
-from beyond_mocap.synthetic.gait import gait
+from beyond_mocap.synthesis.construct.pins import FADE, MAX_SHIFT, estimate_look_axis, apply_pins
+from beyond_mocap.synthetic.gait import build_gait
 
 
 @pytest.fixture(scope="module")
 def walk():
-    return gait(1.4, 4.0, 30.0)
+    return build_gait(1.4, 4.0, 30.0)
 
 
 def pin(time, part, position, hold=0.0):
@@ -22,7 +22,7 @@ def pin(time, part, position, hold=0.0):
 
 
 def joints(motion):
-    body = identify(motion.skeleton)
+    body = identify_joints(motion.skeleton)
     return {
         "left_hand": body.left.hand, "right_hand": body.right.hand, "left_foot": body.left.foot,
         "right_foot": body.right.foot, "gaze": body.head,
@@ -31,7 +31,7 @@ def joints(motion):
 
 def with_pins(motion, *pins, contacts=None):
     contacts = np.zeros((len(motion), 2), bool) if contacts is None else contacts
-    found = pinned(motion, contacts, pins, 0.0, look_axis(motion.skeleton, motion.rotations))
+    found = apply_pins(motion, contacts, pins, 0.0, estimate_look_axis(motion.skeleton, motion.rotations))
     after = type(motion)(motion.skeleton, found.root, found.rotations, motion.fps)
     return after, found, forward_kinematics(motion)[0], forward_kinematics(after)[0]
 
@@ -68,13 +68,13 @@ def test_who_is_too_short_bends_and_comes_nearer_with_his_feet_where_they_were(w
     still = np.repeat(walk.root_positions[:1], 60, 0), np.repeat(walk.rotations[:1], 60, 0)
     standing = type(walk)(walk.skeleton, *still, 30.0)
     hand, feet = joints(walk)["right_hand"], [joints(walk)[name] for name in ("left_foot", "right_foot")]
-    shoulder = forward_kinematics(standing)[0][30, identify(walk.skeleton).right.upper_arm]
-    reach = np.linalg.norm(walk.skeleton.offsets[[identify(walk.skeleton).right.lower_arm, hand]], axis=1).sum()
+    shoulder = forward_kinematics(standing)[0][30, identify_joints(walk.skeleton).right.upper_arm]
+    reach = np.linalg.norm(walk.skeleton.offsets[[identify_joints(walk.skeleton).right.lower_arm, hand]], axis=1).sum()
     place = shoulder + (reach + 0.2) * np.array([np.cos(-0.6), 0.0, np.sin(-0.6)])
     _, found, old, new = with_pins(standing, pin(1.0, "right_hand", place, 0.2), contacts=np.ones((60, 2), bool))
     assert found.miss[0] < 0.01
     assert np.abs(new[:, feet] - old[:, feet]).max() < 0.005
-    assert np.linalg.norm(new[:, 0] - old[:, 0], axis=1).max() < MOST_SHIFT + 0.05
+    assert np.linalg.norm(new[:, 0] - old[:, 0], axis=1).max() < MAX_SHIFT + 0.05
 
 
 def test_what_is_out_of_reach_is_told(walk):
@@ -85,8 +85,8 @@ def test_what_is_out_of_reach_is_told(walk):
 
 
 def test_a_gaze_turns_to_its_place_as_far_as_a_neck_can(walk):
-    facing, head = heading(walk)[60], joints(walk)["gaze"]
-    look = look_axis(walk.skeleton, walk.rotations)
+    facing, head = compute_heading(walk)[60], joints(walk)["gaze"]
+    look = estimate_look_axis(walk.skeleton, walk.rotations)
     for side, most in ((0.9, 0.02), (3.0, 2.0)):
         places, world = forward_kinematics(walk)
         place = places[60, head] + 6.0 * np.array([np.cos(facing + side), np.sin(facing + side), 0.1])

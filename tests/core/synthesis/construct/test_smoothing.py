@@ -8,9 +8,9 @@ from hypothesis import strategies as st
 from beyond_mocap.motion import quaternion
 from beyond_mocap.synthesis.construct.transitions import (
     LONGEST_SPREAD,
-    spread_reaches,
+    compute_spread_reaches,
     spread_rotations,
-    spread_share,
+    compute_spread_share,
     spread_values,
 )
 
@@ -26,23 +26,23 @@ def eq25(f, d, s):
 @pytest.mark.parametrize("reach", [1.0, 4.0, 7.5, 12.0])
 def test_it_is_eq_25(reach):
     offset = np.arange(-15, 16)
-    assert np.allclose(spread_share(offset, reach), [eq25(f, 0, reach) for f in offset])
-    assert spread_share(np.array([0]), reach)[0] == -0.5
-    assert spread_share(np.array([-1e-9]), reach)[0] == pytest.approx(0.5)
+    assert np.allclose(compute_spread_share(offset, reach), [eq25(f, 0, reach) for f in offset])
+    assert compute_spread_share(np.array([0]), reach)[0] == -0.5
+    assert compute_spread_share(np.array([-1e-9]), reach)[0] == pytest.approx(0.5)
 
 
 def test_the_bump_is_smooth_but_for_its_jump():
     offset = np.linspace(-14, 14, 2801)
-    slope = np.diff(spread_share(offset, 12.0)) / np.diff(offset)
+    slope = np.diff(compute_spread_share(offset, 12.0)) / np.diff(offset)
     away = np.abs(offset[:-1]) > 0.02
     assert np.max(np.abs(np.diff(slope)[away[1:] & away[:-1]])) < 1e-3
-    assert np.max(np.abs(spread_share(offset, 12.0))) <= 0.5
+    assert np.max(np.abs(compute_spread_share(offset, 12.0))) <= 0.5
 
 
 def test_reaches_never_overlap():
-    assert spread_reaches(np.array([10, 16, 60]), 100).tolist() == [3.0, 3.0, LONGEST_SPREAD]
-    assert spread_reaches(np.array([1]), 100).tolist() == [0.5]
-    assert spread_reaches(np.zeros(0, int), 50).tolist() == []
+    assert compute_spread_reaches(np.array([10, 16, 60]), 100).tolist() == [3.0, 3.0, LONGEST_SPREAD]
+    assert compute_spread_reaches(np.array([1]), 100).tolist() == [0.5]
+    assert compute_spread_reaches(np.zeros(0, int), 50).tolist() == []
 
 
 def stepped(count=80, seams=(30, 50), size=((1.0, -2.0), (0.5, 3.0))):
@@ -80,7 +80,7 @@ def test_the_second_difference_of_a_single_jump_is_spread():
 def test_nothing_outside_the_windows_is_touched():
     _, values, seams, ahead = stepped()
     out = spread_values(values, seams, ahead)
-    reach = spread_reaches(seams, len(values))
+    reach = compute_spread_reaches(seams, len(values))
     outside = np.all(np.abs(np.arange(len(values))[:, None] - seams) > reach, axis=1)
     assert outside.any() and np.array_equal(out[outside], values[outside])
 

@@ -5,14 +5,14 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from beyond_mocap.annotation.ball_contact import surfaces
-from beyond_mocap.annotation.striking import ball_gap
-from beyond_mocap.motion.contacts import detect
-from beyond_mocap.motion.humanoid import identify
-from beyond_mocap.motion.motion import Motion, pose_kinematics
-from beyond_mocap.synthesis.construct.strike import BALL_NOISE, MOST_DROP, MOST_MOVED, Touch, strike
+from beyond_mocap.annotation.ball_contact import build_surfaces
+from beyond_mocap.annotation.striking import measure_ball_gap
+from beyond_mocap.motion.contacts import detect_contacts
+from beyond_mocap.motion.humanoid import identify_joints
+from beyond_mocap.motion.motion import Motion, compute_pose
+from beyond_mocap.synthesis.construct.strike import BALL_NOISE, MAX_DROP, MAX_SHIFT, Touch, strike_ball
 from beyond_mocap.synthetic import gestures
-from beyond_mocap.synthetic.gait import gait
+from beyond_mocap.synthetic.gait import build_gait
 
 FPS = 30.0
 ENTRY = 8.0
@@ -21,19 +21,19 @@ KICK = ("kick", "low", "right")
 
 @pytest.fixture(scope="module")
 def kick():
-    return gestures.strike("kick low inside", fps=FPS)
+    return gestures.build_strike("kick low inside", fps=FPS)
 
 
 def kinematics(motion, struck=None):
     root, rotations = (motion.root_positions, motion.rotations) if struck is None else (struck.root, struck.rotations)
-    return pose_kinematics(motion.skeleton, root, rotations)
+    return compute_pose(motion.skeleton, root, rotations)
 
 
 def met(gesture, ball, *touches, contacts=None, **known):
     motion = gesture.motion
-    contacts = detect(motion) if contacts is None else contacts
+    contacts = detect_contacts(motion) if contacts is None else contacts
     path = np.broadcast_to(ball, (len(motion), 3)) if np.ndim(ball) == 1 else ball
-    return strike(motion.skeleton, motion.root_positions, motion.rotations, contacts, path, touches, FPS, **known)
+    return strike_ball(motion.skeleton, motion.root_positions, motion.rotations, contacts, path, touches, FPS, **known)
 
 
 def touch(gesture, words=KICK, at=0.0):
@@ -43,14 +43,14 @@ def touch(gesture, words=KICK, at=0.0):
 def natural_ball(gesture, at=0.0):
     """Where the right foot strikes a ball as recorded: ahead of the foot's middle, on the ground."""
     places, _ = kinematics(gesture.motion)
-    limb, frame = identify(gesture.motion.skeleton).right, int(round(gesture.key * FPS + at))
+    limb, frame = identify_joints(gesture.motion.skeleton).right, int(round(gesture.key * FPS + at))
     return np.array([*(0.5 * (places[frame, limb.foot] + places[frame, limb.toe]))[:2] + [0.2, 0.0], 0.11])
 
 
 def gaps(motion, struck, frame, words):
     """Gap of every part that the words name, at one frame."""
     pose = [values[frame] for values in kinematics(motion, struck)]
-    return [ball_gap(s.line(*pose), s.radius, struck.ball[frame]) for s in surfaces(motion.skeleton, words)]
+    return [measure_ball_gap(s.compute_line(*pose), s.radius, struck.ball[frame]) for s in build_surfaces(motion.skeleton, words)]
 
 
 def check_whole(motion, struck, changed=slice(None)):
@@ -62,7 +62,7 @@ def check_whole(motion, struck, changed=slice(None)):
     assert np.allclose(*lengths, atol=1e-9)
     assert np.array_equal(struck.root[:, :2], motion.root_positions[:, :2])
     sunk = motion.root_positions[:, 2] - struck.root[:, 2]
-    assert sunk.min() >= 0.0 and sunk.max() <= MOST_DROP + 1e-9
+    assert sunk.min() >= 0.0 and sunk.max() <= MAX_DROP + 1e-9
     assert struck.ball[:, 2].min() >= 0.11
     outside = np.ones(len(motion), bool)
     outside[changed] = False
@@ -77,7 +77,7 @@ def test_a_ball_in_reach_is_met_in_both_frames_around_the_moment(kick, off, at):
     frame = kick.key * FPS + at
     first, last = (int(f(frame - 1e-6)) for f in (np.floor, np.ceil))
     assert struck.gap[0] < 0.005 and struck.ball_shift[0] <= BALL_NOISE + 1e-9
-    assert struck.moved[0] <= MOST_MOVED["foot"] + 1e-3
+    assert struck.moved[0] <= MAX_SHIFT["foot"] + 1e-3
     check_whole(kick.motion, struck, slice(int(frame - ENTRY), int(frame + ENTRY) + 2))
     near = int(round(frame))
     assert abs(gaps(kick.motion, struck, near, KICK)[0]) < 0.005
@@ -93,11 +93,11 @@ def test_a_ball_within_its_noise_comes_to_the_foot_as_recorded(kick):
 
 def test_the_other_foot_and_a_standing_foot_stay(kick):
     struck = met(kick, natural_ball(kick) + [0.4, 0.0, 0.0], touch(kick))
-    body = identify(kick.motion.skeleton)
+    body = identify_joints(kick.motion.skeleton)
     before, after = kinematics(kick.motion)[0], kinematics(kick.motion, struck)[0]
     assert struck.moved[0] > 0.1
     assert np.abs(after - before)[:, [body.left.foot, body.left.toe]].max() < 0.002
-    standing = detect(kick.motion)[:, 1]
+    standing = detect_contacts(kick.motion)[:, 1]
     assert np.abs(after - before)[standing][:, body.right.foot].max() < 0.002
 
 
@@ -112,7 +112,7 @@ def test_no_pop(kick):
 
 def knee(motion, struck=None):
     """(T,) degrees inside the right knee."""
-    places, limb = kinematics(motion, struck)[0], identify(motion.skeleton).right
+    places, limb = kinematics(motion, struck)[0], identify_joints(motion.skeleton).right
     up, down = (places[:, joint] - places[:, limb.lower_leg] for joint in (limb.upper_leg, limb.foot))
     cosine = np.sum(up * down, axis=1) / np.linalg.norm(up, axis=1) / np.linalg.norm(down, axis=1)
     return np.degrees(np.arccos(cosine))
@@ -128,14 +128,14 @@ def test_the_knee_neither_locks_nor_snaps(kick, off):
 
 
 def test_a_ball_does_not_lie_in_the_other_leg(kick):
-    body, frame = identify(kick.motion.skeleton), int(round(kick.key * FPS))
+    body, frame = identify_joints(kick.motion.skeleton), int(round(kick.key * FPS))
     ankle = kinematics(kick.motion)[0][frame, body.left.foot]
     struck = met(kick, np.array([*ankle[:2], 0.11]), touch(kick))
     pose = [values[frame] for values in kinematics(kick.motion, struck)]
-    left, _ = surfaces(kick.motion.skeleton, ("kick",))
+    left, _ = build_surfaces(kick.motion.skeleton, ("kick",))
     shin = tuple(pose[0][joint] for joint in (body.left.lower_leg, body.left.foot))
     assert struck.moved[0] > 0.0
-    assert min(ball_gap(line, left.radius, struck.ball[frame]) for line in (left.line(*pose), shin)) > -1e-6
+    assert min(measure_ball_gap(line, left.radius, struck.ball[frame]) for line in (left.compute_line(*pose), shin)) > -1e-6
 
 
 @pytest.mark.parametrize("off", [(2.0, 0.0), (-1.5, 1.0), (0.0, -3.0)])
@@ -178,15 +178,15 @@ class Walk(NamedTuple):
 
 @pytest.fixture(scope="module")
 def walk():
-    return Walk(gait(1.4, 2.0, FPS))
+    return Walk(build_gait(1.4, 2.0, FPS))
 
 
 @pytest.mark.parametrize("words", [("header",), ("throwb",), ("throw", "left"), ("receive", "body")])
 def test_head_chest_and_hands_meet_a_ball_of_unknown_height(walk, words):
     places, _ = kinematics(walk.motion)
     near = int(walk.key * FPS)
-    ball = np.array([*places[near, identify(walk.motion.skeleton).head, :2] + [0.2, 0.1], 0.11])
-    struck = met(walk, ball, touch(walk, words), height_known=np.zeros(len(walk.motion), bool))
+    ball = np.array([*places[near, identify_joints(walk.motion.skeleton).head, :2] + [0.2, 0.1], 0.11])
+    struck = met(walk, ball, touch(walk, words), is_height_known=np.zeros(len(walk.motion), bool))
     assert struck.gap[0] < 0.005 and struck.ball[near, 2] > 0.5
     check_whole(walk.motion, struck)
     assert max(map(abs, gaps(walk.motion, struck, near, words))) < 0.005
@@ -194,14 +194,14 @@ def test_head_chest_and_hands_meet_a_ball_of_unknown_height(walk, words):
 
 
 def test_a_ball_of_unknown_height_flies_freely(walk):
-    ball = kinematics(walk.motion)[0][30, identify(walk.motion.skeleton).head] * [1.0, 1.0, 0.0] + [0.25, 0.0, 0.11]
-    struck = met(walk, ball, touch(walk, ("header",)), height_known=np.zeros(len(walk.motion), bool))
+    ball = kinematics(walk.motion)[0][30, identify_joints(walk.motion.skeleton).head] * [1.0, 1.0, 0.0] + [0.25, 0.0, 0.11]
+    struck = met(walk, ball, touch(walk, ("header",)), is_height_known=np.zeros(len(walk.motion), bool))
     fall = np.diff(struck.ball[30:42, 2], 2) * FPS**2
     assert np.allclose(fall, -9.81, atol=1e-6)
 
 
 def test_the_head_bends_to_a_ball_of_known_height(walk):
-    head = kinematics(walk.motion)[0][30, identify(walk.motion.skeleton).head]
+    head = kinematics(walk.motion)[0][30, identify_joints(walk.motion.skeleton).head]
     struck = met(walk, head + [0.58, 0.1, 0.2], touch(walk, ("header",)))
     assert struck.gap[0] < 0.005 and 0.02 < struck.moved[0] < 0.2
     assert np.array_equal(struck.root, walk.motion.root_positions)
@@ -233,7 +233,7 @@ def test_inputs_are_not_changed_and_results_repeat(kick):
 def reaching(walk):
     """A ball that flies past the left hand, ten metres a second, nearest 6 frames after frame 30."""
     places, _ = kinematics(walk.motion)
-    wrist = places[36, identify(walk.motion.skeleton).left.hand]
+    wrist = places[36, identify_joints(walk.motion.skeleton).left.hand]
     seconds = (np.arange(len(walk.motion)) - 36) / FPS
     return wrist + [0.05, 0.25, 0.1] + seconds[:, None] * [-10.0, 0.0, 0.0]
 
@@ -245,7 +245,7 @@ def test_a_hand_meets_the_ball_on_the_flight_of_a_dive(walk):
     assert struck.gap[0] < 0.005 and struck.ball_shift[0] <= BALL_NOISE + 1e-9
     check_whole(walk.motion, struck, slice(20, 56))
     before, after = kinematics(walk.motion)[0], kinematics(walk.motion, struck)[0]
-    other = identify(walk.motion.skeleton).right.hand
+    other = identify_joints(walk.motion.skeleton).right.hand
     assert np.allclose(before[:, other], after[:, other], atol=1e-9)  # the other arm stays with the dive
 
 

@@ -20,24 +20,24 @@ def test_jerk_is_the_third_derivative():
     t = np.arange(50) / FPS
     positions = np.zeros((50, 3, 3))
     positions[:, 1, 2] = 5.0 * t**3
-    np.testing.assert_allclose(movement.jerk(positions, FPS), 30.0, rtol=1e-6)
-    assert len(movement.jerk(positions[:3], FPS)) == 0
+    np.testing.assert_allclose(movement.compute_jerk(positions, FPS), 30.0, rtol=1e-6)
+    assert len(movement.compute_jerk(positions[:3], FPS)) == 0
 
 
 @pytest.mark.parametrize("step", [0.0, 0.05])
 def test_a_jolt_raises_the_ratio_only_at_its_seam(step):
     speed = np.full(400, 1.5)
-    real = movement.real_p95(*movement.uncut_windows(movement.jerk(smooth(), FPS), speed))
+    real = movement.compute_real_p95(*movement.collect_uncut_windows(movement.compute_jerk(smooth(), FPS), speed))
     positions = smooth(seed=2)
     positions[200:] += [0.0, step, 0.0]
-    values = movement.jerk(positions, FPS)
-    ratios = movement.seam_ratios(values, np.array([100, 200, 300]), speed, real)
+    values = movement.compute_jerk(positions, FPS)
+    ratios = movement.compute_transition_ratios(values, np.array([100, 200, 300]), speed, real)
     assert ratios[[0, 2]].max() < 2.0
     # the third differences of a step s are s, -2 s, s
     if step:
         assert ratios[1] == pytest.approx(2 * step * FPS**3 / real[1], rel=0.1)
-        assert movement.rest_ratios(values, np.array([100, 200, 300]), speed, real).max() < 2.0
-        assert movement.rest_ratios(values, np.array([100, 300]), speed, real).max() == pytest.approx(ratios[1])
+        assert movement.compute_rest_ratios(values, np.array([100, 200, 300]), speed, real).max() < 2.0
+        assert movement.compute_rest_ratios(values, np.array([100, 300]), speed, real).max() == pytest.approx(ratios[1])
     else:
         assert ratios[1] < 2.0
 
@@ -46,23 +46,23 @@ def test_a_jolt_raises_the_ratio_only_at_its_seam(step):
 def test_the_window_reaches_eight_frames_each_way(seam):
     positions = np.zeros((400, 1, 3))
     positions[200:] += 0.1
-    values = movement.jerk(positions, FPS)
+    values = movement.compute_jerk(positions, FPS)
     real = np.ones(5)
-    assert movement.seam_ratios(values, np.array([seam]), np.zeros(400), real) > 0
+    assert movement.compute_transition_ratios(values, np.array([seam]), np.zeros(400), real) > 0
     beyond = seam + 3 * np.sign(seam - 200)
-    assert movement.seam_ratios(values, np.array([beyond]), np.zeros(400), real) == 0
+    assert movement.compute_transition_ratios(values, np.array([beyond]), np.zeros(400), real) == 0
 
 
 def test_real_windows_are_whole_and_by_speed():
     values = np.concatenate([np.full(100, 10.0), np.full(100, 50.0)])
     speed = np.concatenate([np.full(102, 0.5), np.full(101, 2.5)])
-    windows, at = movement.uncut_windows(values, speed)
+    windows, at = movement.collect_uncut_windows(values, speed)
     assert len(windows) == len(at) == 200 - 16
-    real = movement.real_p95(windows, at)
+    real = movement.compute_real_p95(windows, at)
     assert real[2] == 50.0 and real[3] == real[4] == 50.0 and real[0] <= 50.0
-    assert len(movement.uncut_windows(values[:10], speed[:13])[0]) == 0
+    assert len(movement.collect_uncut_windows(values[:10], speed[:13])[0]) == 0
 
 
 def test_no_seams_no_ratios():
-    assert len(movement.seam_ratios(np.ones(50), np.array([], int), np.ones(53), np.ones(5))) == 0
-    assert len(movement.seam_ratios(np.zeros(0), np.array([1]), np.ones(2), np.ones(5))) == 0
+    assert len(movement.compute_transition_ratios(np.ones(50), np.array([], int), np.ones(53), np.ones(5))) == 0
+    assert len(movement.compute_transition_ratios(np.zeros(0), np.array([1]), np.ones(2), np.ones(5))) == 0

@@ -45,7 +45,7 @@ def test_it_is_eq_18_of_each_block(rows, asked, data):
     cost = AnnotationCost(frames_with(rows))
     start = np.array(data.draw(st.lists(st.integers(0, len(rows) - len(asked)), min_size=1, max_size=4)))
     expected = [eq18(asked, rows[s : s + len(asked)]) for s in start]
-    assert np.allclose(cost.of_blocks(start, asked), expected)
+    assert np.allclose(cost.compute_block_costs(start, asked), expected)
 
 
 @pytest.mark.parametrize(
@@ -66,33 +66,33 @@ def test_faustino_s_own_frames(asked, carried, cost):
         vocabulary=("kick", "running", "walking"),
     )
     frames = type("Frames", (SimpleNamespace,), {"__len__": lambda self: len(self.words)})(**vars(frames))
-    assert AnnotationCost(frames).of_blocks(np.array([0]), [frozenset(asked)]).tolist() == [cost]
+    assert AnnotationCost(frames).compute_block_costs(np.array([0]), [frozenset(asked)]).tolist() == [cost]
 
 
 def test_transitions_count_neither_way():
     cost = AnnotationCost(frames_with([{"walking"}] * 4))
     asked = [frozenset({"walking"}), None, None, None]
-    assert cost.of_blocks(np.array([0]), asked).tolist() == [-1.0]
-    assert cost.of_blocks(np.array([0]), [None] * 4).tolist() == [0.0]
+    assert cost.compute_block_costs(np.array([0]), asked).tolist() == [-1.0]
+    assert cost.compute_block_costs(np.array([0]), [None] * 4).tolist() == [0.0]
 
 
 def test_sums_and_counts_are_added_before_dividing():
     cost = AnnotationCost(frames_with([{"walking"}, {"jogging", "kick", "right"}]))
     # 1 word shared of 1, then 0 of 4: (1 - 4) / 5, not the mean of -1 and 1
-    assert cost.of_blocks(np.array([0]), [frozenset({"walking"})] * 2).tolist() == [pytest.approx(3 / 5)]
+    assert cost.compute_block_costs(np.array([0]), [frozenset({"walking"})] * 2).tolist() == [pytest.approx(3 / 5)]
 
 
 def test_a_block_beyond_the_library_still_has_a_cost():
     cost = AnnotationCost(frames_with([{"walking"}] * 6))
     asked = [frozenset({"walking"})] * 8
-    inside, beyond, before = cost.of_blocks(np.array([0, 4, -4]), asked)
+    inside, beyond, before = cost.compute_block_costs(np.array([0, 4, -4]), asked)
     assert np.isfinite([inside, beyond, before]).all() and -1.0 <= inside <= min(beyond, before)
 
 
 def test_missing_share(library):
     cost = AnnotationCost(library.frames)
-    share = cost.missing_share(frozenset({"walking", "left"}))
+    share = cost.compute_missing_share(frozenset({"walking", "left"}))
     carried = [library.clips[c].words_at(s) for c, s in zip(library.frames.clip, library.frames.source)]
     assert np.allclose(share, [1 - len({"walking", "left"} & words) / 2 for words in carried])
-    assert np.all(cost.missing_share(frozenset({"header"})) == 1.0)
-    assert np.all(cost.missing_share(frozenset()) == 1.0)
+    assert np.all(cost.compute_missing_share(frozenset({"header"})) == 1.0)
+    assert np.all(cost.compute_missing_share(frozenset()) == 1.0)

@@ -3,19 +3,19 @@
 import numpy as np
 import pytest
 
-from beyond_mocap.base.errors import Cancelled
-from beyond_mocap.library.build import build
+from beyond_mocap.base.errors import UserCancelledError
+from beyond_mocap.library.build import build_library
 from beyond_mocap.synthesis.plan import Plan
 from beyond_mocap.synthesis.resolve_plan import resolve_plan
 from beyond_mocap.synthesis.search.block_costs import AnnotationCost
-from beyond_mocap.synthesis.search.blocks import FINEST, BlockSearch
-from beyond_mocap.synthesis.search.distance import frames_of, straight_edit
-from beyond_mocap.synthesis.search.wanted import build_order, pool_frame
+from beyond_mocap.synthesis.search.blocks import FINEST_LENGTH, BlockSearch
+from beyond_mocap.synthesis.search.distance import list_block_frames, build_straight_edit
+from beyond_mocap.synthesis.search.wanted import build_request, library_frame
 
 
 def shown(library, order, alpha=0.2):
     """Clip and library frame of every output frame as the search found them."""
-    clip, frame = frames_of(BlockSearch(library, order, alpha).run())
+    clip, frame = list_block_frames(BlockSearch(library, order, alpha).run())
     return clip[: len(order)], frame[: len(order)]
 
 
@@ -39,16 +39,16 @@ def test_a_key_moment_is_shown_at_exactly_its_frame(library, order, time):
     clip, frame = shown(library, asked)
     at = int(round(asked.keys[0].frame))
     key = asked.keys[0].choices[0]
-    assert clip[at] == key.clip and frame[at] == round(pool_frame(library, key))
+    assert clip[at] == key.clip and frame[at] == round(library_frame(library, key))
 
 
 def test_several_key_moments_each_at_its_own(library, order):
     asked = order((1.0, "kick right"), (3.5, "kick left"), (6.0, "kick"))
     search = BlockSearch(library, asked, 0.2)
-    edit = straight_edit(search, search.run())
-    assert [key.wanted for key in edit.keys] == [0, 1, 2]
+    edit = build_straight_edit(search, search.run())
+    assert [key.number for key in edit.keys] == [0, 1, 2]
     for placed in edit.keys:
-        at = int(round(asked.keys[placed.wanted].frame))
+        at = int(round(asked.keys[placed.number].frame))
         assert edit.clip[at] == placed.key.clip
         assert library.frames.source[int(edit.frame[at])] == pytest.approx(placed.key.frame, abs=1.0)
 
@@ -87,7 +87,7 @@ def test_the_blocks_chosen_have_the_best_words(library, order):
     asked = order((0.0, 8.0, "jogging front"))
     search = BlockSearch(library, asked, 1.0)
     blocks = search.run()
-    cost = AnnotationCost(library.frames).of_blocks(blocks.start[:-2], [frozenset({"jogging", "front"})] * FINEST)
+    cost = AnnotationCost(library.frames).compute_block_costs(blocks.start[:-2], [frozenset({"jogging", "front"})] * FINEST_LENGTH)
     assert np.all(cost == -1.0)
 
 
@@ -111,12 +111,12 @@ def test_short_motions(library, order, track_of, seconds):
 def test_clips_shorter_than_the_longest_block(tmp_path, clip_file, track_of, seconds):
     clip_file(tmp_path / "walk.bvh", 1.4, seconds)
     clip_file(tmp_path / "jog.bvh", 2.8, seconds, "jogging")
-    library = build(tmp_path)
-    asked = build_order(library, resolve_plan(Plan(track=track_of(1.4, 3.0)), library))
+    library = build_library(tmp_path)
+    asked = build_request(library, resolve_plan(Plan(track=track_of(1.4, 3.0)), library))
     clip, frame = shown(library, asked)
     assert len(clip) == 91 and {library.clips[c].path for c in clip} <= {"walk.bvh", "jog.bvh"}
     search = BlockSearch(library, asked, 0.2)
-    assert len(straight_edit(search, search.run())) == 91
+    assert len(build_straight_edit(search, search.run())) == 91
 
 
 def test_the_same_order_gives_the_same_blocks(library, order):
@@ -128,5 +128,5 @@ def test_it_can_be_stopped_and_tells_how_far_it_is(library, order):
     told = []
     BlockSearch(library, order(), 0.2, lambda fraction, text: told.append(fraction)).run()
     assert told == sorted(told) and 0.0 <= told[0] and told[-1] <= 1.0
-    with pytest.raises(Cancelled):
+    with pytest.raises(UserCancelledError):
         BlockSearch(library, order(), 0.2, cancelled=lambda: True).run()

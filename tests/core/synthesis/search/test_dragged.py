@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from beyond_mocap.library.build import build
+from beyond_mocap.library.build import build_library
 from beyond_mocap.synthesis.plan import Plan
 from beyond_mocap.synthesis.resolve_plan import resolve_plan
-from beyond_mocap.synthesis.search.dragged import left_out
+from beyond_mocap.synthesis.search.dragged import report_left_out
 from beyond_mocap.synthesis.search.path_search import PathSearch
-from beyond_mocap.synthesis.search.slots import KEY_RATES
-from beyond_mocap.synthesis.search.wanted import build_order
+from beyond_mocap.synthesis.search.slots import KEY_PLAYBACK_RATES
+from beyond_mocap.synthesis.search.wanted import build_request
 from beyond_mocap.synthesis.synthesize import synthesize
 
 KEY, ENTRY = 4.0, 1.2
@@ -23,14 +23,14 @@ def with_header(tmp_path_factory, clip_file):
         clip_file(folder / f"{name}.bvh", speed, 5.0, words, seed=3)
     clip_file(folder / "header.bvh", 0.0, 4.0, None, seed=5)
     (folder / "header.txt").write_text(f"{2.0 - ENTRY:g} {2.0 + ENTRY:g} header standing\n2 header standing\n")
-    return build(folder)
+    return build_library(folder)
 
 
 @pytest.fixture(scope="module")
 def search(with_header, track_of, timeline_of):
     def make(speed):
         plan = Plan(track=track_of(speed), timeline=timeline_of((KEY, "header standing")))
-        return PathSearch(with_header, build_order(with_header, resolve_plan(plan, with_header)))
+        return PathSearch(with_header, build_request(with_header, resolve_plan(plan, with_header)))
 
     return make
 
@@ -49,7 +49,7 @@ def test_who_runs_up_and_stops_keeps_running_and_plays_the_exit(search):
     looked = search(lambda t: np.where(t < KEY, 4.5, 0.0))
     edit, first, last = header_shown(looked)
     assert -0.6 < first < -0.2 and last > ENTRY - 0.15
-    told = left_out(looked.library, looked.wanted, edit)
+    told = report_left_out(looked.library, looked.wanted, edit)
     assert len(told) == 1 and "entry of the clip for 'header standing' is left out" in told[0]
 
 
@@ -57,17 +57,17 @@ def test_who_stands_and_runs_off_plays_the_entry_and_runs(search):
     looked = search(lambda t: np.where(t < KEY, 0.0, 4.5))
     edit, first, last = header_shown(looked)
     assert first < 0.15 - ENTRY and 0.2 < last < 0.6
-    told = left_out(looked.library, looked.wanted, edit)
+    told = report_left_out(looked.library, looked.wanted, edit)
     assert len(told) == 1 and "exit of the clip" in told[0]
 
 
 @pytest.mark.parametrize("speed", [0.0, 0.5])
 def test_who_stands_has_the_whole_clip_and_no_choice(search, speed):
     looked = search(speed)
-    assert len(looked.pieces.wanted) == len(looked.wanted.keys[0].choices) * len(KEY_RATES)
+    assert len(looked.pieces.number) == len(looked.wanted.keys[0].choices) * len(KEY_PLAYBACK_RATES)
     edit, first, last = header_shown(looked)
     assert first < 0.15 - ENTRY / 1.3 and last > ENTRY / 1.3 - 0.15
-    assert left_out(looked.library, looked.wanted, edit) == []
+    assert report_left_out(looked.library, looked.wanted, edit) == []
 
 
 @pytest.mark.parametrize("method", ["path", "distance"])

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from beyond_mocap.synthesis.search.offer import RATES, SLOT
+from beyond_mocap.synthesis.search.offer import PLAYBACK_RATES, SLOT
 from beyond_mocap.synthesis.search.path_costs import PathCosts, Weights
 
-NORMAL = int(np.flatnonzero(RATES == 1.0)[0])
+NORMAL = int(np.flatnonzero(PLAYBACK_RATES == 1.0)[0])
 NONE = Weights(**{name: 0.0 for name in vars(Weights())})
 
 
@@ -23,7 +23,7 @@ def costs(library, asked, **weights):
 
 
 def misfit(found, frames):
-    return found.misfit(60, 60 + SLOT, np.full(len(frames), NORMAL), frames)
+    return found.compute_misfit(60, 60 + SLOT, np.full(len(frames), NORMAL), frames)
 
 
 @pytest.mark.parametrize("path, speed", [("stand.bvh", 0.0), ("walk.bvh", 1.4), ("jog.bvh", 2.8), ("run.bvh", 5.0)])
@@ -60,19 +60,19 @@ def test_words_that_lack_and_actions_that_nobody_asked_for_cost(library, order):
 
 def test_a_cut_costs_what_the_standing_foot_would_jump(library, order):
     frames = frames_of(library, "walk.bvh")
-    stands = library.feet_standing[frames]
+    stands = library.feet_in_contact[frames]
     one = frames[stands[:, 0] & ~stands[:, 1]]
-    found = costs(library, order()).feet_apart(one[:, None], one)
+    found = costs(library, order()).measure_foot_jump(one[:, None], one)
     feet = library.frames.feet[one, :2]
     assert np.allclose(found, np.linalg.norm(feet[:, None] - feet, axis=-1), atol=1e-6)
     other = frames[~stands[:, 0] & stands[:, 1]]
-    assert not np.any(costs(library, order()).feet_apart(one[:, None], other))
+    assert not np.any(costs(library, order()).measure_foot_jump(one[:, None], other))
 
 
 def test_the_cheapest_are_the_cheapest(library, order, track_of):
     found = PathCosts(library, order(track=track_of(1.4)))
-    number, frame, cost = found.cheapest(60, 68, 10**6, 20)
-    every = np.indices(found.offer.speed.shape).reshape(2, -1)
-    whole = np.sort(found.misfit(60, 68, *every))
+    number, frame, cost = found.find_cheapest(60, 68, 10**6, 20)
+    every = np.indices(found.index.speed.shape).reshape(2, -1)
+    whole = np.sort(found.compute_misfit(60, 68, *every))
     assert np.allclose(np.sort(cost), whole[:20], atol=1e-5)
-    assert np.allclose(cost, found.misfit(60, 68, number, frame), atol=1e-5)
+    assert np.allclose(cost, found.compute_misfit(60, 68, number, frame), atol=1e-5)

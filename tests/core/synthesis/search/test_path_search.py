@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from beyond_mocap.base.errors import Cancelled, InputError
-from beyond_mocap.library.build import build
+from beyond_mocap.base.errors import UserCancelledError, InputError
+from beyond_mocap.library.build import build_library
 from beyond_mocap.synthesis.plan import Plan
 from beyond_mocap.synthesis.resolve_plan import resolve_plan
-from beyond_mocap.synthesis.search.path_search import Between, PathSearch
-from beyond_mocap.synthesis.search.wanted import build_order
+from beyond_mocap.synthesis.search.path_search import SearchStretch, PathSearch
+from beyond_mocap.synthesis.search.wanted import build_request
 
 
 def found(library, asked):
@@ -37,7 +37,7 @@ def test_every_frame_shows_a_clip_played_forward(library, order, lines):
 def test_a_key_moment_is_on_time(library, order, time):
     asked = order((time, "kick right"))
     edit = found(library, asked)
-    assert [key.wanted for key in edit.keys] == [0]
+    assert [key.number for key in edit.keys] == [0]
     at = asked.keys[0].frame
     near = int(round(at))
     assert edit.clip[near] == edit.keys[0].key.clip
@@ -86,18 +86,18 @@ def test_it_can_be_stopped_and_tells_how_far_it_is(library, order):
     told = []
     PathSearch(library, order(), progress=lambda fraction, text: told.append(fraction)).run()
     assert told == sorted(told) and 0.0 <= told[0] and told[-1] <= 1.0
-    with pytest.raises(Cancelled):
+    with pytest.raises(UserCancelledError):
         PathSearch(library, order(), cancelled=lambda: True).run()
 
 
 def test_a_stretch_is_searched_between_frames_that_stay(library, order):
     before = found(library, order((4.0, "kick right")))
     after = order((4.3, "kick right"))
-    edit = PathSearch(library, after, between=Between(replace(before, keys=()), 60, 180)).run()
+    edit = PathSearch(library, after, stretch=SearchStretch(replace(before, keys=()), 60, 180)).run()
     outside = np.r_[0:60, 180:241]
     assert np.array_equal(edit.clip[outside], before.clip[outside])
     assert np.array_equal(edit.frame[outside], before.frame[outside])
-    assert [seam for seam in edit.seams if not 60 <= seam <= 180] == [s for s in before.seams if not 60 <= s <= 180]
+    assert [seam for seam in edit.transitions if not 60 <= seam <= 180] == [s for s in before.transitions if not 60 <= s <= 180]
     key, = edit.keys
     near = int(round(after.keys[0].frame))
     assert edit.clip[near] == key.key.clip
@@ -110,9 +110,9 @@ def test_a_stretch_whose_order_is_the_same_is_joined_without_a_cut(library, orde
     """A steady walk, cut nowhere: what is shown goes on, so coming back to it costs nothing and leaving it does."""
     asked = order(track=track_of(1.4, seconds=4.0))
     before = found(library, asked)
-    assert len(before.seams) == 0
-    edit = PathSearch(library, asked, between=Between(before, 40, 80)).run()
-    assert len(edit.seams) == 0 and np.allclose(edit.frame, before.frame)
+    assert len(before.transitions) == 0
+    edit = PathSearch(library, asked, stretch=SearchStretch(before, 40, 80)).run()
+    assert len(edit.transitions) == 0 and np.allclose(edit.frame, before.frame)
 
 
 def test_in_a_hurry_the_rest_is_searched_quickly(library, order):
@@ -122,18 +122,18 @@ def test_in_a_hurry_the_rest_is_searched_quickly(library, order):
     )
     edit = search.run()
     whole = found(library, asked)
-    assert 70 < search.hurried < 100 and len(edit) == 241
-    assert search.width.beam < 10
+    assert 70 < search.hurried_from < 100 and len(edit) == 241
+    assert search.width.beam_width < 10
     assert [key.key.clip for key in edit.keys] == [key.key.clip for key in whole.keys]
-    with pytest.raises(Cancelled):
+    with pytest.raises(UserCancelledError):
         PathSearch(library, asked, hurry=lambda: True).run()
 
 
 def test_clips_shorter_than_a_slot_are_told(tmp_path, clip_file, track_of):
     clip_file(tmp_path / "walk.bvh", 1.4, 0.2)
-    library = build(tmp_path)
+    library = build_library(tmp_path)
     with pytest.raises(InputError, match="no clip of more than 8 frames"):
-        found(library, build_order(library, resolve_plan(Plan(track=track_of()), library)))
+        found(library, build_request(library, resolve_plan(Plan(track=track_of()), library)))
 
 
 def test_a_narrow_search_is_one_hurried_from_its_second_slot_on(library, order):
@@ -141,5 +141,5 @@ def test_a_narrow_search_is_one_hurried_from_its_second_slot_on(library, order):
     narrow = PathSearch(library, asked, narrow=True)
     hurried = PathSearch(library, asked, hurry=lambda: next(questions) > 1)
     one, other = narrow.run(), hurried.run()
-    assert narrow.hurried == hurried.hurried == narrow.edges[1]
+    assert narrow.hurried_from == hurried.hurried_from == narrow.edges[1]
     assert np.array_equal(one.frame, other.frame) and narrow.width == hurried.width

@@ -7,11 +7,11 @@ from beyond_mocap.synthesis.search.offer import SLOT
 from beyond_mocap.synthesis.search.path_search import PathSearch
 from beyond_mocap.synthesis.search.touched import (
     RUN_UP,
-    asked_otherwise,
-    kept_keys,
-    lies_elsewhere,
-    stretches,
-    to_search,
+    find_changed_frames,
+    list_unchanged_keys,
+    find_moved_frames,
+    list_stretches,
+    find_stretches_to_search,
 )
 
 
@@ -33,25 +33,25 @@ def searched(library, order, long):
 
 def test_nothing_changed_nothing_touched(library, searched):
     asked, edit = searched((10.0, "kick"))
-    assert not lies_elsewhere(asked, asked).any() and not asked_otherwise(asked, asked, SLOT).any()
-    assert to_search(library, edit, asked, asked, SLOT) == []
-    assert kept_keys(edit, asked, asked) == edit.keys
+    assert not find_moved_frames(asked, asked).any() and not find_changed_frames(asked, asked, SLOT).any()
+    assert find_stretches_to_search(library, edit, asked, asked, SLOT) == []
+    assert list_unchanged_keys(edit, asked, asked) == edit.keys
 
 
 def test_a_moved_key_moment_touches_both_places_and_a_run_up(library, order, searched, long):
     before, edit = searched((10.0, "kick right"))
     after = order((10.4, "kick right"), track=long)
-    (first, end), = to_search(library, edit, before, after, SLOT)
+    (first, end), = find_stretches_to_search(library, edit, before, after, SLOT)
     assert 7.0 * 30 < first < (10.0 - RUN_UP) * 30 and (10.4 + RUN_UP) * 30 < end < 13.5 * 30
-    assert kept_keys(edit, before, after) == ()
+    assert list_unchanged_keys(edit, before, after) == ()
 
 
 def test_a_key_moment_that_stays_is_gone_round(library, order, searched, long):
     """Its clip begins within the run-up of the change, so the stretch ends before it."""
     before, edit = searched((4.0, 7.0, "walking"), (9.0, "kick right"))
     after = order((4.0, 7.0, "jogging"), (9.0, "kick right"), track=long)
-    (first, end), = to_search(library, edit, before, after, SLOT)
-    kick, = kept_keys(edit, before, after)
+    (first, end), = find_stretches_to_search(library, edit, before, after, SLOT)
+    kick, = list_unchanged_keys(edit, before, after)
     rate = 30.0 / library.clips[kick.key.clip].motion.fps
     assert first < 4.0 * 30 and 7.0 * 30 <= end <= 270 - np.floor((kick.key.frame - kick.key.start) * rate) + 1
 
@@ -59,23 +59,23 @@ def test_a_key_moment_that_stays_is_gone_round(library, order, searched, long):
 def test_the_kept_keys_have_their_new_numbers(order, searched, long):
     before, edit = searched((5.0, "kick right"), (15.0, "kick left"))
     after = order((15.0, "kick left"), track=long)
-    kept, = kept_keys(edit, before, after)
-    assert kept.wanted == 0 and kept.key == edit.keys[1].key
+    kept, = list_unchanged_keys(edit, before, after)
+    assert kept.number == 0 and kept.key == edit.keys[1].key
 
 
 def test_a_key_moment_asked_twice_is_as_it_was(library, searched):
     asked, edit = searched((10.0, "kick right"), (10.0, "kick right"))
     assert len(edit.keys) == 1
-    assert to_search(library, edit, asked, asked, SLOT) == [] and kept_keys(edit, asked, asked) == edit.keys
+    assert find_stretches_to_search(library, edit, asked, asked, SLOT) == [] and list_unchanged_keys(edit, asked, asked) == edit.keys
 
 
 def test_faster_is_another_thing_to_ask_for_and_elsewhere_is_not(order, long, track_of):
     before = order(track=long)
     aside = type(long)(long.times, long.positions + [0.0, 0.5])
     faster = track_of(lambda t: 1.4 + 0.3 * (t > 10.0), seconds=20.0)
-    assert lies_elsewhere(before, order(track=aside)).all()
-    assert not asked_otherwise(before, order(track=aside), SLOT).any()
-    off = np.flatnonzero(asked_otherwise(before, order(track=faster), SLOT))
+    assert find_moved_frames(before, order(track=aside)).all()
+    assert not find_changed_frames(before, order(track=aside), SLOT).any()
+    off = np.flatnonzero(find_changed_frames(before, order(track=faster), SLOT))
     assert 270 < off[0] < 300 and off[-1] == 600
 
 
@@ -86,11 +86,11 @@ def test_a_key_moment_is_touched_where_its_ball_lies_elsewhere(library, order, t
     for moved, touched in ((0.05, False), (0.4, True)):
         ball = track.ball + np.where(np.abs(track.times - 10.0) < 0.3, moved, 0.0)[:, None] * [0.0, 1.0, 0.0]
         after = order((10.0, "kick right"), track=type(track)(track.times, track.positions, ball))
-        assert bool(to_search(library, edit, before, after, SLOT)) == touched == (not kept_keys(edit, before, after))
+        assert bool(find_stretches_to_search(library, edit, before, after, SLOT)) == touched == (not list_unchanged_keys(edit, before, after))
 
 
 def test_stretches_near_each_other_are_one():
     touched = np.zeros(50, bool)
     touched[[3, 4, 8, 30]] = True
-    assert stretches(touched, 5) == [(3, 9), (30, 31)] and stretches(touched, 2) == [(3, 5), (8, 9), (30, 31)]
-    assert stretches(np.zeros(4, bool), 3) == []
+    assert list_stretches(touched, 5) == [(3, 9), (30, 31)] and list_stretches(touched, 2) == [(3, 5), (8, 9), (30, 31)]
+    assert list_stretches(np.zeros(4, bool), 3) == []

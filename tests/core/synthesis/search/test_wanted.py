@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from beyond_mocap.base.errors import NotInLibrary, spans_of
-from beyond_mocap.synthesis.search.wanted import needed, pool_frame
+from beyond_mocap.base.errors import NotInLibraryError, line_spans
+from beyond_mocap.synthesis.search.wanted import compute_needed_frames, library_frame
 
 
 def test_nothing_asked_is_locomotion_by_speed(order, track_of):
@@ -27,7 +27,7 @@ def test_words_of_spans_are_asked_where_they_stand(order):
 def test_an_avoided_gait_gives_its_place_to_the_one_nearest_in_speed(order, track_of):
     found = order((2, 4, "-walking"))
     assert found.asked[75] == {"jogging"} and found.asked[30] == {"walking"} == found.asked[150]
-    assert found.avoided_in(0, 59) == frozenset() and found.avoided_in(50, 61) == {"walking"}
+    assert found.list_avoided(0, 59) == frozenset() and found.list_avoided(50, 61) == {"walking"}
     assert order((2, 4, "walking")).avoided == ()
 
 
@@ -36,7 +36,7 @@ def test_a_key_moment_takes_no_clip_with_a_word_that_must_not_be(order, library)
     assert [library.clips[key.clip].mirrored for key in found.keys[0].choices] == [False] and not found.warnings
     only = order((4.0, "kick left -inside"))
     assert only.keys[0].choices and "no clip for 'kick left' is -inside" in only.warnings[0]
-    assert spans_of(only.warnings[0]) == ((only.keys[0].asked.time,) * 2,)
+    assert line_spans(only.warnings[0]) == ((only.keys[0].asked.time,) * 2,)
 
 
 def test_a_transition_asks_for_nothing(order):
@@ -48,7 +48,7 @@ def test_a_key_moment_is_served_with_room_for_its_entry_and_exit(order, library,
     key = order((4.0, "kick right")).keys[0]
     asked = order((4.0, "kick right")).asked
     assert key.frame == 120.0 and [library.clips[k.clip].mirrored for k in key.choices] == [False]
-    entry, leave = needed(library, key.choices[0])
+    entry, leave = compute_needed_frames(library, key.choices[0])
     assert 10 < entry < 40 and 5 < leave < 40
     silent = [i for i, words in enumerate(asked) if words is None]
     assert silent == list(range(int(np.ceil(120 - entry)), int(120 + leave) + 1))
@@ -61,12 +61,12 @@ def test_words_of_a_branch_may_be_left_out(order):
 
 def test_without_mirrors_only_the_recorded_side_serves(order):
     assert len(order((4.0, "kick"), mirror=False).keys[0].choices) == 1
-    with pytest.raises(NotInLibrary):
+    with pytest.raises(NotInLibraryError):
         order((4.0, "kick left"), mirror=False)
 
 
 def test_what_the_library_lacks_is_told_with_what_it_has(order):
-    with pytest.raises(NotInLibrary, match=r"4 s.*'header'.*nearest: .*kick.*Nearest Labels") as told:
+    with pytest.raises(NotInLibraryError, match=r"4 s.*'header'.*nearest: .*kick.*Nearest Labels") as told:
         order((4.0, "header"))
     assert "\n" not in str(told.value) and told.value.nearest and told.value.exit_status == 3
 
@@ -101,7 +101,7 @@ def test_words_that_no_clip_carries_are_told(order):
 
 def test_a_key_s_place_among_the_frames(library):
     for key in library.keys:
-        at = pool_frame(library, key)
+        at = library_frame(library, key)
         assert library.frames.clip[int(at)] == key.clip
         assert np.interp(at, np.arange(len(library.frames)), library.frames.source) == pytest.approx(
             key.frame, abs=1e-6
