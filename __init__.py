@@ -1,16 +1,15 @@
-"""Beyond Mocap: from tracked dots and a few words to a moving body, inside Blender.
+"""Beyond Mocap: full-body animation from tracking data and labels, inside Blender.
 
-This file only switches the extension on and off. Its rooms are registered in the
-order of ROOMS and unregistered in the reverse order; each room does the same with
-its own parts. Blender's `bpy` is first imported when `register()` runs, so reading
-this folder as a plain Python package (a test collector does) needs no Blender.
+This file only registers and unregisters the extension. Its packages are registered in the order of ROOMS and
+unregistered in reverse order; each does the same with its own modules. `bpy` is first imported when `register()` runs,
+so this folder can be read as a plain Python package (by a test collector) without Blender.
 """
 
 ROOMS = ("scene", "operators", "panels")
 
 
 def register():
-    """Switch every room on; when one fails, switch off those before it and pass the error on."""
+    """Register all packages; if one fails, unregister those before it and raise its error."""
     standing = []
     try:
         for room in _rooms():
@@ -23,7 +22,7 @@ def register():
 
 
 def unregister():
-    """Switch every room off, the last one first."""
+    """Unregister all packages in reverse order."""
     for room in reversed(list(_rooms())):
         room.unregister()
 

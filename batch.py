@@ -1,9 +1,9 @@
-"""The commands for farms that only know --python:
+"""The command line for render farms that only know --python:
 
     blender -b FILE.blend --python batch.py -- synthesize --library clips --track p.csv --annotations p.txt --out p.fbx
 
-Takes the verbs of `python -m beyond_mocap` and ends with their exit status. Uses the extension where it is switched on,
-else the code that lies beside this file, so that nothing has to be installed.
+It takes the verbs of `python -m beyond_mocap` and exits with their status. It uses the extension if it is enabled,
+otherwise the code beside this file, so that nothing has to be installed.
 """
 
 import importlib
@@ -15,7 +15,11 @@ BESIDE = "beyond_mocap_batch"
 
 
 def extension():
-    """The name of the loaded extension's package; that of the folder of this file where none is switched on."""
+    """Find the package of the enabled extension; without one, load the folder of this file.
+
+    Returns:
+        The package's name.
+    """
     import bpy
 
     enabled = [name for name in bpy.context.preferences.addons.keys() if name.startswith("bl_ext.")]
@@ -33,7 +37,7 @@ def extension():
 
 
 def main():
-    """Run the command after `--`; returns its exit status."""
+    """Run the command after `--`; return its exit status."""
     arguments = sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else sys.argv[1:]
     command = importlib.import_module(f"{extension()}.operators.command")
     return command.run(arguments)

@@ -1,6 +1,6 @@
-"""Time and quality on real recordings: `python -m benchmarks`, or `make bench`; without ../shared/data it says so.
+"""Time and quality on real recordings: `python -m benchmarks`, or `make bench`. Needs ../shared/data.
 
-- `places`    the recordings, the scenarios, and the libraries that are made of them
+- `places`    the recordings, the scenarios, and the libraries built from them
 - `effort`    seconds, memory and rows of tables
 - `scenarios`, `match`, `path_editing`, `throws`  synthesis and edits; players of a match; other paths; thrown balls
 - `ball_touches`, `ball_contact`  the tracked ball; passing scenes and solved touches

@@ -2,8 +2,8 @@
 
     python -m benchmarks [SECTION ...] [--seconds N] [--out FILE]
 
-A section that takes longer than N seconds is ended, and says so. Results go to benchmarks/results.md, where sections
-that were not measured stay as they are. Seconds in tables are the processor's.
+A section that takes longer than N seconds is ended, which the results say. Results go to benchmarks/results.md, where
+sections that were not measured stay as they are. Seconds in tables are processor time.
 """
 
 from __future__ import annotations
@@ -26,26 +26,32 @@ from beyond_mocap import __version__  # noqa: E402
 SECTIONS = {  # name -> heading, (subheading, module, function) of each part
     "scenarios": ("Synthesis", (("", "scenarios", "section"),)),
     "match": ("Players of a match", (("", "match", "speed_section"),)),
-    "crowd": ("Everybody of a match", (("", "match", "crowd_section"),)),
+    "crowd": ("All players of a match", (("", "match", "crowd_section"),)),
     "paths": ("Path editing", (("", "path_editing", "section"),)),
     "ball": ("The tracked ball", (("", "ball_touches", "section"),)),
     "passes": ("Passes and solved touches", (("", "ball_contact", "section"),)),
-    "markers": ("Markers", (("Markers planted on known motions", "markers_planted", "truth_table"),
-                            ("The same on bone", "markers_planted", "bone_table"),
-                            ("Filters on planted markers", "markers_planted", "filter_table"),
+    "markers": ("Markers", (("Synthetic markers on known motions", "markers_planted", "truth_table"),
+                            ("Synthetic markers on bone", "markers_planted", "bone_table"),
+                            ("Filters on synthetic markers", "markers_planted", "filter_table"),
                             ("Gaps, swaps, jumps and lost labels", "markers_planted", "fault_table"),
-                            ("Frames a second", "markers_planted", "speed_table"),
+                            ("Frames per second", "markers_planted", "speed_table"),
                             ("Real trials", "markers_real", "trial_table"),
-                            ("Releases of planted throws", "markers_real", "planted_table"),
+                            ("Releases of synthetic throws", "markers_real", "planted_table"),
                             ("Pitches against the radar", "markers_real", "radar_table"))),
     "throws": ("Throws and kicks", (("", "throws", "section"),)),
 }  # fmt: skip
 LIMIT = 900.0
-"""Seconds that a section may take by the clock."""
+"""Seconds of clock time that a section may take."""
 
 
 def measured(name: str) -> list[str]:
-    """The lines of a section, measured here."""
+    """Measure a section in this process.
+
+    Args:
+        name: key of SECTIONS.
+    Returns:
+        Its lines of Markdown.
+    """
     effort.on_one_core()
     lines = []
     for title, module, function in SECTIONS[name][1]:
@@ -55,18 +61,30 @@ def measured(name: str) -> list[str]:
 
 
 def apart(name: str, limit: float) -> tuple[list[str], bool]:
-    """The lines of a section measured in a process of its own, and whether it came to its end."""
+    """Measure a section in a process of its own.
+
+    Args:
+        name: key of SECTIONS.
+        limit: s of clock time.
+    Returns:
+        Its lines, and whether it finished.
+    """
     command = [sys.executable, "-m", "benchmarks", name, "--here"]
     try:
         done = subprocess.run(command, cwd=ROOT, stdout=subprocess.PIPE, text=True, timeout=limit)
     except subprocess.TimeoutExpired:
-        return [f"Ended after {limit:g} s: it takes longer."], False
-    return (done.stdout.splitlines(), True) if done.returncode == 0 else (["It failed."], False)
+        return [f"Stopped after {limit:g} s: the section takes longer."], False
+    return (done.stdout.splitlines(), True) if done.returncode == 0 else (["The section failed."], False)
 
 
 def sections(path: Path) -> dict[str, list[str]]:
-    """The lines of results written before, by the heading of their section; those before the first heading are left
-    out."""
+    """Read the sections of earlier results.
+
+    Args:
+        path: the file; it may be missing.
+    Returns:
+        Heading -> lines; what comes before the first heading is left out.
+    """
     found: dict[str, list[str]] = {}
     for line in path.read_text("utf-8").splitlines() if path.is_file() else []:
         if line.startswith("## "):
@@ -77,10 +95,10 @@ def sections(path: Path) -> dict[str, list[str]]:
 
 
 def main() -> int:
-    """Measures what is asked for and writes the results."""
+    """Measure the chosen sections and write the results."""
     options = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
     options.add_argument("section", nargs="*", metavar="SECTION", help=f"all, or some of {', '.join(SECTIONS)}")
-    options.add_argument("--seconds", type=float, default=LIMIT, help="that a section may take (%(default)g)")
+    options.add_argument("--seconds", type=float, default=LIMIT, help="time limit of a section (default %(default)g)")
     options.add_argument("--out", type=Path, default=ROOT / "benchmarks" / "results.md")
     options.add_argument("--here", action="store_true", help="print one section, in this process, and write nothing")
     chosen = options.parse_args()
@@ -100,14 +118,14 @@ def main() -> int:
         heading = f"## {SECTIONS[name][0]}"
         parts[heading] = [heading, "", with_what, "", *lines]
         print("\n".join(parts[heading]), flush=True)
-        begin = ["# Results", "", "Written by `make bench`; seconds are the processor's.", ""]
+        begin = ["# Results", "", "Written by `make bench`; seconds are processor time.", ""]
         text = "\n".join([*begin, *(line for part in parts.values() for line in [*part, ""])])
         chosen.out.write_text(re_spaced(text), "utf-8")
     return 0 if whole else 1
 
 
 def re_spaced(text: str) -> str:
-    """Without two empty lines after each other, and with one end of line at its end."""
+    """Remove repeated blank lines, and end the text with one newline."""
     lines = text.splitlines()
     kept = [line for line, before in zip(lines, ["", *lines]) if line or before]
     return "\n".join(kept).rstrip() + "\n"

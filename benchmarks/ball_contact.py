@@ -1,5 +1,4 @@
-"""How near the striking part comes to the ball, measured on the poses that come out: passing scenes, and takes with key
-moments at solved touches."""
+"""Gap between striking part and ball on the written poses: passing scenes, and takes at solved touches."""
 
 from __future__ import annotations
 
@@ -26,8 +25,14 @@ SAMPLES = ROOT / "sample_blend"
 
 
 def gaps(made: Passes) -> tuple[np.ndarray, np.ndarray]:
-    """(K,) m between the surfaces of part and ball at each strike that touches, by the pose that is played there and
-    the ball as written out; (K,) m from that ball to where the flight before was to arrive."""
+    """Measure the strikes of a passing scene that touch the ball.
+
+    Args:
+        result: the scene's result.
+    Returns:
+        (K,) m between the surfaces of part and ball, by the pose played there and the ball as written; (K,) m from that
+        ball to where the flight before was to arrive.
+    """
     apart, off = [], []
     for strike in made.plan.strikes:
         order = strike.order
@@ -39,6 +44,7 @@ def gaps(made: Passes) -> tuple[np.ndarray, np.ndarray]:
         surface = striking_surface(motion.skeleton, order.part, order.side, order.tool)
         start, end = surface.line(places, turned)
         ball = made.ball.positions[frame]
+        # nearest point of the part's line to the ball
         along = end - start
         share = np.clip((ball - start) @ along / max(float(along @ along), 1e-12), 0.0, 1.0)
         away = float(np.linalg.norm(start + share * along - ball))
@@ -48,7 +54,7 @@ def gaps(made: Passes) -> tuple[np.ndarray, np.ndarray]:
 
 
 def scene_row(name: str, library: Library, label: str) -> str:
-    """A passing scene with one library."""
+    """Build the row of a passing scene with one library."""
     scene = read_scene(SAMPLES / "passes" / f"{name}.json")
     took, made = effort.seconds(lambda: passes(library, scene), 1)
     apart, off = gaps(made)
@@ -60,7 +66,7 @@ def scene_row(name: str, library: Library, label: str) -> str:
 
 
 def take_rows(name: str, library: Library) -> list[str]:
-    """The five scenarios at solved touches: every key moment with a ball."""
+    """Build the rows of the five scenarios at solved touches: every key moment with a ball."""
     rows = []
     for number in (1, 2, 3, 4, 5):
         track, timeline = scenario(number)
@@ -77,15 +83,15 @@ def take_rows(name: str, library: Library) -> list[str]:
 
 
 def section() -> list[str]:
-    """Lines for results.md."""
-    lines = format_head(("passing scene, library", "strikes", "that touch", "gap mm (median / worst, target 5)",
-                  "ball beside the arrival mm", "part moved cm", "seconds of scene", "seconds to make",
+    """Build the lines for results.md."""
+    lines = format_head(("passing scene, library", "strikes", "with contact", "gap mm (median / worst, target 5)",
+                  "ball off its arrival mm", "part moved cm", "seconds of scene", "processor seconds",
                   "warnings"))  # fmt: skip
     with tempfile.TemporaryDirectory() as place:
         own = build(SAMPLES / "passes" / "library", cache_dir=Path(place))
         lines += [scene_row(name, own, "its own") for name in SCENES]
-        lines += ["", *format_head(("take at solved touches", "words", "asked s", "solved s", "gap mm (target 5)",
-                             "ball moved m", "time off s"))]  # fmt: skip
+        lines += ["", *format_head(("take at solved touches", "labels", "requested s", "solved s", "gap mm (target 5)",
+                             "ball moved m", "time error s"))]  # fmt: skip
         for name in LIBRARIES:
             folder = library_folder(name, Path(place))
             lines += take_rows(name, build(folder, unit=LIBRARIES[name], cache_dir=Path(place) / name))

@@ -1,8 +1,8 @@
-"""Touches solved from tracking against what a person read, against events, and against made matches.
+"""Touches solved from tracking, compared with what a person annotated, with events, and with synthetic matches.
 
-A found touch is right within a tolerance in time of a read one of the same player; each serves once. What the reader
-could not tell counts neither way. Event files have a clock of their own: one offset for the whole file is taken out
-first, the one that makes most of them right.
+A found touch is right if an annotated one of the same player is within a tolerance in time; each is matched once. What
+the annotator was unsure of has no effect. Event files have a clock of their own: one offset for the whole file is
+removed first, the one that gives the most matches.
 """
 
 from __future__ import annotations
@@ -25,27 +25,34 @@ from beyond_mocap.synthetic.ground_truth.planted import Feed, planted_match, sam
 
 MATCHES = {"nl2019": "nl2019_half1.dat", "dutch": "dutch_6min.dat"}
 BY_HAND = ROOT / "benchmarks" / "touches_by_hand.csv"
-# Read when the solver stood, which nobody tried on them before.
+# Annotated after the solver was finished; it was never tuned on these.
 LATER = ROOT / "benchmarks" / "touches_by_hand_later.csv"
 EVENTS = DATA / "tracking" / "match" / "dutch_6min_events.csv"
-MARGIN = 20.0  # s that are solved before and after what was read
-PLAYED = ("pass", "miss", "clearance")  # events that are a touch for certain
+MARGIN = 20.0  # s that are solved before and after what was annotated
+PLAYED = ("pass", "miss", "clearance")  # events that are certainly a touch
 _NO_TOUCH = ("out", "foul", "card", "offside")
-EVENT_SPREAD = 1.8  # s: three deviations of how far events that were not tied to a touch lie from it
+EVENT_SPREAD = 1.8  # s: three standard deviations of the time error of events that are not tied to a touch
 
 TOLERANCE = 0.1
-"""Seconds; a sample of a 10 Hz feed may lie so far from the true kick."""
+"""Seconds; a sample of a 10 Hz feed may be this far from the true kick."""
 _COLUMNS = ("match", "row", "time_s", "until_s", "player", "part", "word", "note")
 
 
 def match_of(name: str) -> Match:
-    """One of the recorded matches."""
+    """Read one of the recorded matches."""
     return read_match(DATA / "tracking" / "match" / MATCHES[name])
 
 
 @dataclass(frozen=True)
 class Measured:
-    """One match or feed, its score, and what was solved."""
+    """One match or feed with its score.
+
+    Attributes:
+        name: name in the table.
+        score: the comparison.
+        solved: the solved ball.
+        reading: the annotation.
+    """
 
     name: str
     score: Score
@@ -54,7 +61,7 @@ class Measured:
 
 
 def thinned(match: Match, every: int = 1, heights: bool = True) -> Match:
-    """Every so many samples of a match, without heights."""
+    """Keep every so many samples of a match, with or without heights."""
     part = slice(None, None, every)
     ball = match.ball[part].copy()
     if not heights:
@@ -65,7 +72,7 @@ def thinned(match: Match, every: int = 1, heights: bool = True) -> Match:
 
 
 def of_feed(feed: Feed) -> Match:
-    """A made feed as a match that was read."""
+    """Convert a synthetic feed to a match as it would be read."""
     players = tuple(MatchPlayer(name, team, name, i) for i, (name, team) in enumerate(zip(feed.ids, feed.teams)))
     end = float(feed.times[-1])
     return Match(times=feed.times, players=players, positions=feed.positions, ball=feed.ball, length=feed.length,
@@ -73,8 +80,14 @@ def of_feed(feed: Feed) -> Match:
 
 
 def by_hand(name: str, match: Match, path: Path = BY_HAND, solved: SolvedBall | None = None) -> Measured:
-    """One recorded match against a reading. solved: what was solved before,
-    else the stretches and a while about them."""
+    """Compare one recorded match with an annotation.
+
+    Args:
+        name: name in the table; its first word names the match in the file.
+        match: the match.
+        path: the annotation.
+        solved: the solved ball; None: solve the annotated stretches and MARGIN around them.
+    """
     reading = read_touches(path, name.replace(",", " ").split()[0])
     start, end = reading.stretches[0][0] - MARGIN, reading.stretches[-1][1] + MARGIN
     solved = solved or solve_ball(match, start=start, end=end)
@@ -86,7 +99,7 @@ def _score(solved: SolvedBall, reading: Reading) -> Score:
 
 
 def planted(name: str, seconds: float = 180.0, seed: int = 11, **feed) -> Measured:
-    """A made match as a feed would have it."""
+    """Compare a synthetic match, sampled like a feed, with its ground truth."""
     match = planted_match(seconds, seed)
     touches = tuple(
         ReadTouch(t.time, (t.player,), None, t.part, t.word) for t in match.touches if 1.2 < t.time < seconds - 1
@@ -97,8 +110,11 @@ def planted(name: str, seconds: float = 180.0, seed: int = 11, **feed) -> Measur
 
 
 def event_reading(path: Path = EVENTS) -> Reading:
-    """Events as a reading: what was played for certain; around all the rest the time by which an event may lie wrong
-    counts neither way, nor do the times in which the ball is out of play."""
+    """Convert events to an annotation.
+
+    It holds what was certainly played; the others count neither way within the time by which an event may be off, nor
+    do the times in which the ball is out of play.
+    """
     with open(path, newline="", encoding="utf-8") as file:
         rows = sorted(csv.DictReader(file), key=lambda event: float(event["time_s"]))
     sure, doubts = [], []
@@ -115,8 +131,10 @@ def event_reading(path: Path = EVENTS) -> Reading:
 
 
 def against_events(match: Match) -> Measured:
-    """All touches against the passes among the events. Events tell who plays the ball away, so that other touches of a
-    player before he does count neither way."""
+    """Compare all touches with the passes among the events.
+
+    Events name the player who plays the ball away, so that earlier touches of the same player count neither way.
+    """
     solved, reading = solve_ball(match), event_reading()
     on = [ReadTouch(a.time, (a.player,)) for a, b in zip(solved.touches, solved.touches[1:]) if a.player == b.player]
     reading = replace(reading, doubts=(*reading.doubts, *on))
@@ -125,22 +143,25 @@ def against_events(match: Match) -> Measured:
 
 
 def residuals(solved: SolvedBall) -> tuple[float, float, float]:
-    """Median, 95th percentile (m) of the path's distance over the ground to measured samples;
-    share of measured ones."""
+    """Measure the trajectory's distance over the ground from measured samples.
+
+    Returns:
+        Median and 95th percentile, m, and the share of measured samples.
+    """
     away = solved.residuals[solved.measured]
     away = away[np.isfinite(away)]
     return float(np.median(away)), float(np.percentile(away, 95)), float(solved.measured.mean())
 
 
 def told_apart(measured: Measured) -> str:
-    """Of the right touches with a part that was read: how many have it."""
+    """Count how many of the right touches with an annotated part have that part."""
     pairs = [(measured.reading.touches[read].part, measured.solved.touches[i].part) for read, i in measured.score.right]
     known = [(read, found) for read, found in pairs if read]
     return f"{sum(read == found for read, found in known)} of {len(known)}"
 
 
 def line(measured: Measured) -> list[str]:
-    """A row of the table."""
+    """Build a row of the table."""
     score = measured.score
     late = np.abs(score.errors)
     median, p95, share = residuals(measured.solved)
@@ -152,24 +173,24 @@ def line(measured: Measured) -> list[str]:
 
 
 COLUMNS = ("feed", "touches", "precision", "recall", "F1 at 0.1 s, right player", "doubtful",
-           "time off, ms (median / p95)", "part right", "offset s", "path to measured samples, cm (median / p95)",
+           "time error, ms (median / p95)", "part right", "offset s", "path to measured samples, cm (median / p95)",
            "measured")
 
 
 def all_measured(dutch: Match, half: Match, solved: SolvedBall) -> list[Measured]:
-    """Every feed. solved: the whole half."""
+    """Compare every feed. solved: the whole half."""
     return [by_hand("dutch", dutch), by_hand("nl2019", half, solved=solved), by_hand("dutch, read later", dutch, LATER),
             by_hand("nl2019, read later", half, LATER, solved), by_hand("dutch, no heights", thinned(dutch, 1, False)),
             by_hand("nl2019, no heights", thinned(half, 1, False)), by_hand("dutch, 12.5 Hz", thinned(dutch, 2)),
             by_hand("nl2019, 12.5 Hz", thinned(half, 2)),
             by_hand("dutch, 8.3 Hz, no heights", thinned(dutch, 3, False)), against_events(dutch),
-            planted("made, 25 Hz, 8 cm"), planted("made, 25 Hz, 8 cm, half filled", filled=0.5),
-            planted("made, 25 Hz, 8 cm, no heights", heights=False), planted("made, 10 Hz, 8 cm", fps=10.0),
-            planted("made, 10 Hz, 8 cm, no heights", fps=10.0, heights=False)]
+            planted("synthetic, 25 Hz, 8 cm"), planted("synthetic, 25 Hz, 8 cm, half filled", filled=0.5),
+            planted("synthetic, 25 Hz, 8 cm, no heights", heights=False), planted("synthetic, 10 Hz, 8 cm", fps=10.0),
+            planted("synthetic, 10 Hz, 8 cm, no heights", fps=10.0, heights=False)]
 
 
 def section() -> list[str]:
-    """Lines for results.md."""
+    """Build the lines for results.md."""
     dutch, half = match_of("dutch"), match_of("nl2019")
     took, solved = effort.seconds(lambda: solve_ball(half), 1)
     lines = [f"- the whole half (46 min) is solved in {took:.1f} s (target 60)", ""]
@@ -178,8 +199,15 @@ def section() -> list[str]:
 
 @dataclass(frozen=True)
 class ReadTouch:
-    """A touch as it was read: time s; players who may have made it, any where empty; until s: some moment up to then,
-    or as many as there are (then it is no touch but a doubt). part, word: where they were read."""
+    """An annotated touch.
+
+    Attributes:
+        time: s.
+        players: players who may have touched the ball; any player where empty.
+        until: s: one or several moments up to then; it is a doubt, not a touch.
+        part: part of the body, where it was annotated.
+        word: label, where it was annotated.
+    """
 
     time: float
     players: tuple[str, ...] = ()
@@ -190,8 +218,13 @@ class ReadTouch:
 
 @dataclass(frozen=True)
 class Reading:
-    """What was read: stretches ((start, end) s), the touches in them, and doubts: spans in which touches of these
-    players count neither way."""
+    """The annotation of a match.
+
+    Attributes:
+        stretches: (start, end) s of what was annotated.
+        touches: the touches in them.
+        doubts: spans in which touches of these players count neither way.
+    """
 
     stretches: tuple[tuple[float, float], ...]
     touches: tuple[ReadTouch, ...]
@@ -199,15 +232,22 @@ class Reading:
 
     @property
     def seconds(self) -> float:
-        """Of all stretches."""
+        """Seconds of all stretches."""
         return sum(end - start for start, end in self.stretches)
 
 
 @dataclass(frozen=True)
 class Score:
-    """right: pairs (index of the read touch, of the found one). missed: read ones without. false: found ones that are
-    no touch. doubtful: found ones that nobody can judge. errors: (len(right),) s, found minus read. offset: s taken
-    from the found times before."""
+    """Comparison of found touches with annotated ones.
+
+    Attributes:
+        right: pairs (index of the annotated touch, of the found one).
+        missed: annotated ones that were not found.
+        false: found ones that are no touch.
+        doubtful: found ones that cannot be judged.
+        errors: (len(right),) s, found minus annotated.
+        offset: s taken from the found times before.
+    """
 
     right: tuple[tuple[int, int], ...]
     missed: tuple[int, ...]
@@ -223,7 +263,7 @@ class Score:
 
     @property
     def recall(self) -> float:
-        """Share of the read touches that were found."""
+        """Share of the annotated touches that were found."""
         return len(self.right) / max(len(self.right) + len(self.missed), 1)
 
     @property
@@ -235,7 +275,15 @@ class Score:
 
 def scored(times: Sequence[float], players: Sequence[str], reading: Reading, tolerance: float = TOLERANCE,
            offset: float = 0.0) -> Score:
-    """Found touches (times s, players) against a reading. Those outside its stretches are left out."""
+    """Compare found touches with an annotation; those outside its stretches are left out.
+
+    Args:
+        times: s of the found touches.
+        players: player of each.
+        reading: the annotation.
+        tolerance: s.
+        offset: s taken from the found times first.
+    """
     times = np.asarray(times, float) - offset
     inside = [i for i in np.argsort(times, kind="stable") if _within(times[i], reading.stretches)]
     right = _pairs(times, players, inside, reading.touches, tolerance)
@@ -250,7 +298,7 @@ def scored(times: Sequence[float], players: Sequence[str], reading: Reading, tol
 
 def scored_by_events(times: Sequence[float], players: Sequence[str], reading: Reading, tolerance: float = TOLERANCE,
                      most: float = 4.0) -> Score:
-    """`scored` with the one offset, up to `most` seconds either way, that gives the greatest F1."""
+    """Compare with the one offset, up to `max_offset` seconds either way, that gives the highest F1."""
     coarse = np.arange(-most, most + 1e-9, tolerance / 2.0)
     best = max(coarse, key=lambda offset: _roughly(times, players, reading, tolerance, offset))
     fine = best + np.arange(-tolerance / 2.0, tolerance / 2.0 + 1e-9, 0.01)
@@ -261,10 +309,15 @@ def scored_by_events(times: Sequence[float], players: Sequence[str], reading: Re
 
 
 def read_touches(path: str | os.PathLike, match: str) -> Reading:
-    """The reading of one match from a CSV of match,row,time_s,until_s,player,part,word,note.
+    """Read the annotation of one match.
 
-    row: "stretch", "touch" or "unsure" (a doubt). player: one id, or several with | between where one of them it was.
-    InputError for other columns or rows, and a match that is not in it."""
+    Args:
+        path: CSV of match,row,time_s,until_s,player,part,word,note. row: "stretch", "touch" or "unsure" (a doubt).
+            player: one id, or several with | between where it was one of them.
+        match: name in the first column.
+    Raises:
+        InputError: for other columns or rows, and for a match that is not in it.
+    """
     with open(path, newline="", encoding="utf-8") as file:
         rows = csv.DictReader(file)
         if tuple(rows.fieldnames or ()) != _COLUMNS:
@@ -277,28 +330,31 @@ def read_touches(path: str | os.PathLike, match: str) -> Reading:
                 raise InputError(path, f"row {row['row']!r} at {row['time_s']}", f"one of {', '.join(kinds)}")
             kinds[row["row"]].append(_read(row))
     if not kinds["stretch"]:
-        raise InputError(path, f"no stretch of {match!r}", "one that was read")
+        raise InputError(path, f"no stretch of {match!r}", "a match with a stretch")
     stretches = tuple((row.time, row.until) for row in kinds["stretch"])
     return Reading(stretches, tuple(kinds["touch"]), tuple(kinds["unsure"]))
 
 
 def _read(row: dict[str, str]) -> ReadTouch:
+    """Convert a row to a touch."""
     players = tuple(name for name in row["player"].split("|") if name)
     until = float(row["until_s"]) if row["until_s"] else None
     return ReadTouch(float(row["time_s"]), players, until, row["part"], row["word"])
 
 
 def _within(time: float, stretches) -> bool:
+    """Return whether a time lies in a stretch."""
     return any(start <= time <= end for start, end in stretches)
 
 
 def _covers(doubt: ReadTouch, time: float, player: str, tolerance: float) -> bool:
+    """Return whether a doubt covers a touch."""
     end = doubt.time if doubt.until is None else doubt.until
     return doubt.time - tolerance <= time <= end + tolerance and (not doubt.players or player in doubt.players)
 
 
 def _pairs(times, players, inside, touches, tolerance: float) -> list[tuple[int, int]]:
-    """The greatest number of pairs (read, found) that can stand together; among those the nearest in time."""
+    """Find the largest possible set of pairs (annotated, found); among those sets the nearest in time."""
     from scipy.optimize import linear_sum_assignment
 
     if not inside or not touches:
@@ -307,12 +363,13 @@ def _pairs(times, players, inside, touches, tolerance: float) -> list[tuple[int,
     fits = away <= tolerance + 1e-9
     for row, column in np.argwhere(fits):
         fits[row, column] = not touches[row].players or players[inside[column]] in touches[row].players
+    # each allowed pair gains 1000, so the assignment first maximizes their number, then minimizes the times
     rows, columns = linear_sum_assignment(np.where(fits, away - 1e3, 0.0))
     return [(int(row), int(inside[column])) for row, column in zip(rows, columns) if fits[row, column]]
 
 
 def _roughly(times, players, reading: Reading, tolerance: float, offset: float) -> float:
-    """Right ones at this offset, without each serving once."""
+    """Count the right ones at an offset, without matching each once: a fast upper bound."""
     times = np.asarray(times, float) - offset
     near = [np.flatnonzero(np.abs(times - touch.time) <= tolerance) for touch in reading.touches]
     return sum(

@@ -1,4 +1,4 @@
-"""How sections measure and report: seconds of the processor, what reading, building and memory cost, rows of tables."""
+"""Measuring and reporting: processor seconds, the cost of reading, building and memory, and rows of tables."""
 
 from __future__ import annotations
 
@@ -17,14 +17,21 @@ from beyond_mocap.library.build import build
 
 from .places import DATA, LIBRARIES, ROOT, scenario_files
 
-RUNS = 3
+RUNS = 3  # the best of so many runs counts
 
 
 def seconds(work, runs: int = RUNS) -> tuple[float, object]:
-    """The best of several runs, and what the last one returned.
+    """Measure the best processor time of several runs.
 
-    Seconds of the processor: with one thread on one core they are what a clock shows while nothing else runs, and they
-    stay so where something does."""
+    With one thread on one core this is what a clock shows while nothing else runs, and it does not change when
+    something does.
+
+    Args:
+        work: what is measured.
+        runs: how many runs.
+    Returns:
+        Seconds, and what the last run returned.
+    """
     best, result = np.inf, None
     for _ in range(runs):
         begun = time.process_time()
@@ -34,14 +41,13 @@ def seconds(work, runs: int = RUNS) -> tuple[float, object]:
 
 
 def on_one_core() -> None:
-    """Holds this process and those it starts to one core, where the system can."""
+    """Bind this process and those it starts to one core, where the system permits it."""
     if hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
 
 
 def blas_speed() -> str:
-    """What numpy's products are worth here: official Blenders have no fast BLAS, and everything that multiplies is
-    slower."""
+    """Measure numpy's matrix products: official Blenders have no fast BLAS, so everything that multiplies is slower."""
     random = np.random.default_rng(0)
     a, b = (random.normal(size=(2000, 27)).astype(np.float32) for _ in range(2))
     took, _ = seconds(lambda: [a @ b.T for _ in range(10)])
@@ -50,7 +56,7 @@ def blas_speed() -> str:
 
 
 def bvh_speed() -> str:
-    """How fast a long clip is read, in MB per second of the whole file."""
+    """Measure how fast a long clip is read, in MB per second of the whole file."""
     source = DATA / "mocap" / "lafan1" / "walk1_subject1_walk2_filtered.bvh"
     head, _, motion = source.read_text().partition("MOTION")
     rows = motion.strip().splitlines()
@@ -64,9 +70,10 @@ def bvh_speed() -> str:
 
 
 def library_speed() -> str:
-    """150 clips of 120 frames at 30 fps, the mirrored counted, from text to clusters and from the cache.
+    """Measure the building of 150 clips of 120 frames at 30 fps, mirrored ones included, from text and from the cache.
 
-    Made of the Bandai clips, cut or repeated to 120 frames: 75 files and their 75 twins."""
+    Built from the Bandai clips, cut or repeated to 120 frames: 75 files and their 75 mirror images.
+    """
     sources = sorted((DATA / "mocap" / "bandai").glob("*.bvh"))
     with tempfile.TemporaryDirectory() as folder:
         rows = ["file,start_frame,end_frame,key_frame,labels"]
@@ -81,13 +88,13 @@ def library_speed() -> str:
         cold, _ = seconds(lambda: build(folder, rebuild=True))
         warm, _ = seconds(lambda: build(folder))
     return (
-        f"75 clips of 120 frames and their twins: {cold:.2f} s from text to clusters (target 5), {warm:.2f} s cached "
-        "(target 0.3); Faustino 187 s and 12.9 s"
+        f"75 clips of 120 frames and their mirror images: {cold:.2f} s from text to clusters (target 5), {warm:.2f} s "
+        "cached (target 0.3); Faustino 187 s and 12.9 s"
     )
 
 
 def peak_memory(name: str, folder: Path, cache: Path, number: int = 2) -> str:
-    """Peak resident memory and seconds of the whole command, in a process of its own, the library cached."""
+    """Measure peak resident memory and seconds of the whole command, in a process of its own, with a cached library."""
     if not hasattr(os, "wait4"):
         return "peak memory: not known on this system"
     track, words = scenario_files(number)
@@ -103,14 +110,14 @@ def peak_memory(name: str, folder: Path, cache: Path, number: int = 2) -> str:
         return f"peak memory: the command ended with {status}"
     kilo = 1024 if sys.platform == "darwin" else 1
     took, peak = used.ru_utime + used.ru_stime, used.ru_maxrss / 1024**2 / kilo
-    return f"scenario {number} by the command, imports and cached library counted: {took:.1f} s, {peak:.2f} GiB at most"
+    return f"scenario {number} by the command, with imports and cached library: {took:.1f} s, {peak:.2f} GiB at most"
 
 
 def format_head(names: Sequence[str]) -> list[str]:
-    """The two lines that begin a table."""
+    """Format the two lines that begin a table."""
     return [format_row(names), "|" + "---|" * len(names)]
 
 
 def format_row(cells: Iterable[str]) -> str:
-    """One line of a table."""
+    """Format one line of a table."""
     return f"| {' | '.join(cells)} |"

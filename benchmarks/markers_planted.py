@@ -1,4 +1,4 @@
-"""What is found again of motions on which markers were planted: joints, angles, what was hidden and exchanged."""
+"""Reconstruction of motions with synthetic markers: joints, angles, and what was hidden and swapped."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ CLIPS = {"walk": ("cmu10/test_walking_1.bvh", 0, 360), "run": ("cmu10/test_runni
          "kick, LMD": ("lmd/Player1/P1_S01_penalty_kick.bvh", 0, 360)}
 """Recording, first and last frame."""
 SHIPPED = {"lower_body": "plug_in_gait_legs"}
-"""Planted set -> the shipped one that describes it, where the names differ."""
+"""Synthetic marker set -> the shipped one that describes it, where the names differ."""
 TRIED = (("walk", "plug_in_gait"), ("walk", "driveline"), ("walk", "sprinter"), ("walk", "full"),
          ("walk", "lower_body"), ("run", "plug_in_gait"), ("run", "sprinter"), ("kick", "plug_in_gait"),
          ("basketball", "driveline"), ("pitch", "driveline"), ("pitch", "plug_in_gait"), ("throw", "driveline"),
@@ -32,12 +32,12 @@ TRIED = (("walk", "plug_in_gait"), ("walk", "driveline"), ("walk", "sprinter"), 
 ON_BONE = (("walk", "plug_in_gait"), ("walk", "driveline"), ("pitch", "driveline"))
 SPOILED = (("walk", "plug_in_gait"), ("basketball", "driveline"), ("pitch", "driveline"), ("run", "sprinter"))
 TIMED = (("throw", "full"), ("pitch", "driveline"), ("basketball", "plug_in_gait"), ("run", "sprinter"))
-_OCCLUDED = 0.03
+_OCCLUDED = 0.03  # share of the samples that are hidden
 
 
 @lru_cache(maxsize=None)
 def clip(name: str) -> Motion:
-    """A recording, or the made throw at 30 m/s."""
+    """Read a recording, or generate the throw at 30 m/s."""
     if name == "throw":
         return throw(speed=30.0, fps=200.0).motion
     file, first, last = CLIPS[name]
@@ -46,17 +46,17 @@ def clip(name: str) -> Motion:
 
 
 def settings(planted_set: str, **others) -> ReconstructSettings:
-    """The recipe's settings for a planted set: no release, which is measured apart."""
+    """Build the reconstruction settings of a marker set, without release, which is measured separately."""
     return ReconstructSettings(marker_set=chosen_set(SHIPPED.get(planted_set, planted_set)), release="no", **others)
 
 
 def again(known: Planted, static: bool, chosen: ReconstructSettings) -> Reconstruction:
-    """The whole road from the planted trial."""
+    """Reconstruct a synthetic trial."""
     return reconstruct(known.trial, known.static if static else None, settings=chosen)
 
 
 def truth_table() -> list[str]:
-    """One row per clip, set and static trial or none."""
+    """Build one row per clip, marker set, and static trial or none."""
     lines = [
         "Skin that shifts (thighs 10 to 16 mm), 0.5 mm of camera noise, 3 % of the samples hidden; the whole recipe "
         "with its filters. Angles: the whole angle between found and true joint rotation, all axes at once, root mean "
@@ -73,7 +73,7 @@ def truth_table() -> list[str]:
 
 
 def bone_table() -> list[str]:
-    """The same without skin and noise: what the road itself leaves."""
+    """Build the same without skin and noise: the error of the reconstruction itself."""
     lines = effort.format_head(["clip", "markers", "angles deg", "raw deg", "centres mm", "residual mm"])
     for name, marker_set in ON_BONE:
         known = planted(clip(name), marker_set, seed=1, softness=0.0, noise=0.0)
@@ -86,11 +86,12 @@ def bone_table() -> list[str]:
 
 
 def _truth_row(name: str, marker_set: str, static: bool, known: Planted) -> str:
+    """Build a row; a failure becomes its text."""
     begin = [name, marker_set, "yes" if static else "no"]
     try:
         made = again(known, static, settings(marker_set))
         error = planted_error(known, made.motion)
-    except Exception as problem:  # noqa: BLE001 a table tells what failed and goes on
+    except Exception as problem:  # noqa: BLE001 the table reports the failure and continues
         return effort.format_row([*begin, f"failed: {problem}"[:160], *[""] * 7])
     solved = made.solved
     return effort.format_row([*begin, f"{np.degrees(error.angle):.2f}", f"{np.degrees(error.raw_angle):.2f}",
@@ -100,16 +101,18 @@ def _truth_row(name: str, marker_set: str, static: bool, known: Planted) -> str:
 
 
 def _rms_mm(values: np.ndarray) -> str:
+    """Format a root mean square in millimetres."""
     return f"{1e3 * np.sqrt(np.nanmean(values**2)):.1f}"
 
 
 def _worst(of: dict[str, float], scale: float, digits: int) -> str:
+    """Format the worst joint with its value."""
     joint = max(of, key=of.get)
     return f"{joint} {scale * of[joint]:.{digits}f}"
 
 
 def filter_table() -> list[str]:
-    """The same planted throw and walk by each filter."""
+    """Build the rows of the same throw and walk with each filter."""
     lines = effort.format_head(
         ["clip", "filter", "angles deg", "centres mm", "fastest hand m/s", "true", "hand's acceleration off"]
     )
@@ -126,7 +129,7 @@ def filter_table() -> list[str]:
 
 
 def _hand(known: Planted, found: Motion) -> tuple[float, float, float]:
-    """Fastest wrist found and true, m/s, and how far its acceleration is off, root mean square m/s^2."""
+    """Measure the fastest wrist found and true, m/s, and the error of its acceleration, root mean square m/s^2."""
     from beyond_mocap.motion.motion import forward_kinematics
 
     places, _ = forward_kinematics(found)
@@ -138,12 +141,12 @@ def _hand(known: Planted, found: Motion) -> tuple[float, float, float]:
 
 
 def fault_table() -> list[str]:
-    """What was planted and what of it was found and mended."""
+    """Build the rows of planted faults: what was found and fixed."""
     lines = [
         "Hidden: share of the samples that are hidden; filled: of the hidden ones that have a place again, how far "
-        "they are from where the marker was. Mended: planted faults after which the samples are right; false: what is "
-        "told of where nothing was planted; off afterwards: how far all samples are from the truth.", "",
-        *effort.format_head(["clip", "markers", "hidden", "filled", "off mm rms, p95", "swaps mended", "jumps mended",
+        "they are from where the marker was. Fixed: planted faults after which the samples are right; false: reports "
+        "where nothing was planted; off afterwards: how far all samples are from the truth.", "",
+        *effort.format_head(["clip", "markers", "hidden", "filled", "off mm rms, p95", "swaps fixed", "jumps fixed",
                              "unlabeled back", "false swaps, jumps", "off afterwards mm p99", "frames/s"]),
     ]  # fmt: skip
     for name, marker_set in SPOILED:
@@ -153,6 +156,7 @@ def fault_table() -> list[str]:
 
 
 def _fault_row(name: str, marker_set: str, share: float) -> str:
+    """Build a row of faults."""
     known = planted(clip(name), marker_set, seed=5, occlusion=share, swaps=4, jumps=8, unlabeled=3)
     own = chosen_set(SHIPPED.get(marker_set, marker_set))
     begun = time.process_time()
@@ -175,7 +179,7 @@ def _fault_row(name: str, marker_set: str, share: float) -> str:
 
 
 def _mended(known: Planted, names: tuple[str, ...], apart: np.ndarray, kind: str) -> str:
-    """`3 of 4`: faults of a kind after which 9 in 10 samples are within 15 mm of the truth."""
+    """Format how many faults are fixed, `3 of 4`: 9 in 10 samples are then within 15 mm of the truth."""
     done = [fault for fault in known.faults if fault.kind == kind]
     right = 0
     for fault in done:
@@ -185,7 +189,7 @@ def _mended(known: Planted, names: tuple[str, ...], apart: np.ndarray, kind: str
 
 
 def _false(known: Planted, report) -> str:
-    """Swaps and jumps that are told of where none was planted."""
+    """Format the number of swaps and jumps that are reported where none was planted."""
     counts = []
     for kind, told in (("swap", report.swaps), ("jump", report.jumps)):
         planted_ones = [fault for fault in known.faults if fault.kind in (kind, "swap")]
@@ -194,15 +198,16 @@ def _false(known: Planted, report) -> str:
 
 
 def _meets(stretch, known: Planted, fault) -> bool:
+    """Return whether a reported stretch overlaps a planted fault."""
     start, stop = stretch.start * known.trial.fps, stretch.end * known.trial.fps
     return start < fault.stop + 3 and stop > fault.start - 3 and bool(set(stretch.labels) & set(fault.labels))
 
 
 def speed_table() -> list[str]:
-    """Frames a second of the pose alone, on one core."""
+    """Build the rows of the speed of the pose alone, on one core."""
     from beyond_mocap.markers.pose.pose import solve
 
-    lines = effort.format_head(["clip", "markers", "joints", "frames", "frames a second (target 200)", "weights off"])
+    lines = effort.format_head(["clip", "markers", "joints", "frames", "frames per second (target 200)", "weights off"])
     for name, marker_set in TIMED:
         known = planted(clip(name), marker_set, seed=3, occlusion=_OCCLUDED)
         made = again(known, True, settings(marker_set))
@@ -213,7 +218,7 @@ def speed_table() -> list[str]:
 
 
 def _rate(made: Reconstruction, solve, weights: bool) -> float:
-    """Frames a second by the processor's time, the best of two."""
+    """Measure frames per second of processor time, the best of two."""
     from beyond_mocap.markers.pose.pose import PoseSettings
 
     best = np.inf

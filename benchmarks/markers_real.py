@@ -1,4 +1,4 @@
-"""Real trials through the whole recipe; planted throws whose release is known, and pitches whose speed a radar took."""
+"""Real trials through the whole reconstruction; synthetic throws with a known release; pitches with a radar speed."""
 
 from __future__ import annotations
 
@@ -24,18 +24,18 @@ TRIALS = (("000870_003252_74_195_002_FF_808.c3d", None), ("pitch_biodata.c3d", N
           ("sprinter_run0350cms.trc", "sprinter_static.trc"), ("sprinter_run0350cms.trc", None),
           ("sprinter_run0900cms.trc", "sprinter_static.trc"), ("PiG_Motion3_FF.c3d", "PiG_Calibration3_FF.c3d"),
           ("PiG_Motion3_FF.c3d", None), ("whole_body_stick_puck.c3d", None))
-"""Trial and static trial."""
+"""Trial and its static trial."""
 FOLDER = DATA / "markers"
 
 THROWS = ((18.0, 30.0, "right", "overarm", 240.0, 15.0), (18.0, 36.0, "right", "overarm", 360.0, 25.0),
           (12.0, 18.0, "left", "overarm", 200.0, 8.0), (10.0, 22.0, "right", "sidearm", 200.0, 0.0))
-"""Metres to the target, m/s, arm, style, frames a second, revolutions a second."""
+"""Metres to the target, m/s, arm, style, frames per second, revolutions per second."""
 PITCHES = ("000870_003252_74_195_002_FF_808.c3d", "pitch_biodata.c3d")
 
 
 @lru_cache(maxsize=None)
 def timed(trial: str, static: str | None) -> tuple[Reconstruction, float]:
-    """A trial's reconstruction and the processor's seconds that it took."""
+    """Reconstruct a trial, and measure its processor seconds."""
     still = None if static is None else read_markers(FOLDER / static)
     seen = read_markers(FOLDER / trial)
     begun = time.process_time()
@@ -43,23 +43,24 @@ def timed(trial: str, static: str | None) -> tuple[Reconstruction, float]:
 
 
 def trial_table() -> list[str]:
-    """One row per trial."""
+    """Build one row per trial."""
     lines = [
-        "Residual: model marker against seen one, of the pose; one segment: every cluster of at least three markers "
-        "fitted alone, which knows no joints and no limits; written: of the motion after its filters.", "",
+        "Residual: model marker against measured one, of the pose; one segment: every cluster of at least three "
+        "markers fitted alone, without joints and limits; written: of the motion after its filters.", "",
         *effort.format_head(["trial", "static", "set, markers, joints", "residual mm rms, p95", "one segment mm rms",
-                             "written mm rms", "bones change", "standing feet cm/s, mm", "at a limit",
+                             "written mm rms", "bones change", "planted feet cm/s, mm", "at a limit",
                              "fastest turn deg/frame", "seconds", "worst markers mm"]),
     ]  # fmt: skip
     return lines + [_row(trial, static) for trial, static in TRIALS]
 
 
 def _row(trial: str, static: str | None) -> str:
+    """Build the row of a trial; a failure becomes its text."""
     begin = [Path(trial).stem, "yes" if static else "no"]
     try:
         out, took = timed(trial, static)
         figures = out.report()
-    except Exception as problem:  # noqa: BLE001 a table tells what failed and goes on
+    except Exception as problem:  # noqa: BLE001 the table reports the failure and continues
         return effort.format_row([*begin, f"failed: {problem}"[:160], *[""] * 9])
     near, slide = figures["residual_mm"], figures["skate"]
     worst = sorted(((far, label) for label, far in near["per_marker"].items() if far), reverse=True)[:4]
@@ -74,7 +75,7 @@ def _row(trial: str, static: str | None) -> str:
 
 
 def _fastest(out: Reconstruction) -> str:
-    """The joint that turns farthest from one frame of the pose to the next: a flip would stand out."""
+    """Format the joint that turns most from one frame to the next: a flip would show here."""
     turns = out.solved.motion.rotations
     steps = np.linalg.norm(
         quaternion.to_rotation_vector(quaternion.multiply(quaternion.inverse(turns[:-1]), turns[1:])), axis=-1
@@ -84,9 +85,9 @@ def _fastest(out: Reconstruction) -> str:
 
 
 def planted_table() -> list[str]:
-    """Each planted throw with its ball's marker seen in flight, seen late, and with none."""
+    """Build the rows of each synthetic throw with its ball's marker seen in flight, seen late, and with none."""
     lines = effort.format_head(["throw", "ball's marker", "true m/s", "found m/s", "off", "time off ms, frames",
-                                "way off deg", "told sigma ms, m/s"])
+                                "direction error deg", "reported sigma ms, m/s"])
     for distance, speed, arm, style, fps, turns in THROWS:
         thrown = throw((distance, 0.0, 1.0), speed, arm, style, fps=fps)
         ball = PlantedBall(thrown.release, side=arm.title(), turns=turns)
@@ -100,7 +101,7 @@ def planted_table() -> list[str]:
 
 
 def _ways(known: Planted):
-    """The trial with all of the ball's marker, with it hidden for 40 ms around release, and without it."""
+    """Generate the trial with all of the ball's marker, with it hidden 40 ms around release, and without it."""
     label = known.ball.asked.label
     index = known.trial.index(label)
     frames = np.abs(np.arange(len(known.trial)) / known.trial.fps - known.ball.asked.release) < 0.04
@@ -112,10 +113,11 @@ def _ways(known: Planted):
 
 
 def _release_row(name: str, how: str, known: Planted, trial, motion) -> str:
+    """Build the row of a release; a failure becomes its text."""
     truth, fps = known.ball, known.trial.fps
     try:
         found = release(trial, motion, ReleaseSettings(ball_marker="" if how == "none" else None))
-    except Exception as problem:  # noqa: BLE001 a table tells what failed and goes on
+    except Exception as problem:  # noqa: BLE001 the table reports the failure and continues
         return effort.format_row([name, how, f"{truth.speed:.1f}", f"failed: {problem}"[:120], *[""] * 4])
     late = found.time - truth.asked.release
     way = np.degrees(np.arccos(np.clip(found.direction @ truth.velocity / truth.speed, -1.0, 1.0)))
@@ -126,13 +128,13 @@ def _release_row(name: str, how: str, known: Planted, trial, motion) -> str:
 
 
 def radar_table() -> list[str]:
-    """Pitches without a marker on the ball."""
-    lines = effort.format_head(["pitch", "found m/s", "radar m/s", "off", "told sigma m/s", "release s"])
+    """Build the rows of pitches without a marker on the ball."""
+    lines = effort.format_head(["pitch", "found m/s", "radar m/s", "off", "reported sigma m/s", "release s"])
     for trial in PITCHES:
         body, _ = timed(trial, None)
         found = release(body.raw, body.motion)
         radar = found.radar
-        lines.append(effort.format_row([trial, f"{found.speed:.1f}", "not told" if radar is None else f"{radar:.1f}",
+        lines.append(effort.format_row([trial, f"{found.speed:.1f}", "unknown" if radar is None else f"{radar:.1f}",
                                         "" if radar is None else f"{100 * (found.speed / radar - 1):+.1f} %",
                                         f"{found.speed_sigma:.1f}", f"{found.time:.3f}"]))
     return lines

@@ -1,8 +1,8 @@
-"""What players of a match cost, and how all of them get on together.
+"""Cost of the players of a match, and how they get on together.
 
 `speed_section`: processor seconds of search, construction and polishing per 20 s of motion, and of reading and cleaning
-a whole half. `crowd_section`: who is in whom, what keeping them apart costs, and who is in step with whom; overlaps,
-skate and jerk without and with the corrections; the share in step is that of the time of all players.
+a whole half. `crowd_section`: overlaps between players, the cost of collision avoidance, and players in step; overlaps,
+skate and jerk without and with the corrections. The share in step refers to the time of all players.
 """
 
 from __future__ import annotations
@@ -38,15 +38,21 @@ from beyond_mocap.synthesis.synthesize import synthesize
 from beyond_mocap.synthesis.take import Take
 
 SECONDS = (1480.0, 1500.0)
-"""Of the recorded half: players stand close together, so that there is something to keep apart."""
-WINDOW = 60.0
-STARTS = (60.0, 600.0, 1200.0, 1800.0, 2400.0)
+"""Stretch of the recorded half in which players are close together, so that collision avoidance has work to do."""
+WINDOW = 60.0  # s that are measured of a player
+STARTS = (60.0, 600.0, 1200.0, 1800.0, 2400.0)  # s at which windows begin
 EVERY = 4
-"""Of the players each fourth is measured, in windows that go round."""
+"""Every fourth player is measured, each in the next window."""
 
 
 def step_share(library: Library, takes: list[Take], firsts: list[int]) -> float:
-    """Share of the time of all players in which they are in step with a neighbour."""
+    """Measure the share of the time of all players in which they are in step with a neighbour.
+
+    Args:
+        library: the clips.
+        takes: takes of all players.
+        firsts: frame of the match at which each begins.
+    """
     start, fps = min(firsts), takes[0].motion.fps
     count = max(first + len(take.motion) for first, take in zip(firsts, takes)) - start
     rates = {clip.path: clip.motion.fps for clip in library.extended.clips}
@@ -63,7 +69,7 @@ def step_share(library: Library, takes: list[Take], firsts: list[int]) -> float:
 
 
 def figures(motions: list[Motion], contacts: list[np.ndarray], firsts: list[int]) -> str:
-    """One line on overlaps, skate and jerk."""
+    """Format overlaps, skate and jerk as one line."""
     depth, fps = np.concatenate(overlap_depths(motions, firsts)), motions[0].fps
     joints = [forward_kinematics(motion)[0] for motion in motions]
     skate = np.concatenate([
@@ -79,7 +85,7 @@ def figures(motions: list[Motion], contacts: list[np.ndarray], firsts: list[int]
 
 
 def what_is_changed(corrections: list[Correction], takes: list[Take], firsts: list[int]) -> str:
-    """One line on how far roots and arms are moved, and how often."""
+    """Format how far roots and arms are moved, and how often, as one line."""
     curves = np.concatenate([own.curves(at, len(take.motion)) for own, take, at in zip(corrections, takes, firsts)])
     root, arms = np.linalg.norm(curves[:, ROOT], axis=1), np.linalg.norm(curves[:, ARMS].reshape(-1, 2, 3), axis=2)
     knots = sum(len(own.knots) for own in corrections)
@@ -90,19 +96,19 @@ def what_is_changed(corrections: list[Correction], takes: list[Take], firsts: li
 
 
 def crowd_section() -> list[str]:
-    """Lines for results.md: SECONDS of a recorded half, made and measured."""
+    """Build the lines for results.md: SECONDS of a recorded half, synthesized and measured."""
     with tempfile.TemporaryDirectory() as place:
         folder, cache, recordings = Path(place) / "match", Path(place) / "cache", DATA / "mocap" / "cmu10"
         order = MatchOrder(DATA / "tracking" / "match" / "nl2019_half1.dat", recordings, folder, cache=cache,
                            unit=CMU_UNIT, start=SECONDS[0], end=SECONDS[1], figures=False)
         took, result = seconds(lambda: make_match(order), 1)
         library = build(recordings, unit=CMU_UNIT, cache_dir=cache)
-        made = f"- {len(result.done)} players made in {took:.1f} s of processor time, {len(result.failed)} failed"
+        made = f"- {len(result.done)} players in {took:.1f} s of processor time, {len(result.failed)} failed"
         return [made, *(f"- {line}" for line in crowd_lines(folder, library))]
 
 
 def crowd_lines(folder: Path, library: Library) -> list[str]:
-    """What a made folder shows of everybody together, without and with its corrections."""
+    """Measure all players of a match folder together, without and with their corrections."""
     edits = [read_player(path) for path in sorted(folder.glob("*.take.npz"))]
     pairs = [(take, edit) for edit in edits for take in expanded(library, edit, *SECONDS)]
     takes, fps = [take for take, _ in pairs], pairs[0][0].motion.fps
@@ -114,17 +120,17 @@ def crowd_lines(folder: Path, library: Library) -> list[str]:
     return [f"{len(takes)} takes; in step {100 * step_share(library, takes, firsts):.2f}%",
             f"without corrections: {figures(motions, contacts, firsts)}",
             f"with them: {figures(corrected, contacts, firsts)}", what_is_changed(kept, takes, firsts),
-            f"kept apart anew in {took:.1f} s of processor time"]
+            f"collision avoidance again in {took:.1f} s of processor time"]
 
 
 def windows(match: Match) -> list[tuple[str, float]]:
-    """(player, start in s) of what is measured."""
+    """List (player, start in s) of what is measured."""
     ids = [player.id for player in match.players][::EVERY]
     return [(player, STARTS[number % len(STARTS)]) for number, player in enumerate(ids)]
 
 
 def window_row(library: Library, match: Match, player: str, start: float) -> str:
-    """One player over one window: the search alone, and everything, per 20 s."""
+    """Measure one player over one window: the search alone, and everything, per 20 s."""
     track, _ = clean(match.track(player, start, start + WINDOW))
     plan = Plan(track=track, nearest=True)
     resolved = resolve_plan(plan, library)
@@ -138,7 +144,7 @@ def window_row(library: Library, match: Match, player: str, start: float) -> str
 
 
 def half_row(match: Match) -> str:
-    """One player's whole half, cleaned and sampled."""
+    """Measure cleaning and sampling of one player's whole half."""
     track = match.track(match.players[0].id)
     cleaned, (known, _) = seconds(lambda: clean(track))
     sampled, _ = seconds(lambda: sample(known, 30.0))
@@ -147,7 +153,7 @@ def half_row(match: Match) -> str:
 
 
 def peak_memory() -> str:
-    """What the process has held at most."""
+    """Report the peak memory of this process."""
     import resource
 
     kilo = 1024 if sys.platform == "darwin" else 1
@@ -155,11 +161,11 @@ def peak_memory() -> str:
 
 
 def speed_section() -> list[str]:
-    """Lines for results.md."""
+    """Build the lines for results.md."""
     with tempfile.TemporaryDirectory() as cache:
         library = build(DATA / "mocap" / "cmu10", unit=CMU_UNIT, cache_dir=cache)
         match = read_match(DATA / "tracking" / "match" / "nl2019_half1.dat", cache_dir=cache)
-        lines = format_head(("player", "from, s", "mean m/s", "seams", "search, s per 20 s",
+        lines = format_head(("player", "from, s", "mean m/s", "transitions", "search, s per 20 s",
                              "all, s per 20 s (target 0.35)"))
         lines += [window_row(library, match, *window) for window in windows(match)]
         lines += ["", *format_head(("player", "min", "clean, s", "sample, s")), half_row(match), "", peak_memory()]

@@ -1,7 +1,7 @@
 """Recordings of many kinds on many paths.
 
-Each recording's first ten seconds ride every path of `ALL`: name -> places (N, 3) m, the first at the origin and
-setting out along +x. A figure stands beside the recording's own, and beside the same ride without planting where that
+The first ten seconds of each recording follow every path of `ALL`: name -> places (N, 3) m, the first at the origin and
+starting along +x. A figure is given beside the recording's own, and beside the same edit without planting where that
 says something.
 """
 
@@ -39,7 +39,7 @@ COLUMNS = {
     "kept speed off %, path / body": ("kept_speed.path.max", "kept_speed.body.total"),
     "skate cm/s, before -> after (own)": ("skate.before_contact_cm_s", "skate.contact_cm_s",
                                           "skate.source_contact_cm_s"),
-    "all standing points": ("skate.before_point_cm_s", "skate.point_cm_s", "skate.source_point_cm_s"),
+    "all planted points": ("skate.before_point_cm_s", "skate.point_cm_s", "skate.source_point_cm_s"),
     "stance mm (own)": ("skate.stance_mm_median", "skate.source_stance_mm_median"),
     "over 21 mm % (own)": ("skate.stances_over_21mm", "skate.source_stances_over_21mm"),
     "IK missed %": ("ik_miss_share",),
@@ -49,21 +49,21 @@ COLUMNS = {
 }
 
 
-STEP = 0.02  # metres between places
+STEP = 0.02  # m between places
 
 
 def straight(length: float = 30.0) -> np.ndarray:
-    """A straight line."""
+    """Build a straight line."""
     return np.column_stack([np.arange(0.0, length, STEP), *np.zeros((2, len(np.arange(0.0, length, STEP))))])
 
 
 def circle(radius: float, rounds: float = 1.0) -> np.ndarray:
-    """A circle to the left."""
+    """Build a circle to the left."""
     return bent(lambda s: np.full_like(s, 1.0 / radius), 2.0 * np.pi * radius * rounds)
 
 
 def bent(curvature, length: float) -> np.ndarray:
-    """The line whose curvature, 1/m to the left, is curvature(s (N,) m)."""
+    """Build the line whose curvature, 1/m to the left, is curvature(s (N,) m)."""
     s = np.arange(0.0, length, STEP)
     bend = curvature(s)
     heading = np.concatenate([[0.0], np.cumsum(0.5 * STEP * (bend[1:] + bend[:-1]))])
@@ -73,26 +73,26 @@ def bent(curvature, length: float) -> np.ndarray:
 
 
 def winding(radius: float = 2.5, wave: float = 9.0, length: float = 30.0) -> np.ndarray:
-    """An S after the other; `radius` m where it bends most."""
+    """Build a row of S curves; `radius` m at the tightest points."""
     return bent(lambda s: np.sin(2.0 * np.pi * s / wave) / radius, length)
 
 
 def zigzag(leg: float = 3.0, angle: float = 60.0, legs: int = 10) -> np.ndarray:
-    """Straight legs that turn by `angle` degrees to and fro: the corners alone."""
+    """Build straight legs that turn by `angle` degrees to and fro: corners only."""
     way = np.radians(angle) * (np.arange(legs) % 2)
     steps = leg * np.column_stack([np.cos(way), np.sin(way), np.zeros(legs)])
     return np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
 
 
 def eight(size: float = 3.5, rounds: float = 1.5) -> np.ndarray:
-    """A figure of eight (Gerono's), 2 `size` m long."""
+    """Build a figure of eight (Gerono's), 2 `size` m long."""
     t = np.linspace(0.0, 2.0 * np.pi * rounds, 3000)
     line = size * np.column_stack([np.sin(t), np.sin(t) * np.cos(t), np.zeros_like(t)])
     return line @ _turned(-0.25 * np.pi)
 
 
 def walkabout(length: float = 30.0, seed: int = 3, tightest: float = 2.0) -> np.ndarray:
-    """A stroll of bends of all sizes, `tightest` m at least."""
+    """Build a walk with bends of all sizes, radius at least `tightest` m."""
     rng = np.random.default_rng(seed)
     waves, phases, size = rng.uniform(5.0, 16.0, 5), rng.uniform(0.0, 2.0 * np.pi, 5), rng.uniform(0.4, 1.0, 5)
     s = np.arange(0.0, length, STEP)
@@ -101,8 +101,10 @@ def walkabout(length: float = 30.0, seed: int = 3, tightest: float = 2.0) -> np.
 
 
 def hill(degrees: float, way: float = 4.0, length: float = 30.0) -> np.ndarray:
-    """Up for `way` m over the ground, over the top and down again, and so on; slopes of `degrees` but for 1 m around
-    tops and valleys."""
+    """Build hills: up for `distance` m over the ground, over the top and down again, and so on.
+
+    Slopes are `degrees` except for 1 m around tops and valleys.
+    """
     line = straight(length)
     slope = np.tan(np.radians(degrees)) * np.clip(np.sin(np.pi * line[:, 0] / way) * way / np.pi, -1.0, 1.0)
     line[:, 2] = np.cumsum(slope) * STEP
@@ -110,6 +112,7 @@ def hill(degrees: float, way: float = 4.0, length: float = 30.0) -> np.ndarray:
 
 
 def _turned(angle: float) -> np.ndarray:
+    """Return the matrix that rotates rows about the vertical by `angle` rad."""
     c, s = np.cos(angle), np.sin(angle)
     return np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
 
@@ -123,7 +126,15 @@ ALL = {**FAIR, **TIGHT, **HILLS}
 
 @dataclass(frozen=True)
 class Row:
-    """One ride: of which kind and recording, on which path, its figures by dotted name, ms of `ride`."""
+    """One path edit.
+
+    Attributes:
+        kind: kind of recording.
+        clip: the recording.
+        path: name of the path.
+        values: figures by dotted name.
+        ms: of `edit_path`.
+    """
 
     kind: str
     clip: str
@@ -133,7 +144,13 @@ class Row:
 
 
 def rides(kinds: Iterable[str] = tuple(CLIPS), paths: Iterable[str] = tuple(ALL), **settings) -> list[Row]:
-    """A row for each recording of `kinds` on each of `paths`. settings: of RideSettings."""
+    """Measure each recording of `kinds` on each of `paths`.
+
+    Args:
+        kinds: keys of CLIPS.
+        paths: keys of ALL.
+        settings: of `PathEditSettings`.
+    """
     chosen, rows = RideSettings(**settings), []
     for kind in kinds:
         for name in CLIPS[kind]:
@@ -143,13 +160,14 @@ def rides(kinds: Iterable[str] = tuple(CLIPS), paths: Iterable[str] = tuple(ALL)
 
 
 def recording(kind: str, name: str):
-    """The first ten seconds of a recording."""
+    """Read the first ten seconds of a recording."""
     file = DATA / "mocap" / kind / f"{name}.bvh"
     motion = bvh.read(file, CMU_UNIT if kind == "cmu10" else None).motion
     return motion.frames(0, min(len(motion), int(SECONDS * motion.fps) + 1))
 
 
 def _row(kind: str, name: str, shape: str, source, settings: RideSettings) -> Row:
+    """Edit and measure one recording on one path."""
     path = through(ALL[shape], shape)
     begun = time.process_time()
     ridden = ride(source, path, settings)
@@ -158,7 +176,7 @@ def _row(kind: str, name: str, shape: str, source, settings: RideSettings) -> Ro
 
 
 def dotted(value, name: str = "") -> dict[str, float]:
-    """Nested figures by dotted name; what is not known is NaN."""
+    """Flatten nested figures to dotted names; what is not known is NaN."""
     if isinstance(value, dict):
         return {
             k: v for key, entry in value.items() for k, v in dotted(entry, f"{name}.{key}" if name else key).items()
@@ -167,9 +185,9 @@ def dotted(value, name: str = "") -> dict[str, float]:
 
 
 def table(rows: list[Row], by: str) -> list[str]:
-    """Medians over the rides of each `by` (kind or path), a line each."""
+    """Build a table of medians over the edits of each `by` (kind or path)."""
     names = list(dict.fromkeys(getattr(row, by) for row in rows))
-    lines = effort.format_head([by, "rides", *COLUMNS])
+    lines = effort.format_head([by, "edits", *COLUMNS])
     for name in names:
         group = [row for row in rows if getattr(row, by) == name]
         lines.append(effort.format_row([name, str(len(group)), *(_cell(group, of) for of in COLUMNS.values())]))
@@ -177,6 +195,7 @@ def table(rows: list[Row], by: str) -> list[str]:
 
 
 def _cell(group: list[Row], names: tuple[str, ...]) -> str:
+    """Format the median of one to three figures."""
     values = [_scale(name) * _median([row.values.get(name, np.nan) for row in group]) for name in names]
     shown = ["-" if not np.isfinite(value) else f"{value if abs(value) > 1e-6 else 0.0:.3g}" for value in values]
     if len(shown) == 3:
@@ -186,12 +205,14 @@ def _cell(group: list[Row], names: tuple[str, ...]) -> str:
 
 
 def _scale(name: str) -> float:
+    """Return the factor to centimetres or percent of a figure."""
     if "_m." in name:
         return 100.0
     return 100.0 if name.startswith("kept_speed") or "share" in name or "over_21" in name else 1.0
 
 
 def _median(values: list[float]) -> float:
+    """Compute the median of finite values, NaN without any."""
     known = [value for value in values if np.isfinite(value)]
     return float(np.median(known)) if known else np.nan
 
@@ -200,19 +221,19 @@ WORST = {
     "root error mean, cm": lambda v: 100.0 * v["root_error_m.mean"],
     "kept speed off, %": lambda v: 100.0 * v["kept_speed.path.max"],
     "skate over the recording's own, cm/s": lambda v: v["skate.contact_cm_s"] - v["skate.source_contact_cm_s"],
-    "standing points over the recording's own, cm/s": lambda v: v["skate.point_cm_s"] - v["skate.source_point_cm_s"],
+    "planted points over the recording's own, cm/s": lambda v: v["skate.point_cm_s"] - v["skate.source_point_cm_s"],
     "stance over the recording's own, mm": lambda v: v["skate.stance_mm_median"] - v["skate.source_stance_mm_median"],
     "frames in which IK missed, %": lambda v: 100.0 * v["ik_miss_share"],
     "foot moved, p95, cm": lambda v: 100.0 * v["foot_correction_m.p95"],
     "knee jerk over the recording's own": lambda v: v["knee_jerk_ratio.p99"],
-    "standing sole off the surface over the recording's own, p95, mm": (
+    "planted sole off the surface over the recording's own, p95, mm": (
         lambda v: v["ground_mm.standing_p95"] - v["ground_mm.source_standing_p95"]
     ),
 }
 
 
 def worst(rows: list[Row], count: int) -> list[str]:
-    """The `count` worst rides of every kind of figure."""
+    """List the `count` worst edits for every kind of figure."""
     lines = []
     for title, of in WORST.items():
         known = [(value, row) for row in rows if np.isfinite(value := _value(of, row))]
@@ -223,6 +244,7 @@ def worst(rows: list[Row], count: int) -> list[str]:
 
 
 def _value(of, row: Row) -> float:
+    """Return a figure of a row, NaN where it lacks one."""
     try:
         return of(row.values)
     except KeyError:
@@ -230,28 +252,28 @@ def _value(of, row: Row) -> float:
 
 
 def kept(rows: list[Row]) -> str:
-    """How many fair rides skate no more than their recording, and keep the speed."""
+    """Describe how many edits on fair paths skate no more than their recording, and keep the speed."""
     fair = [row for row in rows if row.path in FAIR]
     if not fair:
-        return "no ride on a fair path"
+        return "no edit on a fair path"
     pairs = [(row.values.get("skate.contact_cm_s"), row.values.get("skate.source_contact_cm_s")) for row in fair]
     known = [(a, b) for a, b in pairs if a is not None and np.isfinite(a) and np.isfinite(b)]
     still = np.mean([a <= b + 0.05 for a, b in known])
     speed = np.mean([row.values["kept_speed.path.max"] <= 0.01 for row in fair])
     error = np.mean([row.values["root_error_m.mean"] <= 0.005 for row in fair])
     return (
-        f"Bends of radius 2 m or more, {len(fair)} rides: feet slide no more than in the recording in {still:.0%}, arc "
+        f"Bends of radius 2 m or more, {len(fair)} edits: feet slide no more than in the recording in {still:.0%}, arc "
         f"length per frame is kept within 1 % in {speed:.0%}, the root is within 5 mm of the path (mean) in "
         f"{error:.0%}."
     )
 
 
 def timing() -> str:
-    """ms of `prepare` and `ride` for 600 frames at 60 per second, the best of seven."""
+    """Measure ms of `prepare_source` and `edit_path` for 600 frames at 60 per second, the best of seven."""
     motion = recording("lafan1", "walk1_subject1_walk2_filtered")
     motion = resample(motion, 60.0).frames(0, BUDGET_FRAMES)
     settings, path = RideSettings(), through(winding(), "winding")
-    took = {"prepare": np.inf, "ride": np.inf, "ride without planting": np.inf}
+    took = {"prepare": np.inf, "edit": np.inf, "edit without planting": np.inf}
     for _ in range(7):
         begun = time.process_time()
         source = prepare(motion, settings)
@@ -262,13 +284,13 @@ def timing() -> str:
         for name, ms in zip(took, (ready - begun, done - ready, time.process_time() - done)):
             took[name] = min(took[name], 1e3 * ms)
     told = ", ".join(f"{name} {ms:.0f} ms" for name, ms in took.items())
-    return f"{len(motion)} frames, {len(motion.skeleton)} joints: {told} (target of ride: {BUDGET_MS:g} ms)."
+    return f"{len(motion)} frames, {len(motion.skeleton)} joints: {told} (target of an edit: {BUDGET_MS:g} ms)."
 
 
 def cycled(kinds: Iterable[str] = tuple(CLIPS)) -> list[str]:
-    """A line for each kind of recordings that are repeated until 25 m of winding path are filled: jerk at their
-    seams."""
-    lines = ["Cycled over the winding path, seam jerk against the recording's own at that speed (95th percentile):", ""]
+    """Measure jerk at the transitions of recordings cycled along 25 m of the winding path, a line per kind."""
+    lines = ["Cycled on the winding path, jerk at transitions over the recording's own at that speed (95th "
+             "percentile):", ""]
     for kind in kinds:
         ratios, told = [], []
         for name in CLIPS[kind]:
@@ -281,13 +303,13 @@ def cycled(kinds: Iterable[str] = tuple(CLIPS)) -> list[str]:
             if np.isfinite(row.values["seam_jerk.max"]):
                 ratios.append(row.values["seam_jerk.max"])
                 told.append(f"{name} {ratios[-1]:.2f}")
-        most = f"{np.median(ratios):.2f} median, {max(ratios):.2f} largest" if ratios else "no seams"
+        most = f"{np.median(ratios):.2f} median, {max(ratios):.2f} largest" if ratios else "no transitions"
         lines.append(f"- {kind}: {most} ({'; '.join(told)})")
     return [*lines, ""]
 
 
 def section(kinds: Iterable[str] = tuple(CLIPS), paths: Iterable[str] = tuple(ALL), count: int = 3) -> list[str]:
-    """The lines of a report: what is kept, by path, by recordings, the worst `count`, cycling."""
+    """Build the lines of a report: what is kept, by path, by recordings, the worst `count`, cycling."""
     rows = rides(kinds, paths)
     return [kept(rows), "", timing(), "", *table(rows, "path"), "", *table(rows, "kind"), "",
             "Medians; `before` is without planting, `own` the recording's. The worst:", "", *worst(rows, count), "",

@@ -1,4 +1,4 @@
-"""Where the recordings and scenarios are, and the libraries that are made of them."""
+"""Where the recordings and scenarios are, and the libraries built from them."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from beyond_mocap.motion.track import Track, clean
 
 ROOT = Path(__file__).resolve().parent.parent
 DATA = ROOT.parent / "shared" / "data"
-CMU_UNIT = 0.05644
+CMU_UNIT = 0.05644  # m per unit of the CMU recordings
 MIXED = ("cmu10", "lmd/Player1", "lafan1", "runs15", "sprinter")
 LIBRARIES = {"cmu10": CMU_UNIT, "mixed": None}
-"""Name -> metres per unit of its clips, None where each is guessed."""
+"""Name -> metres per unit of its clips, None where each is estimated."""
 
 
 def library_folder(name: str, place: Path) -> Path:
-    """The folder of a library; the mixed one is made below `place`."""
+    """Return the folder of a library; the mixed one is built below `place`."""
     return linked(MIXED, place / name) if name == "mixed" else DATA / "mocap" / name
 
 
 def linked(kinds: Sequence[str], folder: Path) -> Path:
-    """`folder` with links to the folders of several kinds of recordings, and one table of words for all."""
+    """Link the folders of several kinds of recordings in `folder`, with one table of labels for all."""
     rows = (DATA / "mocap" / "annotations.csv").read_text().splitlines()
     kept = [row for row in rows[1:] if row.split(",")[0].startswith(tuple(f"{kind}/" for kind in kinds))]
     for kind in kinds:
@@ -35,13 +35,13 @@ def linked(kinds: Sequence[str], folder: Path) -> Path:
 
 
 def scenario_files(number: int) -> tuple[Path, Path]:
-    """Track and annotations of a scenario."""
+    """Return the track and annotation files of a scenario."""
     place = DATA / "tracking" / "scenarios"
     return place / f"scenario{number}_track.csv", place / f"scenario{number}_annotations.txt"
 
 
 def scenario(number: int) -> tuple[Track, Timeline]:
-    """What scenario `number` asks for."""
+    """Read the track and timeline of a scenario."""
     track_file, words_file = scenario_files(number)
     track, _ = clean(read_track_csv(track_file))
     return track, read_timeline(words_file, 30.0, float(track.times[0]))

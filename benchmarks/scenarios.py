@@ -1,8 +1,9 @@
 """The five scenarios with two libraries: time, every figure of method `path` beside its target, and edits.
 
-The edits are those of ../shared/metrics.md, "edit time": every key moment by 0.2 s, earlier and later, and the track
-dragged by half a metre at a quarter, half and three quarters of its time, within a second and a half to either side:
-processor's seconds from a changed plan to the new take, how much of it is new, and what shows at its ends.
+The edits are those of ../shared/metrics.md, "edit time": every key moment moved by 0.2 s, earlier and later, and the
+track dragged by half a metre at a quarter, half and three quarters of its time, within a second and a half to either
+side. Measured are processor seconds from a changed plan to the new take, how much of it is new, and what shows at the
+ends of that.
 """
 
 from __future__ import annotations
@@ -32,12 +33,12 @@ from beyond_mocap.synthesis.take import Take
 
 NUMBERS = (1, 2, 3, 4, 5)
 
-LATER, ASIDE, WIDTH = 0.2, 0.5, 1.5
-TARGET = 0.3
+LATER, ASIDE, WIDTH = 0.2, 0.5, 1.5  # s by which key moments move; m and s of the bump in the track
+TARGET = 0.3  # s of an edit
 
 
 def section() -> list[str]:
-    """Lines for results.md."""
+    """Build the lines for results.md."""
     lines = [f"- {effort.blas_speed()}", f"- {effort.bvh_speed()}", f"- {effort.library_speed()}", ""]
     with tempfile.TemporaryDirectory() as place:
         for name in LIBRARIES:
@@ -46,7 +47,7 @@ def section() -> list[str]:
 
 
 def of_library(name: str, place: Path) -> list[str]:
-    """One library, its cache kept in `place`."""
+    """Measure one library, with its cache in `place`."""
     folder, unit, cache = library_folder(name, place), LIBRARIES[name], place / "cache"
     cold, _ = effort.seconds(lambda: build(folder, unit=unit, cache_dir=cache, rebuild=True), 1)
     warm, library = effort.seconds(lambda: build(folder, unit=unit, cache_dir=cache))
@@ -59,7 +60,7 @@ def of_library(name: str, place: Path) -> list[str]:
 
 
 def report_of(library: Library, number: int) -> dict:
-    """A scenario's report, with the processor's seconds, the best of three."""
+    """Evaluate a scenario, with the best processor time of three runs."""
     track, timeline = scenario(number)
     plan = Plan(track=track, timeline=timeline, library=library.folder, nearest=True)
     best, take = effort.seconds(lambda: synthesize(library, plan))
@@ -68,7 +69,7 @@ def report_of(library: Library, number: int) -> dict:
 
 
 def figures(reports: Mapping[int, Mapping]) -> list[str]:
-    """A row for each figure with a target: its value in every scenario, the recordings' own, in how many it is met."""
+    """Build a row for each figure with a target: its value per scenario, the recordings' own, where it is met."""
     rows = {number: {row.name: row for row in judge_figures(report)} for number, report in reports.items()}
     lines = effort.format_head(["figure", "target", *(f"scenario {number}" for number in rows), "recordings", "met in"])
     for name in dict.fromkeys(row.name for of in rows.values() for row in of.values() if row.status):
@@ -82,8 +83,15 @@ def figures(reports: Mapping[int, Mapping]) -> list[str]:
 
 
 def edit_times(library: Library, orders: Iterable[tuple[Track, Timeline]], runs: int = 3) -> list[str]:
-    """Markdown lines: a row per kind of edit, over all orders (track, timeline); seconds are the best of
-    `runs`."""
+    """Measure a kind of edit per row, over all requests.
+
+    Args:
+        library: the clips.
+        requests: (track, timeline) of each.
+        runs: the best of so many runs counts.
+    Returns:
+        Lines of Markdown.
+    """
     figures: dict[str, list[tuple[float, ...]]] = {}
     for track, timeline in orders:
         before = synthesize(library, Plan(track=track, timeline=timeline, nearest=True))
@@ -93,7 +101,7 @@ def edit_times(library: Library, orders: Iterable[tuple[Track, Timeline]], runs:
             if len(anew):
                 figures.setdefault(kind, []).append((best, len(anew) / after.motion.fps, *_ends(before, after, anew)))
     return [
-        f"| edit | n | median s | 95 % s | within {TARGET:g} s | made anew, median s | "
+        f"| edit | n | median s | 95 % s | within {TARGET:g} s | regenerated, median s | "
         "jerk at its ends, before -> after | feet slide there, before -> after |",
         "|---" * 8 + "|",
         *(_row(kind, np.array(found)) for kind, found in figures.items()),
@@ -101,6 +109,7 @@ def edit_times(library: Library, orders: Iterable[tuple[Track, Timeline]], runs:
 
 
 def _row(kind: str, found: np.ndarray) -> str:
+    """Format the row of a kind of edit."""
     seconds, anew, jerk, jerk_after, slide, slide_after = found.T
     return (
         f"| {kind} | {len(found)} | {np.median(seconds):.2f} | {np.percentile(seconds, 95):.2f} | "
@@ -111,6 +120,7 @@ def _row(kind: str, found: np.ndarray) -> str:
 
 
 def _edits(plan: Plan) -> Iterator[tuple[str, Plan]]:
+    """Generate (kind, changed plan) of every edit."""
     keys, times = plan.timeline.keys, plan.track.times
     for number, key in enumerate(keys):
         for moved in (key.time - LATER, key.time + LATER):
@@ -123,12 +133,20 @@ def _edits(plan: Plan) -> Iterator[tuple[str, Plan]]:
 
 
 def dragged(track: Track, at: float, aside: Sequence[float] = (0.0, ASIDE), width: float = WIDTH) -> Track:
-    """The track with a smooth bump of `aside` (2,) m around second `at`, `width` s to each side."""
+    """Drag a track aside with a smooth bump.
+
+    Args:
+        track: the track.
+        at: s of the bump's top.
+        aside: (2,) m.
+        width: s to either side.
+    """
     bump = smoothstep(1.0 - np.abs(track.times - at) / width)[:, None] * np.asarray(aside)
     return replace(track, positions=track.positions + bump)
 
 
 def _timed(library: Library, plan: Plan, before: Take, runs: int) -> tuple[float, Take]:
+    """Resynthesize, and measure the best processor time."""
     best, after = np.inf, before
     for _ in range(runs):
         begun = time.process_time()
@@ -138,14 +156,17 @@ def _timed(library: Library, plan: Plan, before: Take, runs: int) -> tuple[float
 
 
 def _changed(before: Take, after: Take) -> np.ndarray:
-    """(T,) bool: frames of which any bit is another."""
+    """Return (T,) bool: frames of which any bit has changed."""
     a, b = before.motion, after.motion
     return np.any(a.root_positions != b.root_positions, axis=1) | np.any(a.rotations != b.rotations, axis=(1, 2))
 
 
 def _ends(before: Take, after: Take, anew: np.ndarray) -> tuple[float, ...]:
-    """Largest jerk of any joint, m/s^3, and mean speed of standing toes, cm/s, before and after, within the half second
-    in which old and new meet; NaN where the whole take is new."""
+    """Measure the frames in which old and new motion are blended: largest jerk of any joint and speed of planted toes.
+
+    Returns:
+        Before and after, m/s^3 and cm/s; NaN where the whole take is new.
+    """
     count, hand = len(after.motion), int(0.5 * after.motion.fps)
     starts = [anew[0]] * (anew[0] > 0) + [anew[-1] - hand] * (anew[-1] + 1 < count)
     frames = np.unique(np.clip([np.arange(start - 3, start + hand + 3) for start in starts], 0, count - 4))
@@ -153,6 +174,7 @@ def _ends(before: Take, after: Take, anew: np.ndarray) -> tuple[float, ...]:
 
 
 def _shown(take: Take, frames: np.ndarray) -> tuple[float, float]:
+    """Measure jerk and toe speed of a take in some frames."""
     if not len(frames):
         return np.nan, np.nan
     places, _ = forward_kinematics(take.motion)

@@ -1,5 +1,4 @@
-"""The section on throws and kicks: the shipped weights on people that they never saw, targets anywhere, and
-seconds."""
+"""Throws and kicks: the shipped weights on performers that they were not trained on, targets anywhere, and seconds."""
 
 from __future__ import annotations
 
@@ -25,18 +24,18 @@ from beyond_mocap.throws.throw import throw_at
 from beyond_mocap.throws.throw_order import Order
 
 UNSEEN, EACH = (901, 902, 903), 3
-"""Seeds of made people whom no shipped weights saw, and movements of each."""
+"""Seeds of synthetic performers that no shipped weights were trained on, and movements of each."""
 TARGETS = {"throw": ((6.0, 0.0, 1.2), (12.0, 4.0, 0.4), (12.0, -4.0, 2.2), (18.0, 0.0, 1.0), (24.0, 6.0, 1.5)),
            "kick": ((11.0, 0.0, 0.5), (11.0, 3.4, 2.2), (11.0, -3.4, 0.4), (16.0, 2.0, 1.2), (20.0, -3.0, 1.8))}
-"""m, the thrower or the ball at the origin; (x, y) is turned by any angle."""
-FRAMES = 90
+"""m, the thrower or the ball at the origin; (x, y) is rotated by any angle."""
+FRAMES = 90  # evaluated frames of the networks
 SIZES = (("hierarchy", 4, 3, 96), ("hierarchy", 4, 3, 128), ("hierarchy", 4, 3, 256), ("hierarchy", 1, 8, 256),
          ("single", 4, 4, 512))  # fmt: skip
 _RUNS = 5
 
 
 def section() -> list[str]:
-    """Lines for results.md; an action without weights is told."""
+    """Build the lines for results.md; an action without weights is reported."""
     lines = []
     for action in TARGETS:
         lines += [f"### {action.capitalize()}s by the shipped weights", ""]
@@ -52,7 +51,7 @@ def section() -> list[str]:
 
 @lru_cache(maxsize=None)
 def unseen(action: str, fps: float) -> tuple:
-    """Movements of people whom no weights saw."""
+    """Generate movements of performers that no weights were trained on."""
     found = []
     for seed in UNSEEN:
         for order in range(EACH):
@@ -64,8 +63,8 @@ def unseen(action: str, fps: float) -> tuple:
 
 
 def unseen_table(model, action: str) -> list[str]:
-    """What the model makes of movements that it never saw, scaled by height."""
-    lines = effort.format_head([f"{len(UNSEEN)} unseen people, {EACH} each",
+    """Evaluate the model on movements that it was not trained on, scaled by height."""
+    lines = effort.format_head([f"{len(UNSEEN)} unseen performers, {EACH} each",
                                 "left hand, right hand, left foot, right foot, cm", "networks alone, cm",
                                 "ball off at 4 m, m", "head off, °", "head turns", "jerk", "beyond limits"])
     for words, options in (("networks alone (target 3 cm)", RAW), ("corrected", FULL)):
@@ -80,12 +79,12 @@ def unseen_table(model, action: str) -> list[str]:
 
 
 def target_table(model, action: str) -> list[str]:
-    """Targets that nobody aimed at, after the last correction."""
+    """Evaluate new targets, after the last correction."""
     lines = effort.format_head(
         ["target, m", "ball off, m (0.10)", "moved, cm (5)", "turned, °", "m/s", "raw, cm (3)", "seconds"]
     )
     for number, target in enumerate(TARGETS[action]):
-        angle = 1.1 * number  # anywhere on the ground
+        angle = 1.1 * number  # rad, any direction on the ground
         turn = np.array([[np.cos(angle), -np.sin(angle), 0.0], [np.sin(angle), np.cos(angle), 0.0], [0.0, 0.0, 1.0]])
         order = Order(tuple(turn @ target))
         try:
@@ -101,19 +100,22 @@ def target_table(model, action: str) -> list[str]:
 
 
 def _place(target) -> str:
+    """Format a place."""
     return ", ".join(f"{value:g}" for value in target)
 
 
 def _centimetres(values: dict) -> str:
+    """Format values in centimetres."""
     return ", ".join(f"{100 * value:.1f}" for value in values.values())
 
 
 def _number(value: float, form: str) -> str:
+    """Format a number, "-" where it is not finite."""
     return format(value, form) if np.isfinite(value) else "-"
 
 
 def networks_row(kind: str, points: int, layers: int, units: int) -> str:
-    """The networks of one size, evaluated frame after frame on a full body."""
+    """Measure the networks of one size, evaluated frame after frame on a full body."""
     settings = ModelSettings(kind=kind, points=points, layers=layers, units=units)
     random = np.random.default_rng(1)
     made = [_network(random, *size, settings) for size in widths(chains_of(adult_skeleton(1.8)), settings).values()]
@@ -133,6 +135,7 @@ def networks_row(kind: str, points: int, layers: int, units: int) -> str:
 
 
 def _network(random, inputs: int, outputs: int, settings: ModelSettings) -> PhaseNetwork:
+    """Build a network with random weights."""
     sizes = [inputs, *[settings.units] * settings.layers, outputs]
     shapes = [(settings.points, out, width) for width, out in zip(sizes, sizes[1:])]
     weights = tuple((random.normal(size=shape) / np.sqrt(shape[2])).astype(np.float32) for shape in shapes)
@@ -141,7 +144,7 @@ def _network(random, inputs: int, outputs: int, settings: ModelSettings) -> Phas
 
 
 def throw_rows(model: ThrowModel, name: str) -> list[str]:
-    """A throw of three seconds on the model's skeleton: what the networks say, and with everything after the fact."""
+    """Measure a throw of three seconds on the model's skeleton: the networks alone, and with all corrections."""
     made = throw((18.0, 1.0, 1.0), 20.0, "right", skeleton=model.skeleton, fps=120.0)
     begin = max(made.release - 1.75, 0.0)
     example = example_of("timed", "", made.motion, "right_hand", made.release, (18.0, 1.0, 1.0), None,
@@ -156,7 +159,7 @@ def throw_rows(model: ThrowModel, name: str) -> list[str]:
 
 
 def speed_tables() -> list[str]:
-    """What the networks alone cost, of several sizes, and a throw of three seconds with the shipped weights."""
+    """Measure the networks alone, of several sizes, and a throw of three seconds with the shipped weights."""
     lines = effort.format_head(("networks", "control points", "hidden layers", "units", "parameters, million",
                                 "MB as float16", f"s for {FRAMES} frames (target 0.12)"))
     lines += [networks_row(*size) for size in SIZES]

@@ -1,12 +1,13 @@
-"""Beyond Mocap's core: from tracking data, a folder of motion capture and a few labels to full-body animation.
+"""Beyond Mocap's core: full-body animation from tracking data, a folder of motion capture and a few labels.
 
-A folder for each feature over a small shared base; docs/architecture.md has the rooms, what each is for and who may
-import whom. The main road: `files` and `library` in, `synthesis` (plan, resolve, search, construct), `evaluation` out.
+There is one folder per feature over a small shared base; docs/architecture.md describes each folder and which folders
+it may import. The main sequence is `files` and `library` (input), `synthesis` (plan, resolve, search, construct) and
+`evaluation` (output).
 
-Units and frames everywhere inside: metres, seconds, radians; Z up, X forward along the pitch's length, Y to its left;
+Units and frames inside the core: metres, seconds, radians; Z up, X forward along the pitch's length, Y to its left;
 quaternions (w, x, y, z), unit and sign-continuous; arrays (frame, joint, component) with free leading axes.
-Readers and writers convert at the border. Inputs are never changed; randomness takes a seed; the same input gives the
-same output. The core needs numpy, scipy and scikit-learn, and never bpy.
+Readers and writers convert at the border. Functions do not change their inputs. Randomness takes a seed, and the same
+input gives the same output. The core needs numpy, scipy and scikit-learn, and never bpy.
 """
 
 __version__ = "0.1.0"

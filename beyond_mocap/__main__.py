@@ -1,4 +1,4 @@
-"""`python -m beyond_mocap VERB ...`: the command line, see `cli.main`."""
+"""Run the command line: `python -m beyond_mocap VERB ...`, see `cli.main`."""
 
 import sys
 

@@ -1,4 +1,4 @@
-"""What a user can do: a module per feature, each operator from settings to the core to the scene."""
+"""The extension's operators, one module per feature: each takes settings, calls the core and changes the scene."""
 
 from ..scene.core import registration
 
@@ -9,5 +9,5 @@ def register():
 
 
 def unregister():
-    """Undo it, the last step first."""
+    """Unregister them in reverse order."""
     registration.unregister_package(__name__)

@@ -1,4 +1,4 @@
-"""Annotate by keys while the match plays (a shell over the core's `annotating`), and the reference video beside it."""
+"""Annotate by keys while the match plays (the window's side of the core's `key_commands`), and the reference video."""
 
 from __future__ import annotations
 
@@ -29,28 +29,27 @@ KEYS = {
     "X": "REMOVE", "DEL": "REMOVE", "COMMA": "EARLIER", "PERIOD": "LATER", "LEFT_ARROW": "PREVIOUS",
     "RIGHT_ARROW": "NEXT", "UP_ARROW": "PREVIOUS_PLAYER", "DOWN_ARROW": "NEXT_PLAYER", "TAB": "NEXT_PLAYER",
 }
-LOWEST = 10.0  # letters; a lower editor has no room for the menu, and it is drawn in the largest one
+LOWEST = 10.0  # height in letters; the menu of a smaller editor is drawn in the largest one
 REPEATING = {"EARLIER", "LATER", "PREVIOUS", "NEXT"}
-STATUS = ("1-9: words   I, O: in, out   M: mirror   Left, Right: key moments   Up, Down: players   , . : a frame   "
-          "X: remove   H: hide the list   Space: play   Esc: leave")
+STATUS = ("1-9: labels   I, O: in, out   M: mirror   Left, Right: key moments   Up, Down: players   , . : one frame   "
+          "X: remove   H: hide the list   Space: play   Esc: stop")
 
-_menu: dict = {}  # what is drawn: the box, in which region and for which (by pointer), the word under the mouse
-_running: list[bool] = []  # not empty while the user annotates
+_menu: dict = {}  # the drawn menu: its box, its two regions (as pointers), the label under the mouse
+_running: list[bool] = []  # not empty while the operator runs
 
 
 class BEYOND_MOCAP_OT_annotate(Verb, bpy.types.Operator):
-    """Say what the player does by number keys, at the playhead while the match plays: a menu of words opens at the
-pointer, greyed where the library has no such clip. The same key or Esc leaves"""
+    """Annotate the player's actions with number keys while the match plays; press the same key or Esc to stop"""
 
     bl_idname = "beyond_mocap.annotate"
     bl_label = "Annotate by Keys"
     keys: StringProperty(name="Keys", options={"SKIP_SAVE"},
-                         description="Keys to press at the playhead, with blanks between: '2 2 3 5 ENTER'; for scripts")
-    needs = ("Import tracking in step 2 first, and choose a player of the list; or open a clip's words",
+                         description="Keys to press at the playhead, separated by blanks, for scripts: '2 2 3 5 ENTER'")
+    needs = ("Import tracking data and choose a player in the list first, or open a clip's labels",
              lambda context: bool(name_of(context)))
 
     def do(self, context):
-        """Press the keys that a script gives."""
+        """Press the keys of a script."""
         keys = self.keys.upper().split()
         known = {*annotating.KEYS, *"0123456789"}
         strange = next((key for key in keys if key not in known), None)
@@ -58,14 +57,14 @@ pointer, greyed where the library has no such clip. The same key or Esc leaves""
             found = f"the key {strange}" if strange else "no keys"
             raise InputError("annotate", found, f"keys of {', '.join(sorted(known))}", "for example '2 2 3 5 ENTER'")
         told = type_keys(context, keys)
-        self.report({"INFO"}, "; ".join(told) or "nothing to do")
+        self.report({"INFO"}, "; ".join(told) or "Nothing to do")
 
     def invoke(self, context, event):
-        """Begin, or end where it runs already."""
+        """Start, or stop if it runs already."""
         if bpy.app.background or self.keys:
             return self.execute(context)
         if _running:
-            unwatch()  # the running one sees this and ends
+            unwatch()  # the running operator detects this and ends
             return {"CANCELLED"}
         try:
             self.state, self.told = annotating.State(held(context.scene)), ""
@@ -81,7 +80,7 @@ pointer, greyed where the library has no such clip. The same key or Esc leaves""
         return {"RUNNING_MODAL"}
 
     def modal(self, context, event):
-        """Take our keys where an editor of time or space is under the pointer; pass on the rest."""
+        """Handle the table's keys if an editor of `SPACES` is under the pointer; pass on all other events."""
         if not _running:
             return self.left(context)
         area, region = _under(context, event)
@@ -101,7 +100,11 @@ pointer, greyed where the library has no such clip. The same key or Esc leaves""
         return self.left(context) if self.state is None else {"RUNNING_MODAL"}
 
     def press(self, context, event, how):
-        """One key or click: the next state, and what it asks for."""
+        """Handle one key or click: compute the next state and run its commands.
+
+        Args:
+            handle: from the state and the playhead to the next state and its commands.
+        """
         try:
             self.who = name_of(context)
             before = replace(self.state, held=held(context.scene))
@@ -117,7 +120,7 @@ pointer, greyed where the library has no such clip. The same key or Esc leaves""
         self.show(context, event)
 
     def carry_out(self, context, command):
-        """Do one thing; a step for undo where it changes words."""
+        """Run one command; add an undo step if it changes labels."""
         if isinstance(command, Leave):
             self.state = None
             return
@@ -127,7 +130,7 @@ pointer, greyed where the library has no such clip. The same key or Esc leaves""
             bpy.ops.ed.undo_push(message=f"Annotate: {self.told}"[:60])
 
     def moused(self, context, event, area, region):
-        """The mouse over the menu lights a row, a click chooses it; elsewhere it is Blender's."""
+        """Highlight the row under the mouse; a click chooses it. Events outside the menu are passed on."""
         word = None
         if _menu.get("region") == region.as_pointer():
             word = _menu["box"].word_at(event.mouse_x - region.x, event.mouse_y - region.y)
@@ -143,7 +146,7 @@ pointer, greyed where the library has no such clip. The same key or Esc leaves""
         return {"PASS_THROUGH"}
 
     def show(self, context, event):
-        """Lay the menu out: at the pointer while words are chosen, else in the editor's corner."""
+        """Update the menu: at the pointer while labels are chosen, else in the editor's corner."""
         area, region = _under(context, event)
         if area is None or self.state is None:
             return
@@ -157,31 +160,31 @@ pointer, greyed where the library has no such clip. The same key or Esc leaves""
         window.redraw(*SPACES)
 
     def left(self, context):
-        """End: nothing is drawn any more, and there is no step for undo beside those that were made."""
+        """Stop: remove the menu; the operator itself adds no undo step."""
         self.cancel(context)
         return {"CANCELLED"}
 
     def cancel(self, context):
-        """Blender takes the operator away (a file is loaded, the window closes), or it has ended."""
+        """Clean up, also when Blender ends the operator (a file is loaded, the window closes)."""
         unwatch()
         window.clear_status()
         window.redraw(*SPACES)
 
 
 def unwatch() -> None:
-    """Take the drawing of the menu away."""
+    """Stop drawing the menu."""
     window.undraw(_draw)
     _running.clear()
     _menu.clear()
 
 
 def unregister() -> None:
-    """The menu goes with the extension."""
+    """Remove the menu with the extension."""
     unwatch()
 
 
 def _watch() -> None:
-    """Let the menu be drawn in every editor in which one annotates."""
+    """Start drawing the menu in every editor of `SPACES`."""
     unwatch()
     _running.append(True)
     for space in SPACES.values():
@@ -194,7 +197,7 @@ def _draw() -> None:
 
 
 def _key(event: bpy.types.Event) -> str | None:
-    """What a Blender event means; None for what is not ours, also with Ctrl, Alt or the system's key."""
+    """Find the key of an event; None for other keys, also with Ctrl, Alt or the system's key."""
     if event.type == "TAB" and event.shift:
         return "PREVIOUS_PLAYER"
     return None if _held_down(event) else KEYS.get(event.type)
@@ -205,7 +208,7 @@ def _held_down(event: bpy.types.Event) -> bool:
 
 
 def _under(context, event) -> tuple[bpy.types.Area | None, bpy.types.Region | None]:
-    """The editor and its main region under the pointer, if one annotates in it."""
+    """Find the editor of `SPACES` and its main region under the pointer."""
     area = next((area for area in context.window.screen.areas if area.type in SPACES and _holds(area, event)), None)
     shown = [region for region in area.regions if min(region.width, region.height) > 1] if area else []
     held_by = [region for region in shown if _holds(region, event)]
@@ -215,7 +218,7 @@ def _under(context, event) -> tuple[bpy.types.Area | None, bpy.types.Region | No
 
 
 def _largest(context) -> tuple[bpy.types.Area, bpy.types.Region]:
-    """The largest editor in which one annotates, with its main region."""
+    """Find the largest editor of `SPACES` and its main region."""
     area = max((a for a in context.window.screen.areas if a.type in SPACES), key=lambda a: a.width * a.height)
     return area, next(region for region in area.regions if region.type == "WINDOW")
 
@@ -225,25 +228,25 @@ def _holds(place, event) -> bool:
 
 
 class VideoVerb(Verb):
-    """A verb about the reference video."""
+    """An operator for the reference video."""
 
     needs = "Load a reference video first", lambda context: context.scene.beyond_mocap.video.clip is not None
 
 
 class BEYOND_MOCAP_OT_show_video(VideoVerb, bpy.types.Operator):
-    """Open a movie clip editor beside the 3D view, with the reference video in it"""
+    """Show the reference video in a movie clip editor beside the 3D view"""
 
     bl_idname = "beyond_mocap.show_video"
-    bl_label = "Show Beside the 3D View"
+    bl_label = "Show Beside 3D View"
 
     def do(self, context):
-        """Drive it anew, where that was lost, and show it."""
+        """Restore the video's driver if it is lost, and show the video."""
         drive(context.scene)
         beside(context, context.scene.beyond_mocap.video.clip)
 
 
 def beside(context: bpy.types.Context, clip: bpy.types.MovieClip) -> None:
-    """Show the clip in a clip editor: one that is open, else the left half of the largest 3D view, else nowhere."""
+    """Show a clip in an open clip editor, else in the left half of the largest 3D view, else not at all."""
     area = window.open_editor(context, "CLIP_EDITOR", "VERTICAL", 0.45)
     if area is None:
         return
@@ -261,25 +264,24 @@ FILES = "*.mp4;*.mov;*.avi;*.mkv;*.webm;*.m4v;*.mpg;*.mpeg;*.mts;*.png;*.jpg;*.j
 
 
 class BEYOND_MOCAP_OT_load_video(Verb, ImportHelper, bpy.types.Operator):
-    """Load a movie, or the first picture of an image sequence, to watch beside the match while annotating. It plays at
-its own speed whatever the scene's frame rate"""
+    """Load a movie or an image sequence to watch beside the match while you annotate; it plays at its own speed"""
 
     bl_idname = "beyond_mocap.load_video"
     bl_label = "Load Reference Video"
     filter_glob: StringProperty(default=FILES, options={"HIDDEN"})
     rate: FloatProperty(
         name="Frames per Second", default=0.0, min=0.0, max=1000.0, precision=3,
-        description="Of the video; 0 takes what a movie file says, and for an image sequence the scene's own rate",
+        description="Frame rate of the video; 0 uses the movie file's, or for an image sequence the scene's",
     )
-    show: BoolProperty(name="Show", default=True, description="Open an editor beside the 3D view for it")
+    show: BoolProperty(name="Show", default=True, description="Show the video in an editor beside the 3D view")
 
     def invoke(self, context, event):
         return ImportHelper.invoke(self, context, event)
 
     def do(self, context):
-        """Load it and drive it; then make room for it."""
+        """Load and drive the video, then open an editor for it."""
         if not self.filepath:
-            raise InputError("video", "no file given", "a movie, or the first picture of a sequence", "choose one")
+            raise InputError("video", "no file given", "a movie, or the first picture of a sequence", "choose a file")
         clip, scene = video.load(bpy.path.abspath(self.filepath)), context.scene
         video.show(scene, clip, self.rate or None)
         if self.show:
@@ -289,11 +291,11 @@ its own speed whatever the scene's frame rate"""
 
 
 class BEYOND_MOCAP_OT_move_video(VideoVerb, bpy.types.Operator):
-    """Move the reference video against the track by frames of the video: earlier, it shows later pictures now"""
+    """Move the reference video by a number of its frames relative to the track"""
 
     bl_idname = "beyond_mocap.move_video"
     bl_label = "Move Reference Video"
-    frames: IntProperty(name="Frames", default=1, description="Frames of the video by which it begins later")
+    frames: IntProperty(name="Frames", default=1, description="Frames of the video by which it starts later")
 
     def do(self, context):
         video = context.scene.beyond_mocap.video
@@ -301,11 +303,11 @@ class BEYOND_MOCAP_OT_move_video(VideoVerb, bpy.types.Operator):
 
 
 class BEYOND_MOCAP_OT_remove_video(Verb, bpy.types.Operator):
-    """Let go of the reference video; the movie clip itself stays in the file"""
+    """Remove the reference video from the scene; the movie clip stays in the file"""
 
     bl_idname = "beyond_mocap.remove_video"
     bl_label = "Remove Reference Video"
-    needs = "There is no reference video", lambda context: context.scene.beyond_mocap.video.clip is not None
+    needs = "No reference video is loaded", lambda context: context.scene.beyond_mocap.video.clip is not None
 
     def do(self, context):
         video.release(context.scene)

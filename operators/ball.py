@@ -1,4 +1,6 @@
-"""The ball: aim it, hand it to Blender's physics, analyse hits, let a body carry it, solve it from tracking data."""
+"""Operators of the ball: aim it, hand it over to Blender's physics, analyse hits, attach it to a body, solve it from
+tracking data.
+"""
 
 from __future__ import annotations
 
@@ -20,38 +22,37 @@ from ..scene.passes.settings import KEPT, ball_of, found_of, subject
 from ..scene.stage import ball as balls
 from .verb import BackgroundVerb, Verb
 
-FAR = 10.0  # metres to a target that is made
-NAME = "Aimed Ball"  # another than that of the takes' ball, which may lie in the same collection
+FAR = 10.0  # m to a new target
+NAME = "Aimed Ball"  # differs from the takes' ball, which may be in the same collection
 
 
 class BEYOND_MOCAP_OT_aim_ball(Verb, bpy.types.Operator):
-    """Let the selected armature strike the selected ball (a new one, if none is) so that it arrives at the selected
-Empty (a new one, if none is). Drag the Empty: the ball follows. Without an armature the ball leaves
-from where it lies"""
+    """Let the selected armature strike the selected ball so that it arrives at the selected Empty, which can be
+dragged; a missing ball or Empty is created, and without an armature the ball starts where it lies"""
 
     bl_idname = "beyond_mocap.aim_ball"
     bl_label = "Aim Ball"
-    part: EnumProperty(name="Part", items=PARTS, default="foot", description="What the ball is struck with")
-    side: EnumProperty(name="Side", items=SIDES, default="right", description="Left or right, of what there are two")
+    part: EnumProperty(name="Part", items=PARTS, default="foot", description="Body part that strikes the ball")
+    side: EnumProperty(name="Side", items=SIDES, default="right", description="Left or right body part")
     found: BoolProperty(
-        name="Find the Strike", default=True,
-        description="Take the ball stretch of the strike nearest to the current frame; else From and To",
+        name="Find Strike", default=True,
+        description="Use the strike nearest to the current frame; off: use From and To",
     )
-    first: IntProperty(name="From", default=1, description="First frame on which the ball may be struck")
-    last: IntProperty(name="To", default=1, description="Last frame on which the ball may be struck")
-    way: EnumProperty(name="Way", items=WAYS, default="AIR", description="How the ball gets there")
+    first: IntProperty(name="From", default=1, description="First frame on which the ball can be struck")
+    last: IntProperty(name="To", default=1, description="Last frame on which the ball can be struck")
+    way: EnumProperty(name="Trajectory", items=WAYS, default="AIR", description="How the ball reaches the target")
     bounces: IntProperty(name="Bounces", default=0, min=0, max=5,
-                         description="How often it touches the ground before it arrives")
-    timing: EnumProperty(name="Arrives", items=TIMES, default="FREE", description="When it arrives")
+                         description="Number of bounces before it arrives")
+    timing: EnumProperty(name="Arrives", items=TIMES, default="FREE", description="When the ball arrives")
     seconds: FloatProperty(name="Flight", default=1.0, min=0.05, max=20.0,
                            description="Seconds from the strike to the target")
     arrival: IntProperty(name="Frame", default=50, description="Scene frame on which the ball arrives")
-    ball: EnumProperty(name="Ball", items=BALLS, default="football", description="What kind of ball it is")
+    ball: EnumProperty(name="Ball", items=BALLS, default="football", description="Kind of ball")
     needs = ("Select an armature that strikes, or a ball",
              lambda context: body_meant(context) is not None or ball_meant(context) is not None)
 
     def do(self, context):
-        """Solve first, then make what is lacking and write."""
+        """Solve first, then create what is missing and write."""
         shots.unsure()
         ball, scene = ball_meant(context), context.scene
         if ball is not None and ball.beyond_mocap_aim.on:
@@ -63,7 +64,7 @@ from where it lies"""
         self.report({"INFO"}, "; ".join(shots.lines(solved)))
 
     def new(self, context, ball):
-        """A ball that is not aimed yet."""
+        """Create and aim a ball that is not aimed yet."""
         body, scene, target = body_meant(context), context.scene, target_meant(context)
         channels.check_local(ball, body)
         shots.check_ball(ball)
@@ -95,39 +96,38 @@ from where it lies"""
 
 
 class BEYOND_MOCAP_OT_leave_aim(Verb, bpy.types.Operator):
-    """The ball is not aimed any more: it plays what it did before, and its trajectory goes. The target stays"""
+    """Stop aiming the ball, restore its earlier animation and remove its trajectory; the target stays"""
 
     bl_idname = "beyond_mocap.leave_aim"
-    bl_label = "Leave Aim"
+    bl_label = "Revert Aim"
 
     @classmethod
     def poll(cls, context):
         cls.poll_message_set("No ball is aimed" if not aimed(context.scene) else "Select an aimed ball or its target")
         ball = aimed_ball(context)
         if ball is not None and ball.beyond_mocap_aim.handed:
-            cls.poll_message_set("Blender's physics has the ball: press Take Ball Back first")
+            cls.poll_message_set("Blender's physics moves the ball: press Ball from Physics first")
             return False
         return ball is not None
 
     def do(self, context):
-        """Bring back what it did."""
+        """Restore its earlier animation."""
         shots.leave(aimed_ball(context))
 
 
 class BEYOND_MOCAP_OT_ball_to_physics(Verb, bpy.types.Operator):
-    """From the current frame on Blender's rigid bodies move the ball, as fast and with the spin that it has there:
-keyed as Animated up to then, over a ground that is solid; other selected meshes are in its way. Play
-from the start to see it"""
+    """Let Blender's rigid bodies move the ball from the current frame on, with its velocity and spin there, over a
+solid ground and against other selected meshes; play from the start to see it"""
 
     bl_idname = "beyond_mocap.ball_to_physics"
     bl_label = "Ball to Physics"
     frame: IntProperty(name="Frame", default=0, min=0, description="Frame of the handover; 0: the current one")
-    ball: EnumProperty(name="Ball", items=(("OWN", "Own", "The kind that it is aimed as"), *BALLS), default="OWN",
-                       description="What kind of ball it is")
+    ball: EnumProperty(name="Ball", items=(("OWN", "As Aimed", "The kind it is aimed as"), *BALLS), default="OWN",
+                       description="Kind of ball")
     needs = ("Select a ball that moves",
              lambda context: (ball := ball_meant(context)) is not None and ball.animation_data is not None
              and ball.animation_data.action is not None,
-             "Blender's physics has this ball already", lambda context: ball_meant(context).rigid_body is None)
+             "Blender's physics moves this ball already", lambda context: ball_meant(context).rigid_body is None)
 
     def do(self, context):
         ball = ball_meant(context)
@@ -136,15 +136,15 @@ from the start to see it"""
         chosen = [thing for thing in context.selected_objects if thing.type == "MESH" and thing.visible_get()]
         solid = [thing for thing in chosen if thing != ball]
         handover.hand_over(context.scene, ball, frame, kind, solid)
-        self.report({"INFO"}, f"Physics has {ball.name} from frame {frame} on: play from the start")
+        self.report({"INFO"}, f"Physics moves {ball.name} from frame {frame} on: play from the start")
 
 
 class BEYOND_MOCAP_OT_ball_from_physics(Verb, bpy.types.Operator):
-    """Blender's rigid bodies let go of the ball: it goes its keyed way again, and the solid ground goes"""
+    """Return the ball from Blender's rigid bodies to its keys, and remove the solid ground"""
 
     bl_idname = "beyond_mocap.ball_from_physics"
-    bl_label = "Take Ball Back"
-    needs = ("Blender's physics has no ball that is selected",
+    bl_label = "Ball from Physics"
+    needs = ("Select a ball that Blender's physics moves",
              lambda context: (ball := ball_meant(context)) is not None and ball.beyond_mocap_aim.handed)
 
     def do(self, context):
@@ -152,26 +152,26 @@ class BEYOND_MOCAP_OT_ball_from_physics(Verb, bpy.types.Operator):
 
 
 class HitVerb(Verb):
-    """A verb about an armature's strikes."""
+    """An operator on an armature's strikes."""
 
     needs = "Select an armature with a motion", lambda context: subject(context) is not None
 
 
 class BEYOND_MOCAP_OT_hit_analysis(HitVerb, bpy.types.Operator):
-    """Find where the armature's foot, head, chest, hand or any bone can strike a ball: height and speed as a graph in
-the panel, and markers on its action. A ball was never seen: the marked frame is the likeliest one"""
+    """Find where a body part or bone can strike a ball, show height and speed as a graph in the panel and set markers
+on the action; without ball data, the marked frame is the most likely one"""
 
     bl_idname = "beyond_mocap.hit_analysis"
     bl_label = "Hit Analysis"
-    part: EnumProperty(name="Part", items=PARTS, default="foot", description="The part whose strikes are looked for")
-    side: EnumProperty(name="Side", items=SIDES, default="right", description="Left or right, of what there are two")
+    part: EnumProperty(name="Part", items=PARTS, default="foot", description="Body part whose strikes are found")
+    side: EnumProperty(name="Side", items=SIDES, default="right", description="Left or right body part")
     threshold: FloatProperty(name="Threshold", default=0.0, min=0.0, max=5.0, precision=2,
-                             description="Metres above which a strike may be; 0: automatic")
+                             description="Least height of a strike, in metres; 0: automatic")
     bone: StringProperty(name="Bone", description="A bone by name, in place of the part")
     markers: BoolProperty(name="Markers", default=True, description="Set markers on the action")
 
     def invoke(self, context, _event):
-        """With the choices of the panel."""
+        """Run with the settings of the panel."""
         hits = subject(context).beyond_mocap_hits
         self.part, self.side, self.threshold, self.bone = hits.part, hits.side, hits.threshold, hits.bone
         return self.execute(context)
@@ -201,7 +201,7 @@ class BEYOND_MOCAP_OT_go_to_strike(Verb, bpy.types.Operator):
 
 
 class BEYOND_MOCAP_OT_clear_hits(HitVerb, bpy.types.Operator):
-    """Forget the hit analysis of this armature, and take its markers away"""
+    """Clear the hit analysis of this armature and remove its markers"""
 
     bl_idname = "beyond_mocap.clear_hits"
     bl_label = "Clear Hit Analysis"
@@ -210,7 +210,7 @@ class BEYOND_MOCAP_OT_clear_hits(HitVerb, bpy.types.Operator):
         body = subject(context)
         channels.check_local(body)
         if not found_of(body.beyond_mocap_hits):
-            raise InputError(f"armature {body.name}", "no hit analysis", "one", "press Hit Analysis")
+            raise InputError(f"armature {body.name}", "no hit analysis", "a hit analysis", "press Hit Analysis")
         played = channels.playing(body)[0]
         if played is not None and played.library is None:
             hits_shown.unmark(played)
@@ -219,19 +219,19 @@ class BEYOND_MOCAP_OT_clear_hits(HitVerb, bpy.types.Operator):
 
 
 class BEYOND_MOCAP_OT_take_ball(Verb, bpy.types.Operator):
-    """Let a hand or foot of the armature carry the ball from one frame to another, without a jump at either end: a
-Child Of constraint with a keyed influence. The ball's own action is put aside; Free Ball brings it back"""
+    """Attach the ball to a hand or foot of the armature from one frame to another, with a Child Of constraint and
+smooth transitions; Free Ball restores the ball's own action"""
 
     bl_idname = "beyond_mocap.take_ball"
     bl_label = "Take Ball"
-    part: EnumProperty(name="Part", items=PARTS, default="hand", description="What carries the ball")
-    side: EnumProperty(name="Side", items=SIDES, default="right", description="Left or right, of what there are two")
+    part: EnumProperty(name="Part", items=PARTS, default="hand", description="Body part that carries the ball")
+    side: EnumProperty(name="Side", items=SIDES, default="right", description="Left or right body part")
     bone: StringProperty(name="Bone", description="A bone by name, in place of the part")
-    first: IntProperty(name="From", default=1, description="Frame from which on it is carried")
-    last: IntProperty(name="To", default=30, description="Frame on which it is let go")
+    first: IntProperty(name="From", default=1, description="First frame on which the ball is carried")
+    last: IntProperty(name="To", default=30, description="Frame on which the ball is released")
     how: EnumProperty(name="Hold", items=HOLDS, default="KEEP", description="Where the ball is while it is carried")
     settle: IntProperty(name="Settle", default=4, min=1, max=1000,
-                        description="Frames within which the ball comes to where it is carried")
+                        description="Frames in which the ball moves to where it is carried")
     needs = ("Select an armature", lambda context: subject(context) is not None,
              "Select the ball beside the armature", lambda context: ball_of(context) is not None)
 
@@ -245,13 +245,12 @@ Child Of constraint with a keyed influence. The ball's own action is put aside; 
 
 
 class BEYOND_MOCAP_OT_free_ball(Verb, bpy.types.Operator):
-    """Take back that the ball is carried: at one stretch, or at all.
-After the last one the ball plays its own action again"""
+    """Release the ball from one carried stretch, or from all; after the last one it plays its own action again"""
 
     bl_idname = "beyond_mocap.free_ball"
     bl_label = "Free Ball"
-    number: IntProperty(name="Stretch", default=-1, min=-1, options={"SKIP_SAVE"}, description="Which one; -1: all")
-    needs = ("Nobody carries the ball",
+    number: IntProperty(name="Stretch", default=-1, min=-1, options={"SKIP_SAVE"}, description="Stretch; -1: all")
+    needs = ("The ball is not carried",
              lambda context: (ball := ball_of(context)) is not None and len(ball.beyond_mocap_ball.holds) > 0)
 
     def do(self, context):
@@ -262,8 +261,8 @@ After the last one the ball plays its own action again"""
 
 
 class BEYOND_MOCAP_OT_solve_ball(BackgroundVerb, bpy.types.Operator):
-    """Work out of the imported tracking who touches the ball and when, and its way between. The ball becomes an object,
-its touches proposals for key moments"""
+    """Find from the imported tracking who touches the ball and when, and its trajectory; the ball becomes an object,
+and its touches are proposals for key moments"""
 
     bl_idname = "beyond_mocap.solve_ball"
     bl_label = "Solve Ball"
@@ -273,36 +272,36 @@ its touches proposals for key moments"""
              and bool(player.tracking_file))
 
     def order(self, context):
-        """What is to be solved."""
+        """Build the request."""
         return tracked.order_of(context.scene)
 
     work = staticmethod(tracked.work)
 
     def apply(self, scene, solved):
-        """The ball, and the list of touches."""
+        """Create the ball and the list of touches."""
         tracked.write(scene, solved)
         self.report({"INFO"},
-                    f"{len(solved.touches)} touches solved, with {solved.confidence:.0%} confidence in the mean")
+                    f"{len(solved.touches)} touches solved, mean confidence {solved.confidence:.0%}")
 
 
 class BEYOND_MOCAP_OT_accept_touches(Verb, bpy.types.Operator):
-    """Make key moments of the ticked touches, at their solved times. Where a player has a key moment near by already,
-none is added"""
+    """Add key moments for the selected touches, at their solved times, unless the player has a key moment close to
+them"""
 
     bl_idname = "beyond_mocap.accept_touches"
     bl_label = "Accept Touches"
     active: BoolProperty(name="Active Player", default=False, options={"SKIP_SAVE"},
-                         description="Only those of the active player")
+                         description="Only touches of the active player")
     needs = "Press Solve Ball first", lambda context: len(context.scene.beyond_mocap_passes.touches) > 0
 
     def do(self, context):
         player = active_player(context.scene.beyond_mocap)
         if self.active and player is None:
-            raise InputError("player", "none in the list", "one", "import tracking in step 2")
+            raise InputError("player", "none in the list", "a player", "import tracking in step 2")
         count, told = tracked.accept(context, player.name if self.active else "")
         if not count and not told:
-            raise InputError("touches", "none is ticked that has words and a player of the list", "one",
-                             "tick some in the list")
+            raise InputError("touches", "none selected with labels and a player of the list", "at least one",
+                             "select some in the list")
         for line in told[:5]:
             self.report({"INFO"}, line)
         self.report({"INFO"}, f"{count} key moments added")

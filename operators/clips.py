@@ -23,29 +23,29 @@ from .verb import BackgroundVerb, ImportVerb, Verb
 
 
 class BEYOND_MOCAP_OT_import_clips(ImportVerb, bpy.types.Operator):
-    """Import motion clips (BVH, FBX, glTF, USD) as armatures; choose files, or a folder without a file for all below
-it. Of a file with a body only the motion is taken, hips up and in metres"""
+    """Import motion clips (BVH, FBX, glTF, USD) as armatures, from files or from all files below a folder. Only the
+motion is imported, from the hips up and in metres"""
 
     bl_idname = "beyond_mocap.import_clips"
     bl_label = "Import Motion Clips"
     filename_ext = ".bvh"
     filter_glob: StringProperty(default=";".join(f"*{ending}" for ending in (".bvh", *FOREIGN)), options={"HIDDEN"})
-    unit: FloatProperty(name="Metres per unit", default=0.0, min=0.0, precision=5,
+    unit: FloatProperty(name="Metres per Unit", default=0.0, min=0.0, precision=5,
                         description="Size of one unit of the file in metres; 0 guesses it from the height of the hips")
     reuse: BoolProperty(
-        name="Onto Selected Armature", default=False,
-        description="Add the clips' actions to the active armature, if its bones are the same, and make no new one",
+        name="Onto Active Armature", default=False,
+        description="Add the clips' actions to the active armature, if its bones are the same",
     )
 
     def paths(self) -> list[Path]:
-        """The chosen files, and all below a chosen folder."""
+        """List the chosen files, and all below a chosen folder."""
         chosen = self.chosen() or ([Path(self.directory)] if self.directory else [])
         if not chosen:
             raise InputError("import", "no file given", "a .bvh file or a folder", "choose one")
         return [file for path in chosen for file in (_all_below(path) if path.is_dir() else [path])]
 
     def do(self, context):
-        """Read all files, then make armatures."""
+        """Read all files, then create armatures."""
         clips = [clip for path in self.paths() for clip in self.read(path)]
         own = context.object if self.reuse and context.object and context.object.type == "ARMATURE" else None
         if own is not None:
@@ -58,10 +58,10 @@ it. Of a file with a body only the motion is taken, hips up and in metres"""
             for note in clip.notes:
                 self.report({"INFO"}, f"{name}: {note}")
         window.select_only(context, made[-1], *made)
-        self.report({"INFO"}, f"clips imported at the scene's frame rate: {len(made)}")
+        self.report({"INFO"}, f"Clips imported at the scene's frame rate: {len(made)}")
 
     def read(self, path: Path) -> list[tuple[str, bvh.BvhClip]]:
-        """The clips of one file with their names."""
+        """Read the clips of one file with their names."""
         if not is_foreign(path):
             return [(path.stem, bvh.read(path, self.unit or None))]
         takes = foreign.read(path)
@@ -70,18 +70,18 @@ it. Of a file with a body only the motion is taken, hips up and in metres"""
 
     @staticmethod
     def check_bones(body, clips, scene):
-        """InputError where a clip has other bones than the armature."""
+        """Check that all clips have the armature's bones (InputError)."""
         skeleton = armature.skeleton_of(body, scene)
         for name, clip in clips:
             if not clip.motion.skeleton.same_bones(skeleton, 5e-3):
-                found = f"other bones than {body.name}"
+                found = f"different bones than {body.name}"
                 raise InputError(name, found, "the same skeleton", "import it as a new armature")
 
 
 def _all_below(folder: Path) -> list[Path]:
     found = find_recordings(folder)
     if not found:
-        raise InputError(folder, "no motion clip below it", "BVH, FBX, glTF or USD files", "choose another folder")
+        raise InputError(folder, "no motion clip in the folder", "BVH, FBX, glTF or USD files", "choose another folder")
     return found
 
 
@@ -89,7 +89,7 @@ class BEYOND_MOCAP_FH_clips(bpy.types.FileHandler):
     """BVH files dropped into a view"""
 
     bl_idname = "BEYOND_MOCAP_FH_clips"
-    bl_label = "Motion clip"
+    bl_label = "Motion Clip"
     bl_import_operator = "beyond_mocap.import_clips"
     bl_file_extensions = ".bvh"
 
@@ -102,7 +102,7 @@ class BEYOND_MOCAP_FH_foreign_clips(bpy.types.FileHandler):
     """FBX, glTF and USD files dropped into a view; Blender offers its own importers beside this one"""
 
     bl_idname = "BEYOND_MOCAP_FH_foreign_clips"
-    bl_label = "Motion clip (Beyond Mocap)"
+    bl_label = "Motion Clip (Beyond Mocap)"
     bl_import_operator = "beyond_mocap.import_clips"
     bl_file_extensions = ";".join(FOREIGN)
 
@@ -112,8 +112,8 @@ class BEYOND_MOCAP_FH_foreign_clips(bpy.types.FileHandler):
 
 
 class BEYOND_MOCAP_OT_mirror(Verb, bpy.types.Operator):
-    """Exchange left and right in the active armature's motion: it begins at the same place and looks the same way, but
-turns and kicks to the other side. The motion before is kept as an action"""
+    """Exchange left and right in the active armature's motion: it starts at the same place and facing, but turns and
+kicks to the other side. The previous motion stays as an action"""
 
     bl_idname = "beyond_mocap.mirror"
     bl_label = "Mirror Motion"
@@ -129,7 +129,7 @@ turns and kicks to the other side. The motion before is kept as an action"""
 
 
 def mirrored_in_place(motion: Motion) -> Motion:
-    """The mirrored motion, put where the motion began and facing as it did."""
+    """Mirror a motion and place it where the original started, with the same heading."""
     twin = mirror(motion)
     turn = humanoid.heading(motion)[0] - humanoid.heading(twin)[0]
     begun = rotate(about_up(turn), twin.root_positions[0])
@@ -138,13 +138,19 @@ def mirrored_in_place(motion: Motion) -> Motion:
 
 
 WHICH = (("CHOSEN", "Chosen Clip", "The clip chosen in the library's list"),
-         ("SHOWN", "Clips Shown", "All clips that the library's list shows now"),
+         ("SHOWN", "Listed Clips", "All clips that the library's list currently shows"),
          ("SELECTED", "Selected Armatures", "The actions that the selected armatures play"))
 
 
 @dataclass(frozen=True, eq=False)
 class Order:
-    """What is to become assets: files of clips that are to be read, and drafts that are already."""
+    """The input of making assets.
+
+    Attributes:
+        folder: the library's.
+        files: (path below the folder, file to read, unit, description) of clips to read.
+        drafts: motions that are already in the scene.
+    """
 
     folder: Path
     files: tuple  # (path below the folder, file to read, unit, line about it)
@@ -152,31 +158,31 @@ class Order:
 
 
 class BEYOND_MOCAP_OT_make_assets(BackgroundVerb, bpy.types.Operator):
-    """Make assets of clips: each an action with a picture of its key pose, its words as tags, in a catalog of its kind.
-In this file, or as a .blend that you keep in a folder of asset libraries"""
+    """Make assets of clips: each an action with a picture of its key pose, its labels as tags, in a catalog of its
+kind, in this file or as a .blend for a folder of asset libraries"""
 
     bl_idname = "beyond_mocap.make_assets"
     bl_label = "Clips as Assets"
     kind = "assets"
     which: EnumProperty(name="Clips", items=WHICH, default="CHOSEN", description="Which clips become assets")
-    apart: BoolProperty(name="As a File", description="Write a .blend of their own and leave this file as it is",
+    apart: BoolProperty(name="As a File", description="Write the assets to a .blend file and leave this file unchanged",
                         options={"SKIP_SAVE"})
-    overwrite: BoolProperty(name="Overwrite", description="Replace a file that is there", options={"SKIP_SAVE"})
+    overwrite: BoolProperty(name="Overwrite", description="Replace an existing file", options={"SKIP_SAVE"})
     filepath: StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"}, description="The .blend to write")
     filter_glob: StringProperty(default="*.blend", options={"HIDDEN"})
     check_existing: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
 
     def invoke(self, context, event):
-        """Ask where to, where a file of its own is wanted."""
+        """Open the file browser where a file is to be written."""
         if not self.apart or self.filepath:
             return super().invoke(context, event)
         self.filepath = "clips.blend"
-        self.overwrite = True  # the file browser warns of a file that is there
+        self.overwrite = True  # the file browser warns of an existing file
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
 
     def order(self, context):
-        """Which clips, as plain values."""
+        """Collect the clips as plain values."""
         self.check_target()
         settings = context.scene.beyond_mocap
         if self.which == "SELECTED":
@@ -193,24 +199,24 @@ In this file, or as a .blend that you keep in a folder of asset libraries"""
         return Order(folder, files, ())
 
     def target(self) -> Path:
-        """The .blend to write."""
+        """Return the .blend to write."""
         return export.with_ending(Path(bpy.path.abspath(self.filepath)), ".blend")
 
     def check_target(self):
-        """InputError where the file may not be written."""
+        """Check that the file may be written (InputError)."""
         if not self.apart:
             return
         if not self.filepath:
             raise InputError("assets", "no file given", "a .blend to write", "choose where")
         target = self.target()
         if target.exists() and not self.overwrite:
-            raise InputError(target, "is there already", "a new file", "choose another name, or say Overwrite")
+            raise InputError(target, "already exists", "a new file", "choose another name or switch Overwrite on")
         if bpy.data.filepath and target.resolve() == Path(bpy.data.filepath).resolve():
-            raise InputError(target, "is the file that is open", "another file", "leave As a File away instead")
+            raise InputError(target, "is the open file", "another file", "switch As a File off instead")
 
     @staticmethod
     def work(order, progress, cancelled, _hurry):
-        """Read the motions and draw the pictures."""
+        """Read the motions and render the pictures."""
         from ..beyond_mocap.files.bvh import bvh
         from ..beyond_mocap.library.keep_words import read_words
 
@@ -229,7 +235,7 @@ In this file, or as a .blend that you keep in a folder of asset libraries"""
         return drafts, pictures
 
     def apply(self, scene, result):
-        """Make the actions; write them into their own file, or leave them here."""
+        """Create the actions; write them to their own file, or leave them here."""
         drafts, pictures = result
         catalogs = {assets.catalog_of(one.words) for one in drafts}
         if self.apart:
@@ -241,12 +247,12 @@ In this file, or as a .blend that you keep in a folder of asset libraries"""
         if bpy.data.filepath:
             assets.define_catalogs(Path(bpy.data.filepath).parent, catalogs)
         else:
-            self.report({"INFO"}, "their catalogs get their names when this file is saved and this is done again")
-        self.report({"INFO"}, f"assets in this file: {len(assets.make(bpy.context, drafts, pictures))}")
+            self.report({"INFO"}, "To name the catalogs, save this file and make the assets again")
+        self.report({"INFO"}, f"Assets in this file: {len(assets.make(bpy.context, drafts, pictures))}")
 
 
 def write_apart(target: Path, made, drafts) -> None:
-    """The actions into a .blend, under the names of the drafts; they are taken out of this file again."""
+    """Write the actions to a .blend, under the names of the drafts, and remove them from this file."""
     taken = {}
     for item, one in zip(made, drafts):
         if one.action:
@@ -262,21 +268,21 @@ def write_apart(target: Path, made, drafts) -> None:
 
 
 def _playing(context) -> list[bpy.types.Object]:
-    """The selected armatures that play an action of this file."""
+    """List the selected armatures that play an action of this file; InputError where there are none."""
     rigs = [thing for thing in context.selected_objects if thing.type == "ARMATURE" and channels.playing(thing)[0]]
     if not rigs:
-        raise InputError("assets", "no selected armature plays an action", "armatures with motions", "select them")
+        raise InputError("assets", "no selected armature plays an action", "armatures with motions", "select some")
     for rig in rigs:
         if channels.playing(rig)[0].library is not None:
             raise InputError(rig.name, "its action belongs to another file", "actions of this file")
         if rig.beyond_mocap_ride.on:
-            raise InputError(rig.name, "its motion still rides a path", "a motion of its own",
-                             "press Keep in Path Editing first")
+            raise InputError(rig.name, "its path edit is not applied", "an applied motion",
+                             "press Apply in Path Editing first")
     return rigs
 
 
 def _draft_of(rig, context) -> assets.Draft:
-    """What an armature plays, with the words of its strips where it has any."""
+    """Build a draft of what an armature plays, with the labels of its strips where it has any."""
     motion, item = action.read(rig, context.scene), channels.playing(rig)[0]
     try:
         rows = recordings.read_words_at(rig, motion.fps, len(motion))

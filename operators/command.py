@@ -10,7 +10,13 @@ _registered = []
 
 
 def run(arguments: list[str]) -> int:
-    """Run one command line; returns its exit status."""
+    """Run one command line.
+
+    Args:
+        arguments: the command line without the program's name.
+    Returns:
+        The exit status.
+    """
     from ..beyond_mocap.cli.main import main
     from ..scene.match import child
     from ..scene.rigs.deliver import WRITERS
@@ -19,10 +25,10 @@ def run(arguments: list[str]) -> int:
 
 
 def register():
-    """Make the command known to Blender."""
+    """Register the command with Blender."""
     _registered.append(bpy.utils.register_cli_command(NAME, run))
 
 
 def unregister():
-    """Take it away."""
+    """Unregister the command."""
     bpy.utils.unregister_cli_command(_registered.pop())

@@ -1,7 +1,7 @@
-"""All keys of the extension: one table, put into Blender's key configuration for add-ons.
+"""All keys of the extension: one table, added to Blender's key configuration for add-ons.
 
-There they can be changed by the user, in Blender's preferences under Keymap and in the add-on's own. Nothing else in
-the extension adds a key. A new key is a new line of ENTRIES.
+Users can change them in Blender's preferences under Keymap and in the add-on's own. No other file of the extension adds
+a key. To add a key, add a line to ENTRIES.
 """
 
 from __future__ import annotations
@@ -17,9 +17,17 @@ NUDGES = {"LEFT_ARROW": "LEFT", "RIGHT_ARROW": "RIGHT", "UP_ARROW": "FORTH", "DO
 
 
 class Entry(NamedTuple):
-    """One key. keymap, space: Blender's name of the keymap and its editor type ("EMPTY" where it belongs to no one
-    editor). operator: its bl_idname. key: event type. modifiers: of "shift", "ctrl", "alt", "oskey". properties: of
-    the operator. repeat: whether the key acts again and again while it is held."""
+    """One key.
+
+    Attributes:
+        keymap: Blender's name of the keymap.
+        space: its editor type, "EMPTY" if it belongs to no single editor.
+        operator: bl_idname of the operator.
+        key: event type.
+        modifiers: of "shift", "ctrl", "alt", "oskey".
+        properties: of the operator.
+        repeat: whether the key repeats while it is held.
+    """
 
     keymap: str
     space: str
@@ -49,7 +57,7 @@ ENTRIES: tuple[Entry, ...] = (
 
 
 def register():
-    """Put the table into the key configuration; there is none where Blender runs without keys."""
+    """Add the table to the key configuration, if Blender has one."""
     configuration = bpy.context.window_manager.keyconfigs.addon
     if configuration is None:
         return
@@ -62,7 +70,7 @@ def register():
 
 
 def unregister():
-    """Take all of our keys out again, those that a user has changed too."""
+    """Remove all of the extension's keys, also those that a user changed."""
     configuration = bpy.context.window_manager.keyconfigs.addon
     if configuration is None:
         return

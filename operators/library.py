@@ -1,4 +1,4 @@
-"""The library: build it, list its clips, bring one into the scene, take one out, find a moved folder."""
+"""The library: build it, list its clips, import and remove them, relink a moved folder."""
 
 from __future__ import annotations
 
@@ -22,32 +22,32 @@ if TYPE_CHECKING:
 
 
 class FolderVerb(BackgroundVerb):
-    """A verb about the library's folder."""
+    """Base of operators about the library's folder."""
 
     needs = "Choose the library's folder first", lambda context: bool(context.scene.beyond_mocap.library_folder)
 
 
 class ClipVerb(Verb):
-    """A verb about one clip of the list: the one that it is told, else the one chosen there."""
+    """Base of operators about one clip of the list: the named one, else the active one."""
 
     path: StringProperty(name="Clip", options={"SKIP_SAVE"},
-                         description="Below the library's folder; empty: the one chosen in the list")
-    dressed: BoolProperty(name="Body", default=True, description="With a low-poly body, not only bones")
-    needs = ("No clip is listed; press Build Library or List Clips first",
+                         description="Clip file below the library folder; empty uses the one chosen in the list")
+    dressed: BoolProperty(name="Body", default=True, description="Add a low-poly body to the bones")
+    needs = ("No clips listed; press Build Library or List Clips first",
              lambda context: clips.active(context.window_manager) is not None)
 
     def clip(self, context) -> str:
-        """The clip, below the library's folder."""
+        """Return the clip, below the library's folder."""
         chosen = clips.active(context.window_manager)
         path = self.path or (chosen.path if chosen else "")
         if not path:
-            raise InputError(self.bl_label, "no clip chosen", "a clip of the library's list")
+            raise InputError(self.bl_label, "no clip chosen", "a clip in the library's list")
         return path
 
 
 @dataclass(frozen=True)
 class Order:
-    """What a build needs to know."""
+    """The input of a build."""
 
     setting: str
     folder: str
@@ -58,7 +58,15 @@ class Order:
 
 @dataclass(frozen=True, eq=False)
 class Built:
-    """What came of it: the library (or what is wrong with it), its clips one by one, and the folder as it was read."""
+    """The result of a build.
+
+    Attributes:
+        setting: the library folder as the setting spells it.
+        library: None where it could not be built.
+        error: the error in that case.
+        listing: its clips.
+        files: the folder's files when it was read.
+    """
 
     setting: str
     library: "Library | None"
@@ -68,9 +76,8 @@ class Built:
 
 
 class BEYOND_MOCAP_OT_build_library(FolderVerb, bpy.types.Operator):
-    """Read all clips of the library folder, their words and foot contacts, and sort them for the search.
-The result is kept in a cache, so that the next time takes a moment; when anything in the folder has changed, all of it
-is read again. FBX, glTF and USD clips are converted first, each once"""
+    """Read all clips of the library folder with their labels and foot contacts, and index them for the search. The
+result is cached, so the next build is quick unless files have changed. FBX, glTF and USD clips are converted first"""
 
     bl_idname = "beyond_mocap.build_library"
     bl_label = "Build Library"
@@ -78,7 +85,7 @@ is read again. FBX, glTF and USD clips are converted first, each once"""
     queue = None  # foreign.Queue while a window waits for conversions
     job = None
     notes = ()
-    rebuild: BoolProperty(name="From Scratch", description="Ignore what an earlier build has kept",
+    rebuild: BoolProperty(name="From Scratch", description="Ignore the cache of earlier builds",
                           options={"SKIP_SAVE"})
 
     def order(self, context):
@@ -88,30 +95,31 @@ is read again. FBX, glTF and USD clips are converted first, each once"""
         folder = absolute(settings.library_folder)
         unit = settings.library_unit or None
         queue = self.queue or self.waiting(context)
-        while queue.todo:  # by a script; in a window `modal` has converted them one by one
+        while queue.todo:  # called from a script; in a window `modal` has converted them one by one
             queue.step()
         self.notes = queue.notes
         return Order(settings.library_folder, folder, unit, self.rebuild, preferences.for_build(folder))
 
     def waiting(self, context):
-        """The clips that are to be converted."""
+        """Create the queue of clips that need a conversion."""
         folder = absolute(context.scene.beyond_mocap.library_folder)
         return foreign.Queue(folder, preferences.cache_folder(folder))
 
     def start(self, context):
-        """Convert first, if there is anything to convert, then hand the build to a thread."""
+        """Start with the conversions, if there are any, else with the build in a thread."""
         self.queue = self.waiting(context)
         self.scene = context.scene.session_uid
         if not self.queue.todo:
             super().start(context)
 
     def modal(self, context, event):
-        """One conversion at each tick, since only the main thread may import; then as every work in the background."""
+        """Convert one clip at each timer event, since only the main thread may import; then as any background operator.
+        """
         if self.job is not None:
             return super().modal(context, event)
         if event.type == "ESC" and event.value == "PRESS":
             self.ended(context)
-            self.report({"WARNING"}, f"{self.bl_label}: cancelled, what is converted is kept")
+            self.report({"WARNING"}, f"{self.bl_label}: cancelled; finished conversions are kept")
             return {"CANCELLED"}
         if event.type != "TIMER":
             return {"PASS_THROUGH"}
@@ -123,14 +131,14 @@ is read again. FBX, glTF and USD clips are converted first, each once"""
         return {"RUNNING_MODAL"}
 
     def convert_next(self, context):
-        """The next one, or the thread where there is none."""
+        """Convert the next clip, or start the build where there is none."""
         if self.queue.todo:
             self.queue.step()
         else:
             super().start(context)
 
     def show(self, context):
-        """The conversions' progress while they run."""
+        """Show the conversions' progress while they run."""
         if self.job is not None:
             return super().show(context)
         running, queue = context.window_manager.beyond_mocap_work, self.queue
@@ -141,14 +149,16 @@ is read again. FBX, glTF and USD clips are converted first, each once"""
         window.redraw()
 
     def cancel(self, context):
-        """Blender takes the operator away."""
+        """Stop when Blender ends the operator."""
         if self.job is not None:
             self.job.cancel()
         self.ended(context)
 
     @staticmethod
     def work(order, progress, cancelled, _hurry):
-        """Build it, and list its clips; where it cannot be built they are listed all the same, to be given words."""
+        """Build the library and list its clips; a library that cannot be built is listed too, so that it can be
+        labelled.
+        """
         from ..beyond_mocap.library.build import build
         from ..beyond_mocap.library.listing import listed, scanned
 
@@ -161,7 +171,7 @@ is read again. FBX, glTF and USD clips are converted first, each once"""
         return Built(order.setting, built, None, listed(built), files)
 
     def apply(self, scene, built):
-        """Keep it, and say what it holds."""
+        """Store the library and report its content."""
         clips.keep(bpy.context.window_manager, built.setting, built.listing, built.files)
         for note in self.notes:
             self.report({"WARNING"}, note)
@@ -175,7 +185,9 @@ is read again. FBX, glTF and USD clips are converted first, each once"""
 
 
 def summary(built: "Library") -> str:
-    """Lines for the panel: clips and minutes, then each gait with its speed, then key moments with their number."""
+    """Describe a library for the panel: clips and minutes, then each gait with its speed, then key moments with their
+    number.
+    """
     originals = [clip for clip in built.clips if not clip.mirrored]
     keys = Counter(row.words[0] for clip in originals for row in clip.annotations if row.key is not None and row.words)
     lines = [f"{len(originals)} clips, {built.minutes:.1f} minutes, {len(built.skeleton)} joints"]
@@ -187,7 +199,7 @@ def summary(built: "Library") -> str:
 
 @dataclass(frozen=True, eq=False)
 class ListOrder:
-    """Which folder, and the library that was built of it in this session."""
+    """The folder to list, and its library if it was built in this session."""
 
     setting: str
     folder: str
@@ -196,8 +208,8 @@ class ListOrder:
 
 
 class BEYOND_MOCAP_OT_list_clips(FolderVerb, bpy.types.Operator):
-    """List the clips of the folder with their words, without reading their motion. For speeds and quality press Build
-Library"""
+    """List the clips of the folder with their labels, without reading their motion; Build Library adds speeds and
+quality"""
 
     bl_idname = "beyond_mocap.list_clips"
     bl_label = "List Clips"
@@ -213,7 +225,7 @@ Library"""
 
     @staticmethod
     def work(order, progress, _cancelled, _hurry):
-        """From the built library where there is one, else from the folder."""
+        """List from the built library where there is one, else from the folder."""
         from ..beyond_mocap.library.listing import listed, scanned
 
         progress(0.0, "Listing clips")
@@ -226,21 +238,21 @@ Library"""
     def apply(self, _scene, result):
         setting, found, files = result
         clips.keep(bpy.context.window_manager, setting, found, files)
-        self.report({"INFO"}, f"clips listed: {len(found)}")
+        self.report({"INFO"}, f"Clips listed: {len(found)}")
 
 
 class BEYOND_MOCAP_OT_relink_library(Verb, bpy.types.Operator):
-    """The library's folder was moved: choose where it is now. Without a choice it is looked for beside this file"""
+    """Choose the new place of a library folder that was moved; a folder beside this file is found automatically"""
 
     bl_idname = "beyond_mocap.relink_library"
     bl_label = "Relink Library"
     directory: StringProperty(subtype="DIR_PATH", options={"SKIP_SAVE", "HIDDEN"})
     filter_folder: bpy.props.BoolProperty(default=True, options={"HIDDEN"})
-    needs = ("Choose the library's folder in the field above",
+    needs = ("Choose the library folder in the field above",
              lambda context: bool(context.scene.beyond_mocap.library_folder))
 
     def invoke(self, context, _event):
-        """Look beside the file first; ask where nothing is found."""
+        """Search beside the file first; open the file browser where nothing is found."""
         if clips.relink_library(context.scene):
             return self.execute(context)
         context.window_manager.fileselect_add(self)
@@ -250,25 +262,24 @@ class BEYOND_MOCAP_OT_relink_library(Verb, bpy.types.Operator):
         settings = context.scene.beyond_mocap
         chosen = bpy.path.abspath(self.directory) if self.directory else ""
         if chosen and not clips.holds_recordings(chosen):
-            raise InputError(chosen, "no recordings below it", "the library's folder", "choose another")
+            raise InputError(chosen, "no recordings in the folder", "the library's folder", "choose another one")
         if chosen:
             settings.library_folder = as_setting(chosen)
         elif not os.path.isdir(absolute(settings.library_folder)) and not clips.relink_library(context.scene):
-            raise InputError(absolute(settings.library_folder), "no such folder, nor one like it beside this file",
+            raise InputError(absolute(settings.library_folder), "no such folder, and no similar one beside this file",
                              "the library's folder", "choose it in Relink Library")
         clips.check_folder(context.scene)
-        self.report({"INFO"}, f"library: {absolute(settings.library_folder)}")
+        self.report({"INFO"}, f"Library: {absolute(settings.library_folder)}")
 
 
 class BEYOND_MOCAP_OT_import_clip(ClipVerb, bpy.types.Operator):
-    """Bring this clip of the library into the scene as it was recorded: an armature with a body and the clip's
-action"""
+    """Import this clip of the library as it was recorded: an armature with a body and the clip's action"""
 
     bl_idname = "beyond_mocap.import_clip"
     bl_label = "Import Clip"
 
     def do(self, context):
-        """Read the file, then make the armature."""
+        """Read the file, then create the armature."""
         path = self.clip(context)
         clip, notes = recordings.read_recording(context.scene.beyond_mocap, path)
         body = recordings.show_recording(context, clip, path, self.dressed)
@@ -278,18 +289,18 @@ action"""
 
 
 class BEYOND_MOCAP_OT_remove_clip(Verb, bpy.types.Operator):
-    """Take the active clip out of this file again: armature, body, strips and actions. The library keeps it; words that
-were not saved are lost"""
+    """Remove the active clip from this file: armature, body, strips and actions. The library keeps the clip; unsaved
+labels are lost"""
 
     bl_idname = "beyond_mocap.remove_clip"
     bl_label = "Remove Clip"
-    needs = ("Select the armature of a clip that came from the library's list",
+    needs = ("Select the armature of a clip from the library's list",
              lambda context: bool(recordings.shown_clip(context.object)))
 
     def do(self, context):
         rig = context.object
         if rig.library is not None or rig.override_library is not None:
-            raise InputError(rig.name, "it belongs to another file", "an object of this file")
+            raise InputError(rig.name, "belongs to another file", "an object of this file")
         if rig.mode != "OBJECT":
             bpy.ops.object.mode_set(mode="OBJECT")
         recordings.remove_clip(rig)

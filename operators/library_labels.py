@@ -1,4 +1,4 @@
-"""Labels of a library clip: open it for annotation, have labels proposed, review and save them, learn from them."""
+"""Labels of a library clip: open it for annotation, propose labels, review and save them, learn from them."""
 
 from __future__ import annotations
 
@@ -20,21 +20,21 @@ from .verb import Verb
 
 
 class OpenClipVerb(Verb):
-    """A verb about the library clip that the active armature shows."""
+    """Base of operators about the library clip that the active armature shows."""
 
     needs = ("Open a clip with Annotate Clip first, and keep its armature active",
              lambda context: bool(recordings.shown_clip(context.object)))
 
 
 class BEYOND_MOCAP_OT_annotate_clip(ClipVerb, bpy.types.Operator):
-    """Open this clip of the library for annotation: an armature that plays it, with its words as strips and markers in
-the NLA editor. Change them there, or have words proposed, then press Save Words"""
+    """Open this clip of the library for annotation: an armature that plays it, with its labels as strips and markers in
+the NLA editor. Edit them there or propose labels, then press Save Labels"""
 
     bl_idname = "beyond_mocap.annotate_clip"
     bl_label = "Annotate Clip"
 
     def do(self, context):
-        """Read clip and words, then make armature and strips."""
+        """Read clip and labels, then create armature and strips."""
         from ..beyond_mocap.library.keep_words import as_timeline, read_sources, read_words
 
         settings, path = context.scene.beyond_mocap, self.clip(context)
@@ -47,28 +47,27 @@ the NLA editor. Change them there, or have words proposed, then press Save Words
         recordings.lay_words(rig, context.scene, motion, timeline)
         for row, (source, confidence) in said.items():
             proposals.add(rig, row, source, confidence, "ACCEPTED")
-        self.report({"INFO"}, f"{rig.name}: {len(rows)} {'row' if len(rows) == 1 else 'rows'} of words")
+        self.report({"INFO"}, f"{rig.name}: {len(rows)} {'row' if len(rows) == 1 else 'rows'} of labels")
 
 
 class BEYOND_MOCAP_OT_propose_words(OpenClipVerb, bpy.types.Operator):
-    """Propose words for the active clip from its motion: gaits and directions, kicks with foot and key moment, jumps,
-headers, turns, getting up; and all that was learned from annotated clips. Look through them; what neither knows is
-yours to add"""
+    """Propose labels for the active clip from its motion: gaits and directions, kicks with foot and key moment, jumps,
+headers, turns, getting up, and acts learned from annotated clips. Review them and add what is missing"""
 
     bl_idname = "beyond_mocap.propose_words"
-    bl_label = "Propose Words"
-    least: FloatProperty(name="At Least", default=0.5, min=0.0, max=1.0, subtype="FACTOR",
-                         description="Proposals that are less sure than this are left out")
+    bl_label = "Propose Labels"
+    least: FloatProperty(name="Confidence", default=0.5, min=0.0, max=1.0, subtype="FACTOR",
+                         description="Lowest confidence of proposals to keep")
     replace: BoolProperty(
         name="Replace", default=True,
-        description="In place of the strips that are there; else they stay, and proposals are put beside them",
+        description="Replace the existing strips; otherwise proposals are added beside them",
     )
 
     review: BoolProperty(name="One by One", default=False, options={"SKIP_SAVE"},
-                         description="Only list them: each becomes a strip or key moment when it is accepted")
+                         description="List the proposals; each becomes a strip or key moment when you accept it")
 
     def do(self, context):
-        """Look at the recording itself, then lay the strips."""
+        """Read the recording, then write the strips."""
         from ..beyond_mocap.annotation import Timeline
         from ..beyond_mocap.library.classify import classifier
         from ..beyond_mocap.library.keep_words import as_timeline
@@ -79,7 +78,7 @@ yours to add"""
         built = session.library(absolute(settings.library_folder), settings.library_unit or None)
         try:
             gaits = gaits_of(built) if built is not None else GAITS
-        except InputError:  # a library without locomotion says nothing of gaits
+        except InputError:  # a library without locomotion has no gaits
             gaits = GAITS
         known = classifier.read_classifier(absolute(settings.words_model)) if settings.words_model else None
         found = [one for one in propose(motion, gaits, known) if one.confidence >= self.least]
@@ -96,14 +95,14 @@ yours to add"""
             row = one.annotation
             if row.key is not None or one.confidence < 0.6:
                 when = f"{(row.start if row.key is None else row.key) / motion.fps:.2f} s"
-                self.report({"INFO"}, f"{when} {' '.join(row.words)}: {one.why}, {one.confidence:.0%} sure")
+                self.report({"INFO"}, f"{when} {' '.join(row.words)}: {one.why}, confidence {one.confidence:.0%}")
         keys = sum(one.annotation.key is not None for one in found)
         rest = len(found) - keys
         counted = f"{rest} stretch{'es' * (rest != 1)} and {keys} key moment{'s' * (keys != 1)}"
         self.report({"INFO"}, f"{rig.name}: {counted} proposed")
 
     def list_them(self, rig, scene, motion, found):
-        """List what is not among the clip's words already."""
+        """List the proposals that are not among the clip's labels already."""
         from ..beyond_mocap.annotation import Timeline
 
         if not lanes.has(rig):
@@ -111,57 +110,57 @@ yours to add"""
         said = lanes.read(rig)
         new = [one for one in found if not proposals.said_already(said, one.annotation, motion.fps)]
         proposals.keep(rig, new)
-        self.report({"INFO"}, f"{rig.name}: {len(new)} proposal{'s' * (len(new) != 1)} to look through")
+        self.report({"INFO"}, f"{rig.name}: {len(new)} proposal{'s' * (len(new) != 1)} to review")
 
 
-WHAT = (("ACCEPT", "Accept", "Put it among the clip's words, and go to the next one"),
-        ("REFUSE", "Refuse", "Leave it out, and go to the next one"),
-        ("NEXT", "Next", "Look at the next one"),
-        ("PREVIOUS", "Previous", "Look at the one before"),
-        ("ACCEPT_ALL", "Accept All", "Accept all that are still open"),
-        ("REFUSE_ALL", "Refuse All", "Refuse all that are still open"))
+WHAT = (("ACCEPT", "Accept", "Add this proposal to the clip's labels and go to the next one"),
+        ("REFUSE", "Reject", "Reject this proposal and go to the next one"),
+        ("NEXT", "Next", "Go to the next proposal"),
+        ("PREVIOUS", "Previous", "Go to the previous proposal"),
+        ("ACCEPT_ALL", "Accept All", "Accept all open proposals"),
+        ("REFUSE_ALL", "Reject All", "Reject all open proposals"))
 KEYS = {"A": "ACCEPT", "RET": "ACCEPT", "NUMPAD_ENTER": "ACCEPT", "X": "REFUSE", "DEL": "REFUSE", "DOWN_ARROW": "NEXT",
         "RIGHT_ARROW": "NEXT", "UP_ARROW": "PREVIOUS", "LEFT_ARROW": "PREVIOUS"}
-STATUS = "A, Enter: accept   X: refuse   Up, Down: the one before, the next   Space: play   Esc: leave"
+STATUS = "A, Enter: accept   X: reject   Up, Down: previous, next   Space: play   Esc: finish"
 
 
 class ProposalVerb(Verb):
-    """A verb about what was proposed for the active clip."""
+    """Base of operators about the proposals for the active clip."""
 
-    needs = ("Open a clip with Annotate Clip first, and press Look Through",
+    needs = ("Open a clip with Annotate Clip first, then press Review",
              lambda context: context.object is not None and len(context.object.beyond_mocap_proposals.listed) > 0)
 
 
 class BEYOND_MOCAP_OT_judge_proposal(ProposalVerb, bpy.types.Operator):
-    """Accept or refuse a proposal of the list, or step to another one"""
+    """Accept or reject a proposal of the list, or go to another one"""
 
     bl_idname = "beyond_mocap.judge_proposal"
-    bl_label = "Judge Proposal"
-    what: EnumProperty(name="What", items=WHAT, default="ACCEPT", description="What becomes of it")
+    bl_label = "Review Proposal"
+    what: EnumProperty(name="What", items=WHAT, default="ACCEPT", description="Action on the proposal")
     index: IntProperty(name="Proposal", default=-1, min=-1, options={"SKIP_SAVE"},
-                       description="Its place in the list; -1: the chosen one")
+                       description="Number in the list; -1 uses the chosen one")
 
     @classmethod
     def description(cls, _context, properties):
         return next(text for name, _, text in WHAT if name == properties.what)
 
     def do(self, context):
-        """Do it, and say so."""
+        """Carry out the action and report it."""
         self.report({"INFO"}, judged(context.object, self.what, self.index))
 
 
 class BEYOND_MOCAP_OT_review_proposals(ProposalVerb, bpy.types.Operator):
-    """Look through the proposals by keys while the clip plays: A or Enter accepts, X refuses, and the playhead goes to
-the next one; Up and Down step, Esc leaves"""
+    """Review the proposals with keys while the clip plays: A or Enter accepts, X rejects and goes to the next one, Up
+and Down step, Esc finishes"""
 
     bl_idname = "beyond_mocap.review_proposals"
-    bl_label = "Judge by Keys"
+    bl_label = "Review Proposals"
 
     def do(self, _context):
-        raise InputError("Judge by Keys", "no window", "a 3D view", "in scripts use Judge Proposal")
+        raise InputError("Review Proposals", "no window", "a 3D view", "in scripts use Review Proposal")
 
     def invoke(self, context, _event):
-        """Take keys from now on; the first open proposal is shown."""
+        """Start handling keys; the first open proposal is shown."""
         if bpy.app.background or context.window is None:
             return self.execute(context)
         self.target = context.object.name
@@ -171,7 +170,7 @@ the next one; Up and Down step, Esc leaves"""
         return {"RUNNING_MODAL"}
 
     def modal(self, context, event):
-        """Our keys where an editor of time or space is under the pointer; all else is Blender's."""
+        """Handle our keys while the pointer is over an editor of time or space; pass on all other events."""
         target = context.object
         listed = target is not None and target.name == self.target and len(target.beyond_mocap_proposals.listed) > 0
         if not listed:
@@ -187,7 +186,7 @@ the next one; Up and Down step, Esc leaves"""
         return {"RUNNING_MODAL"} if proposals.left(target) else self.left(context)
 
     def press(self, context, target, what: str):
-        """One key; a step for undo where words change."""
+        """Handle one key, with an undo step where labels change."""
         try:
             told = judged(target, what)
         except BeyondMocapError as error:
@@ -198,25 +197,25 @@ the next one; Up and Down step, Esc leaves"""
             bpy.ops.ed.undo_push(message=told[:60])
 
     def tell(self, context, told: str):
-        """What was done and what the keys do, in the status bar."""
+        """Show the last result, the current proposal and the keys in the status bar."""
         one = proposals.chosen(context.object)
-        now = f"{one.name}, {one.confidence:.0%} sure" if one is not None else ""
+        now = f"{one.name}, confidence {one.confidence:.0%}" if one is not None else ""
         context.workspace.status_text_set("   |   ".join(part for part in (told, now, STATUS) if part))
         for area in context.window.screen.areas:
             area.tag_redraw()
 
     def left(self, context):
-        """End."""
+        """Finish the operator."""
         self.cancel(context)
         return {"FINISHED"}
 
     def cancel(self, _context):
-        """Blender takes the operator away, or it has ended."""
+        """Clear the status bar when the operator ends."""
         clear_status()
 
 
 def judged(target: bpy.types.Object, what: str, index: int = -1) -> str:
-    """Carry out one of WHAT; returns a line for the user. InputError for a place that is not in the list."""
+    """Carry out one of REVIEW_ACTIONS; returns a line for the user. InputError for a number that is not in the list."""
     group = target.beyond_mocap_proposals
     if what in ("NEXT", "PREVIOUS"):
         group.active = min(group.active, len(group.listed) - 1)
@@ -227,7 +226,7 @@ def judged(target: bpy.types.Object, what: str, index: int = -1) -> str:
         judged_now = [number for number, one in enumerate(group.listed) if one.state == "OPEN"]
         for number in judged_now:
             how(target, number)
-        return f"{len(judged_now)} {'accepted' if what == 'ACCEPT_ALL' else 'refused'}"
+        return f"{len(judged_now)} {'accepted' if what == 'ACCEPT_ALL' else 'rejected'}"
     told = how(target, group.active if index < 0 else index)
     proposals.go_on(target, 1, only_open=True)
     count = proposals.left(target)
@@ -235,7 +234,7 @@ def judged(target: bpy.types.Object, what: str, index: int = -1) -> str:
 
 
 def _show_open(target: bpy.types.Object) -> None:
-    """The chosen proposal, if nobody has judged it, else the next one that is open; the playhead goes there."""
+    """Show the chosen proposal if it is open, else the next open one; the playhead goes there."""
     group = target.beyond_mocap_proposals
     one = proposals.chosen(target)
     if one is None or one.state != "OPEN":
@@ -244,24 +243,24 @@ def _show_open(target: bpy.types.Object) -> None:
 
 
 def _over_editor(context, event) -> bool:
-    """Whether the pointer is over an editor in which one annotates."""
+    """Whether the pointer is over an editor for annotation."""
     inside = (area for area in context.window.screen.areas
               if 0 <= event.mouse_x - area.x < area.width and 0 <= event.mouse_y - area.y < area.height)
     return any(area.type in SPACES for area in inside)
 
 
 class BEYOND_MOCAP_OT_save_words(OpenClipVerb, bpy.types.Operator):
-    """Write the words of the active clip's strips to NAME.txt beside the clip, or into the annotations.csv that speaks
-of it. What is written there already is overwritten only when you say so"""
+    """Write the labels of the active clip's strips to a text file beside the clip, or to the library's annotation
+table. Existing labels are replaced only after you confirm"""
 
     bl_idname = "beyond_mocap.save_words"
-    bl_label = "Save Words"
+    bl_label = "Save Labels"
     bl_options = {"REGISTER"}
-    overwrite: BoolProperty(name="Overwrite", description="Replace what is written about this clip",
+    overwrite: BoolProperty(name="Overwrite", description="Replace the existing labels of this clip",
                             options={"SKIP_SAVE"})
 
     def invoke(self, context, event):
-        """Ask before words are overwritten."""
+        """Ask before existing labels are replaced."""
         from ..beyond_mocap.base.errors import InputError
         from ..beyond_mocap.library.keep_words import has_words, place
 
@@ -276,12 +275,12 @@ of it. What is written there already is overwritten only when you say so"""
             return self.execute(context)
         self.overwrite = True
         what = (
-            f"Replace the words in {target.name}?" if form == "TEXT" else f"Replace this clip's rows in {target.name}?"
+            f"Replace the labels in {target.name}?" if form == "TEXT" else f"Replace this clip's rows in {target.name}?"
         )
         return context.window_manager.invoke_confirm(self, event, title=what, confirm_text="Replace", icon="WARNING")
 
     def do(self, context):
-        """Read the strips, write the file, and show the words in the list."""
+        """Read the strips, write the file, and update the list."""
         from ..beyond_mocap.library.keep_words import keep
 
         rig = context.object
@@ -290,12 +289,19 @@ of it. What is written there already is overwritten only when you say so"""
         target = keep(clip, folder, rows, fps=rig[recordings.RATE], overwrite=self.overwrite,
                       sources=proposals.sources(rig))
         clips.say(context.window_manager, recordings.shown_clip(rig), rows)
-        self.report({"INFO"}, f"{len(rows)} rows of words written to {target}; Build Library takes them in")
+        self.report({"INFO"}, f"{len(rows)} rows of labels written to {target}; press Build Library to use them")
 
 
 @dataclass(frozen=True)
 class Order:
-    """What learning needs to know. out: where it is kept; empty: beside the library's cache."""
+    """The input of learning.
+
+    Attributes:
+        folder: the library's.
+        unit: metres per unit of its files; None guesses it.
+        cache: the cache folder.
+        out: file to write; empty: beside the library's cache.
+    """
 
     folder: str
     unit: float | None
@@ -304,17 +310,17 @@ class Order:
 
 
 class BEYOND_MOCAP_OT_learn_words(FolderVerb, bpy.types.Operator):
-    """Learn from the library's clips that have words, ten are enough to begin with, so that Propose Words finds the
-same acts in others. What is learned is kept in a file, which serves any library"""
+    """Learn from the library's labelled clips, about ten are enough, so that Propose Labels finds the same acts in
+others; the result is a file that works with any library"""
 
     bl_idname = "beyond_mocap.learn_words"
-    bl_label = "Learn from Words"
+    bl_label = "Learn from Labels"
     kind = "learning"
     out: StringProperty(name="File", subtype="FILE_PATH", options={"SKIP_SAVE"},
-                        description="Where it is kept; empty: in the cache")
+                        description="File to write; empty uses the cache folder")
 
     def order(self, context):
-        """Folder, unit and where to."""
+        """Collect folder, unit and target file."""
         settings = context.scene.beyond_mocap
         if not settings.library_folder:
             raise InputError("library", "no folder chosen", "a folder of BVH clips", "choose one in step 1")
@@ -323,7 +329,7 @@ same acts in others. What is learned is kept in a file, which serves any library
 
     @staticmethod
     def work(order, progress, cancelled, _hurry):
-        """Look at the clips, learn, and keep it; returns the file and what was learned, as lines."""
+        """Read the clips, train and write the classifier; returns the file and lines about what was learned."""
         from ..beyond_mocap.library import cache
         from ..beyond_mocap.library.classify import classifier
         from ..beyond_mocap.library.classify.examples import examples_of
@@ -341,7 +347,7 @@ same acts in others. What is learned is kept in a file, which serves any library
         return str(out), (*known.told(), *notes)
 
     def apply(self, scene, result):
-        """Propose Words uses it from now on."""
+        """Set the file that Propose Labels uses."""
         scene.beyond_mocap.words_model, told = result
         for line in told[1:]:
             self.report({"INFO"}, line)

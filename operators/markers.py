@@ -1,4 +1,4 @@
-"""Optical markers: import, label and clean them, reconstruct a body, find a ball's release."""
+"""Operators of optical markers: import, label, clean, reconstruct a body, find a ball's release."""
 
 from __future__ import annotations
 
@@ -19,63 +19,62 @@ from .verb import BackgroundVerb, DroppedIntoView, ImportVerb, Verb
 
 
 class OnMarkers:
-    """To be mixed into a verb: it is about the cloud of markers that is meant."""
+    """Mixin for verbs that act on the target cloud of markers."""
 
-    needs = "Select a cloud of markers (Import Markers makes one)", lambda context: cloud_meant(context) is not None
+    needs = "Select a marker cloud; Import Markers creates one", lambda context: cloud_meant(context) is not None
 
     @staticmethod
     def cloud(context):
-        """The cloud; InputError where it belongs to another file."""
+        """Return the target cloud; raise InputError where it belongs to another file."""
         thing = cloud_meant(context)
         channels.check_local(thing, thing.data)
         return thing
 
     @staticmethod
     def within(scene):
-        """The context of the scene that the work began in, also where the window shows another one by now."""
+        """Return the context of the scene in which the work started, even if the window shows another one now."""
         if bpy.context.scene == scene:
             return nullcontext()
         return bpy.context.temp_override(scene=scene, view_layer=scene.view_layers[0])
 
 
-UP = (("AUTO", "Found", "As the file says, or heads above feet"),
+UP = (("AUTO", "Detect", "As the file says, or heads above feet"),
       *((axis, axis, f"{axis} of the file points up") for axis in ("X", "-X", "Y", "-Y", "Z", "-Z")))
 
 
 class BEYOND_MOCAP_OT_import_markers(ImportVerb, bpy.types.Operator):
-    """Import recordings of optical markers (.c3d, .trc) as clouds that play. Whose labels are those of a known marker
-set know their segments at once"""
+    """Import optical marker recordings (.c3d, .trc) as marker clouds, and apply a known marker set"""
 
     bl_idname = "beyond_mocap.import_markers"
     bl_label = "Import Markers"
     filename_ext = ".c3d"
     filter_glob: StringProperty(default="*.c3d;*.trc", options={"HIDDEN"})
     unit: FloatProperty(
-        name="Metres per unit", default=0.0, min=0.0, precision=5,
-        description="Size of one unit of the file in metres; 0: as the file says, or by the body's size",
+        name="Metres per Unit", default=0.0, min=0.0, precision=5,
+        description="Size of one unit of the file in metres; 0 uses the file or the body's size",
     )
-    up: EnumProperty(name="Up", items=UP, description="Which axis of the file points up")
-    subject: StringProperty(name="Subject", description="Whose markers to read, where a file holds several subjects'")
+    up: EnumProperty(name="Up", items=UP, description="Axis of the file that points up")
+    subject: StringProperty(name="Subject", description="Whose markers to read if a file contains several subjects")
 
     def do(self, context):
-        """Read all files, then make the clouds."""
+        """Read all files, then create the clouds."""
         from ..beyond_mocap.markers.files.marker_files import read_markers
 
         paths = self.chosen()
         if not paths:
-            raise InputError("import", "no file given", "a .c3d or .trc file", "choose one")
+            raise InputError("import", "no file", "a .c3d or .trc file", "choose a file")
         unit = self.unit or context.scene.beyond_mocap_markers.unit or None
         how = unit, self.subject or None, None if self.up == "AUTO" else self.up
         trials = [(path, read_markers(path, *how)) for path in paths]
         for _, trial in trials:
             cloud.check(trial)
-        if context.mode != "OBJECT":  # what is edited would stay so beside what is then active
+        if context.mode != "OBJECT":  # another object would stay in Edit Mode
             bpy.ops.object.mode_set(mode="OBJECT")
         made = [self.add(context, path, trial) for path, trial in trials]
         window.select_only(context, *made)
 
     def add(self, context, path: Path, trial) -> bpy.types.Object:
-        """One cloud, and what is to be said of it."""
+        """Create one cloud, and report messages on it."""
         thing = cloud.create(context, trial)
         thing.beyond_mocap_cloud.file = as_setting(str(path))
         told = list(trial.notes)
@@ -86,7 +85,7 @@ set know their segments at once"""
         thing.beyond_mocap_cloud.told = "\n".join(told)
         for line in told:
             self.report({"INFO"}, f"{thing.name}: {line}")
-        seen = f"{100.0 * float(trial.seen.mean()):.0f} % seen"
+        seen = f"{100.0 * float(trial.seen.mean()):.0f} % visible"
         found = f"{len(trial.labels)} markers, {trial.duration:.2f} s at {trial.fps:g} per second, {seen}"
         self.report({"INFO"}, f"{thing.name}: {found}")
         return thing
@@ -105,28 +104,28 @@ _segments: list[tuple[str, str, str]] = []
 
 
 def segments(_operator, _context):
-    """The segments to choose from; kept, since Blender does not keep the texts itself."""
+    """List the segments to choose from; stored, since Blender does not keep the texts."""
     if not _segments:
         from ..beyond_mocap.markers.model.template import JOINTS
 
-        _segments.append(("NONE", "None", "No segment carries it"))
-        _segments.extend((name, name, f"The body's {name} carries it") for name in JOINTS)
+        _segments.append(("NONE", "None", "No segment"))
+        _segments.extend((name, name, f"Body segment {name}") for name in JOINTS)
     return _segments
 
 
 class BEYOND_MOCAP_OT_assign_markers(OnMarkers, Verb, bpy.types.Operator):
-    """Say which segment carries the markers that are selected in Edit Mode, or else the one chosen in the list"""
+    """Assign the markers selected in Edit Mode, or the active one of the list, to a body segment"""
 
     bl_idname = "beyond_mocap.assign_markers"
     bl_label = "Assign Markers"
-    segment: EnumProperty(name="Segment", items=segments, description="The segment of the body that carries them")
+    segment: EnumProperty(name="Segment", items=segments, description="Body segment that the markers lie on")
 
     def do(self, context):
-        """Write it to the labels."""
+        """Write the segment to the labels."""
         thing = self.cloud(context)
         names = sets.chosen(thing)
         if not names:
-            raise InputError(thing.name, "no marker selected", "one at least", "select vertices in Edit Mode")
+            raise InputError(thing.name, "no markers selected", "at least one", "select vertices in Edit Mode")
         segment = "" if self.segment == "NONE" else self.segment
         sets.assign(thing, names, segment)
         self.report({"INFO"}, f"{', '.join(names)}: {segment or 'no segment'}")
@@ -136,23 +135,24 @@ _sets: list[tuple[str, str, str]] = []
 
 
 def shipped(_operator, _context):
-    """The marker sets that come along; kept, since Blender does not keep the texts itself."""
+    """List the shipped marker sets; stored, since Blender does not keep the texts."""
     if not _sets:
         from ..beyond_mocap.markers.files.marker_set_text import shipped_sets
 
-        _sets.append(("AUTO", "Recognise", "The one that the labels are of"))
+        _sets.append(("AUTO", "Detect", "Marker set that fits the labels"))
         _sets.extend((one.name, one.name.replace("_", " ").title(), one.about) for one in shipped_sets())
     return _sets
 
 
 class BEYOND_MOCAP_OT_use_marker_set(OnMarkers, Verb, bpy.types.Operator):
-    """Give the markers their segments by a marker set that comes along"""
+    """Apply a shipped marker set to the labels of the marker cloud"""
 
     bl_idname = "beyond_mocap.use_marker_set"
     bl_label = "Use Marker Set"
-    which: EnumProperty(name="Marker Set", items=shipped, description="Which one")
+    which: EnumProperty(name="Marker Set", items=shipped, description="Marker set to apply")
 
     def do(self, context):
+        """Apply the chosen set, and report what does not fit."""
         from ..beyond_mocap.markers.files.marker_set_text import shipped_sets
 
         thing = self.cloud(context)
@@ -165,7 +165,7 @@ class BEYOND_MOCAP_OT_use_marker_set(OnMarkers, Verb, bpy.types.Operator):
 
 
 class BEYOND_MOCAP_OT_load_marker_set(OnMarkers, ImportVerb, bpy.types.Operator):
-    """Give the markers of the active cloud their segments by a marker set in a text file"""
+    """Apply a marker set from a text file to the labels of the active marker cloud"""
 
     bl_idname = "beyond_mocap.load_marker_set"
     bl_label = "Load Marker Set"
@@ -173,6 +173,7 @@ class BEYOND_MOCAP_OT_load_marker_set(OnMarkers, ImportVerb, bpy.types.Operator)
     filter_glob: StringProperty(default="*.txt", options={"HIDDEN"})
 
     def do(self, context):
+        """Read the set and apply it, and report what does not fit."""
         from ..beyond_mocap.markers.files.marker_set_text import read_marker_set
 
         path = self.chosen_one("one marker set")
@@ -182,8 +183,7 @@ class BEYOND_MOCAP_OT_load_marker_set(OnMarkers, ImportVerb, bpy.types.Operator)
 
 
 class BEYOND_MOCAP_OT_save_marker_set(OnMarkers, Verb, bpy.types.Operator, ExportHelper):
-    """Write labels, segments and landmarks of the active cloud as a marker set, for other recordings and the command
-line"""
+    """Save labels, segments and landmarks of the active marker cloud as a marker set file"""
 
     bl_idname = "beyond_mocap.save_marker_set"
     bl_label = "Save Marker Set"
@@ -192,7 +192,7 @@ line"""
     filter_glob: StringProperty(default="*.txt", options={"HIDDEN"})
 
     def do(self, context):
-        """Put it together, write it."""
+        """Build the marker set and write it."""
         from ..beyond_mocap.markers.files.marker_set_text import marker_set_text
 
         path = Path(bpy.path.abspath(self.filepath))
@@ -202,28 +202,28 @@ line"""
 
 
 class BEYOND_MOCAP_OT_set_static(OnMarkers, Verb, bpy.types.Operator):
-    """The active cloud is a static trial: the other selected clouds, or all others where none is selected, get the
-places of their joints from it"""
+    """Use the active cloud as the static trial of the other selected clouds, or of all others if none is selected"""
 
     bl_idname = "beyond_mocap.set_static"
     bl_label = "Set Static Trial"
-    needs = ("Make the cloud of the static trial active; there have to be others",
+    needs = ("Make the cloud of the static trial active; at least one other cloud is needed",
              lambda context: is_cloud(context.view_layer.objects.active) and len(clouds(context.scene)) > 1)
 
     def do(self, context):
+        """Set the static trial of the other clouds."""
         static = context.view_layer.objects.active
         others = [thing for thing in clouds(context.scene) if thing != static]
         chosen = [thing for thing in others if thing.select_get()] or others
         channels.check_local(*chosen)
         if static.beyond_mocap_cloud.static in chosen:
-            raise InputError(static.name, "its own static trial is among them", "a trial without", "clear it first")
+            raise InputError(static.name, "its own static trial is among them", "a trial without one", "clear it first")
         for thing in chosen:
             thing.beyond_mocap_cloud.static = static
         self.report({"INFO"}, f"{static.name}: static trial of {', '.join(thing.name for thing in chosen)}")
 
 
 class BEYOND_MOCAP_OT_load_marker_model(OnMarkers, ImportVerb, bpy.types.Operator):
-    """Take joints and markers of the active cloud's body from a MODEL.json, as the command reconstruct saves it"""
+    """Load joints and marker places of the active cloud's body from a model file"""
 
     bl_idname = "beyond_mocap.load_marker_model"
     bl_label = "Load Marker Model"
@@ -231,7 +231,7 @@ class BEYOND_MOCAP_OT_load_marker_model(OnMarkers, ImportVerb, bpy.types.Operato
     filter_glob: StringProperty(default="*.json", options={"HIDDEN"})
 
     def do(self, context):
-        """Read it, keep it with the cloud."""
+        """Read the model, and store it with the cloud."""
         from ..beyond_mocap.markers.files.model_json import read_model
 
         path = self.chosen_one("one MODEL.json")
@@ -242,7 +242,7 @@ class BEYOND_MOCAP_OT_load_marker_model(OnMarkers, ImportVerb, bpy.types.Operato
 
 
 class BEYOND_MOCAP_OT_save_marker_model(OnMarkers, Verb, bpy.types.Operator, ExportHelper):
-    """Write the model that the active cloud keeps as a MODEL.json, for other recordings and the command line"""
+    """Save the model of the active marker cloud as a file, for other recordings"""
 
     bl_idname = "beyond_mocap.save_marker_model"
     bl_label = "Save Marker Model"
@@ -251,7 +251,7 @@ class BEYOND_MOCAP_OT_save_marker_model(OnMarkers, Verb, bpy.types.Operator, Exp
     filter_glob: StringProperty(default="*.json", options={"HIDDEN"})
 
     def do(self, context):
-        """Read it off the text, write it."""
+        """Read the model from the text and write it."""
         from ..beyond_mocap.markers.files.model_json import write_model
 
         path = bpy.path.abspath(self.filepath)
@@ -260,15 +260,14 @@ class BEYOND_MOCAP_OT_save_marker_model(OnMarkers, Verb, bpy.types.Operator, Exp
 
 
 class BEYOND_MOCAP_OT_clean_markers(OnMarkers, BackgroundVerb, bpy.types.Operator):
-    """Fill the gaps of the active cloud's markers, mend exchanged labels and jumps, and name those that nobody has
-named where the others tell. Reconstruct does the same for itself"""
+    """Fill gaps, exchange swapped labels back, remove jumps and label unlabeled markers of the active cloud"""
 
     bl_idname = "beyond_mocap.clean_markers"
     bl_label = "Clean Up Markers"
     kind = "clean markers"
 
     def order(self, context):
-        """The trial, and which markers belong together."""
+        """Return the trial, and which markers belong together."""
         thing = self.cloud(context)
         trial = cloud.read(thing, context.scene)
         assigned = any(row.segment for row in thing.beyond_mocap_cloud.labels)
@@ -276,38 +275,39 @@ named where the others tell. Reconstruct does the same for itself"""
 
     @staticmethod
     def work(order, progress, cancelled, _hurry):
+        """Clean the trial."""
         from ..beyond_mocap.markers.cleaning.clean import clean
 
         name, trial, clusters = order
         return name, clean(trial, clusters, progress=progress, cancelled=cancelled)
 
     def apply(self, scene, result):
-        """Other trajectories for the cloud, and what was done."""
+        """Write the new trajectories to the cloud, and report what was done."""
         name, cleaned = result
         thing = scene.objects.get(name)
         if not is_cloud(thing):
-            self.report({"WARNING"}, f"{name} is gone: nothing was written")
+            self.report({"WARNING"}, f"{name} no longer exists: no data written")
             return
         cloud.write(thing, cleaned.trial, scene)
-        thing.beyond_mocap_cloud.cleaned = "\n".join(cleaned.report.lines) or "nothing to mend"
+        thing.beyond_mocap_cloud.cleaned = "\n".join(cleaned.report.lines) or "nothing to correct"
         for line in thing.beyond_mocap_cloud.cleaned.splitlines():
             self.report({"INFO"}, f"{name}: {line}")
 
 
 class BEYOND_MOCAP_OT_reconstruct_markers(OnMarkers, BackgroundVerb, bpy.types.Operator):
-    """Find the skeleton that moves under the markers of the active cloud: an armature with an action beside it, and a
-clip of the library where asked for"""
+    """Reconstruct the skeleton that moves with the active cloud's markers, as an armature with an action"""
 
     bl_idname = "beyond_mocap.reconstruct_markers"
     bl_label = "Reconstruct"
     kind = "reconstruct markers"
 
     def order(self, context):
-        """The trial, its static or model, and the settings."""
+        """Return the trial, its static or model, and the settings."""
         return solve.order_of(context.scene, self.cloud(context))
 
     @staticmethod
     def work(order, progress, cancelled, _hurry):
+        """Reconstruct the trial."""
         from ..beyond_mocap.markers.reconstruct import reconstruct
 
         made = reconstruct(order.trial, order.static, order.model, settings=order.settings, progress=progress,
@@ -315,11 +315,11 @@ clip of the library where asked for"""
         return order, made
 
     def apply(self, scene, result):
-        """Armature, action, figures, and the clip."""
+        """Create armature, action and figures, and write the clip."""
         order, made = result
         thing = scene.objects.get(order.cloud)
         if not is_cloud(thing):
-            self.report({"WARNING"}, f"{order.cloud} is gone: nothing was written")
+            self.report({"WARNING"}, f"{order.cloud} no longer exists: no data written")
             return
         notes = solve.add(order, made)
         with self.within(scene):
@@ -330,19 +330,19 @@ clip of the library where asked for"""
 
 
 class BEYOND_MOCAP_OT_find_release(OnMarkers, BackgroundVerb, bpy.types.Operator):
-    """Find out when and how fast the ball left the hand of the reconstructed body: a ball on its way, and a marker on
-the timeline"""
+    """Estimate when and how fast the ball left the hand of the reconstructed body, and show its trajectory"""
 
     bl_idname = "beyond_mocap.find_release"
     bl_label = "Find Release"
     kind = "find release"
 
     def order(self, context):
-        """The reconstruction, and what is known of the ball."""
+        """Return the reconstruction, and what is known of the ball."""
         return solve.release_order(context.scene, self.cloud(context))
 
     @staticmethod
     def work(order, progress, _cancelled, _hurry):
+        """Estimate the release."""
         from ..beyond_mocap.markers.release.release import release
 
         name, trial, motion, settings = order
@@ -350,10 +350,11 @@ the timeline"""
         return name, release(trial, motion, settings)
 
     def apply(self, scene, result):
+        """Show the release, and report its figures."""
         name, found = result
         thing = scene.objects.get(name)
         if not is_cloud(thing):
-            self.report({"WARNING"}, f"{name} is gone: nothing was written")
+            self.report({"WARNING"}, f"{name} no longer exists: no data written")
             return
         with self.within(scene):
             solve.show_release(bpy.context, thing, found)

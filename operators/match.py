@@ -1,4 +1,4 @@
-"""A match: read its files, make and show a stretch of it, its cameras, its export."""
+"""Operators of a match: read its files, synthesize and show a stretch of it, its cameras, its export."""
 
 from __future__ import annotations
 
@@ -17,26 +17,26 @@ from ..scene.rigs import export, rig
 from .verb import NEEDS_LIBRARY, BackgroundVerb, DroppedIntoView, ExportVerb, Verb
 
 MAKING = 0.85
-"""Of the bar, the share of making where a match is made and shown."""
+"""Share of the progress bar for the synthesis, before a match is shown."""
 
 
 class MatchVerb(BackgroundVerb):
-    """A verb that ends with a stretch of a match in the scene."""
+    """An operator that ends with a stretch of a match in the scene."""
 
     bl_options = {"REGISTER", "UNDO"}
 
     def known_library(self, wanted: load.Wanted):
-        """The library where this session has it."""
+        """Find the library if this session has it."""
         return session.library(wanted.library, wanted.unit)
 
     def apply(self, scene, result):
-        """Pitch, bodies, ball, cameras; and lines about what came of it."""
+        """Show pitch, characters, ball and cameras, and report messages."""
         wanted, (library, scenery, lines), notes = result
         match = scene.beyond_mocap_match
         match.made = "" if match.folder else as_setting(wanted.folder)
         if scene != bpy.context.scene:
-            raise InputError("match", f"scene {scene.name} is not shown in the window", "the scene that asked",
-                             "choose it and press Show Match")
+            raise InputError("match", f"scene {scene.name} is not the window's scene", "the scene it was started in",
+                             "switch to it and press Show Match")
         session.keep_library(library, wanted.unit)
         first = match.first_frame
         took = show.show(bpy.context, scenery, first)
@@ -47,24 +47,25 @@ class MatchVerb(BackgroundVerb):
         for line in lines:
             self.report({"WARNING"}, line)
         seconds = scenery.end - scenery.start
-        self.report({"INFO"}, f"{len(scenery.people)} people, {seconds:.1f} s, shown in {sum(took.values()):.1f} s")
+        self.report({"INFO"}, f"{len(scenery.people)} players, {seconds:.1f} s, shown in {sum(took.values()):.1f} s")
 
 
 class BEYOND_MOCAP_OT_read_match(BackgroundVerb, bpy.types.Operator):
-    """Read a provider's tracking of a whole match: fills the list of players, the teams' colours and the data report.
-The first minute is chosen"""
+    """Read a provider's tracking of a match, fill the list of players, the teams' colours and the data report, and
+select the first minute"""
 
     bl_idname = "beyond_mocap.read_match"
     bl_label = "Read Match"
     kind = "match file"
     filepath: StringProperty(name="File", subtype="FILE_PATH", options={"SKIP_SAVE"},
-                             description="A tracking file; empty: the one that is chosen in the panel")
+                             description="Tracking file; empty: the one in the panel")
     directory: StringProperty(subtype="DIR_PATH", options={"SKIP_SAVE", "HIDDEN"})
     files: CollectionProperty(type=bpy.types.OperatorFileListElement, options={"SKIP_SAVE", "HIDDEN"})
 
     def order(self, context):
-        """Which files. Of those that are dropped together the largest is read, which is the tracking: others are found
-        beside it."""
+        """Choose the files; of several dropped files the largest is the tracking, and the others are found beside
+        it.
+        """
         dropped = [Path(self.directory, name) for name in sorted(file.name for file in self.files) if name]
         sizes = {path: path.stat().st_size if path.is_file() else 0 for path in dropped}
         chosen = str(max(dropped, key=sizes.get)) if self.directory and dropped else self.filepath
@@ -84,24 +85,24 @@ The first minute is chosen"""
 
 
 class BEYOND_MOCAP_FH_match(DroppedIntoView, bpy.types.FileHandler):
-    """A provider's tracking of a match dropped into the 3D view"""
+    """Read a provider's tracking file dropped into the 3D view"""
 
     bl_idname = "BEYOND_MOCAP_FH_match"
-    bl_label = "Match of all players"
+    bl_label = "Match of All Players"
     bl_import_operator = "beyond_mocap.read_match"
-    bl_file_extensions = ".csv;.json;.jsonl;.xml;.dat"  # dropped texts are words; tracking as text is chosen by name
+    bl_file_extensions = ".csv;.json;.jsonl;.xml;.dat"  # dropped texts are labels; tracking as text is chosen by name
 
 
-WHOM = (("ALL", "All", "Tick everybody"), ("NONE", "None", "Tick nobody"), ("home", "Home", "Tick the home team alone"),
-        ("away", "Away", "Tick the away team alone"), ("ONE", "Chosen", "Tick the chosen player alone"))
+WHOM = (("ALL", "All", "Select all"), ("NONE", "None", "Select none"), ("home", "Home", "Select the home team only"),
+        ("away", "Away", "Select the away team only"), ("ONE", "Active", "Select the active player only"))
 
 
 class BEYOND_MOCAP_OT_tick_match(Verb, bpy.types.Operator):
-    """Choose whom the match is made of"""
+    """Select the players of the match"""
 
     bl_idname = "beyond_mocap.tick_match"
-    bl_label = "Tick Players"
-    whom: EnumProperty(name="Whom", items=WHOM, default="ALL", description="Who is ticked")
+    bl_label = "Select Players"
+    whom: EnumProperty(name="Players", items=WHOM, default="ALL", description="Players to select")
     needs = "Press Read Match first", lambda context: len(context.scene.beyond_mocap_match.players) > 0
 
     @classmethod
@@ -117,24 +118,24 @@ class BEYOND_MOCAP_OT_tick_match(Verb, bpy.types.Operator):
 
 
 class BEYOND_MOCAP_OT_make_match(MatchVerb, bpy.types.Operator):
-    """Find motion for everybody and the ball's course, from From to To, and show it. Other processes do the work, so
-Blender stays free. ESC cancels: what is finished is kept, and pressing again goes on there"""
+    """Synthesize all selected players and the ball from From to To, in other processes, and show them; ESC cancels,
+and pressing the button again resumes with the finished work"""
 
     bl_idname = "beyond_mocap.make_match"
     bl_label = "Make Match"
     kind = "match"
-    left = "cancelled; what is finished is kept, and pressed again it goes on there"
+    left = "cancelled; finished work is kept, press Make Match again to resume"
     needs = (*NEEDS_LIBRARY, "Choose a tracking file of a match, or drop one into the view, first",
              lambda context: bool(context.scene.beyond_mocap_match.tracking_file))
 
     def order(self, context):
-        """The command line, and what is shown of its results."""
+        """Build the command line, and the request to display its result."""
         wanted = order.wanted(context.scene, order.folder_to_make(context.scene))
         return order.command(context.scene), wanted, self.known_library(wanted)
 
     @staticmethod
     def work(asked, progress, cancelled, hurry):
-        """Make it in a process of its own, then expand it."""
+        """Run the command in its own process, then load the result."""
         arguments, wanted, library = asked
         notes = child.run(arguments, lambda done, text: progress(MAKING * done, text), cancelled)
         shown = load.scenery(wanted, library, lambda done, text: progress(MAKING + (1.0 - MAKING) * done, text),
@@ -143,13 +144,13 @@ Blender stays free. ESC cancels: what is finished is kept, and pressing again go
 
 
 class BEYOND_MOCAP_OT_show_match(MatchVerb, bpy.types.Operator):
-    """Show a stretch of a made match, from From to To: everybody in kit, ball, pitch and cameras. It takes the place of
-the one that is shown"""
+    """Show a stretch of a match, from From to To, with players in kits, ball, pitch and cameras, in place of the one
+that is displayed"""
 
     bl_idname = "beyond_mocap.show_match"
     bl_label = "Show Match"
     kind = "match"
-    needs = (*NEEDS_LIBRARY, "Press Make Match, or choose the folder of a made match, first",
+    needs = (*NEEDS_LIBRARY, "Press Make Match, or choose the folder of a match, first",
              lambda context: bool((match := context.scene.beyond_mocap_match).folder or match.made))
 
     def order(self, context):
@@ -163,27 +164,27 @@ the one that is shown"""
 
 
 class ShownMatchVerb(Verb):
-    """A verb about the match that is shown."""
+    """An operator on the displayed match."""
 
     needs = "Press Make Match or Show Match first", lambda context: bool(ours.bodies(context.scene))
 
 
 class BEYOND_MOCAP_OT_match_second(ShownMatchVerb, bpy.types.Operator):
-    """Go to this second of the shown match, and select this player. The page over a match names both for its worst
-seconds"""
+    """Go to a second of the displayed match and select a player, such as for a worst second on the match's report
+page"""
 
     bl_idname = "beyond_mocap.match_second"
     bl_label = "Go to Match Second"
-    seconds: FloatProperty(name="Second", options={"SKIP_SAVE"}, description="Of the match's clock")
-    player: StringProperty(name="Player", options={"SKIP_SAVE"}, description="ID in the feed; empty: nobody")
+    seconds: FloatProperty(name="Second", options={"SKIP_SAVE"}, description="Second of the match's clock")
+    player: StringProperty(name="Player", options={"SKIP_SAVE"}, description="ID in the feed; empty: none")
 
     def invoke(self, context, _event):
         return context.window_manager.invoke_props_dialog(self)
 
     def do(self, context):
-        """Set the frame, select the body."""
+        """Set the frame and select the body."""
         scene, shown = context.scene, context.scene.beyond_mocap_match
-        rate = shown.shown_rate or frames_per_second(scene)  # keys stay on their frames when the scene's rate changes
+        rate = shown.shown_rate or frames_per_second(scene)  # keys keep their frames if the scene's rate changes
         frame = round(shown.shown_first + (self.seconds - shown.shown_start) * rate)
         last = _last(scene)
         if not shown.shown_first <= frame <= last:
@@ -198,22 +199,22 @@ seconds"""
 
 
 def _body_of(scene: bpy.types.Scene, player: str) -> bpy.types.Object:
-    """A player's armature; InputError where the player is not shown."""
+    """Find a player's armature; InputError if the player is not displayed."""
     known = {thing.get(ours.PLAYER): thing for thing in ours.bodies(scene)}
     if player not in known:
         raise InputError("match", f"{player} is not shown", f"one of {', '.join(map(str, known))}",
-                         "tick the player and press Show Match")
+                         "select the player and press Show Match")
     return known[player]
 
 
 def _last(scene: bpy.types.Scene) -> int:
-    """The last frame in which somebody moves; the scene's last one where nobody does."""
+    """Find the last frame with a motion; the scene's last frame if there is none."""
     actions = [channels.playing(body)[0] for body in ours.bodies(scene)]
     return round(max((action.frame_range[1] for action in actions if action is not None), default=scene.frame_end))
 
 
-WHICH = (("STAND", "Broadcast", "From the stand, following the ball"),
-         ("EYES", "Eyes", "Through the eyes of the player chosen in the list, or of the selected one"))
+WHICH = (("STAND", "Broadcast", "Look from the stand, following the ball"),
+         ("EYES", "Eyes", "Look through the eyes of the selected player, or of the active one in the list"))
 
 
 class BEYOND_MOCAP_OT_match_camera(ShownMatchVerb, bpy.types.Operator):
@@ -221,8 +222,8 @@ class BEYOND_MOCAP_OT_match_camera(ShownMatchVerb, bpy.types.Operator):
 
     bl_idname = "beyond_mocap.match_camera"
     bl_label = "Match Camera"
-    which: EnumProperty(name="Which", items=WHICH, default="STAND", description="The camera to look through")
-    player: StringProperty(name="Player", options={"SKIP_SAVE"}, description="ID of the player; empty: the chosen one")
+    which: EnumProperty(name="Which", items=WHICH, default="STAND", description="Camera to look through")
+    player: StringProperty(name="Player", options={"SKIP_SAVE"}, description="ID of the player; empty: the active one")
 
     @classmethod
     def description(cls, _context, properties):
@@ -236,14 +237,14 @@ class BEYOND_MOCAP_OT_match_camera(ShownMatchVerb, bpy.types.Operator):
         else:
             camera = cameras.stand_of(scene)
         if camera is None:
-            raise InputError("match", "no camera in the stand", "the one that was laid", "press Show Match again")
+            raise InputError("match", "no camera in the stand", "the match's camera", "press Show Match again")
         scene.camera = camera
         area = None if bpy.app.background else window.largest_editor(context.window.screen, "VIEW_3D")
         if area is not None:
             _look_through(context, area)
 
     def who(self, context) -> bpy.types.Object:
-        """The armature that is meant: named, selected, or chosen in the list."""
+        """Find the armature that is named, selected, or active in the list."""
         shown, active = ours.bodies(context.scene), context.active_object
         if not self.player and active is not None:
             active = active.parent if active.type == "MESH" else active
@@ -254,7 +255,7 @@ class BEYOND_MOCAP_OT_match_camera(ShownMatchVerb, bpy.types.Operator):
 
 
 def _look_through(context, area: bpy.types.Area) -> None:
-    """The scene's camera in the 3D view, its whole frame."""
+    """Show the scene's camera in the 3D view, with its whole frame."""
     area.spaces.active.region_3d.view_perspective = "CAMERA"
     region = next(region for region in area.regions if region.type == "WINDOW")
     with context.temp_override(area=area, region=region):
@@ -265,16 +266,16 @@ FORMATS = [one for one in rig.FORMATS if one[0] != "BVH"]
 
 
 class BEYOND_MOCAP_OT_match_export(ExportVerb, bpy.types.Operator):
-    """Write the match that is shown to one file: a skeleton and meshes for everybody, the ball, and the pitch. The
-scene stays as it is"""
+    """Write the displayed match to one file, with a skeleton and meshes for every player, the ball and the pitch; the
+scene is not changed"""
 
     bl_idname = "beyond_mocap.match_export"
     bl_label = "Export Match"
     filter_glob: StringProperty(default="*.fbx;*.glb;*.usdc", options={"HIDDEN"})
-    format: EnumProperty(name="Format", items=FORMATS, default="GLB", description="Form of the file")
-    engine: EnumProperty(name="For", items=rig.ENGINES, default="BLENDER", description="Axes and units of")
-    root: EnumProperty(name="Root Motion", items=rig.ROOTS, default="KEEP", description="What the root bone carries")
-    pitch: BoolProperty(name="Pitch", default=True, description="Grass, lines and goals, too")
+    format: EnumProperty(name="Format", items=FORMATS, default="GLB", description="File format")
+    engine: EnumProperty(name="For", items=rig.ENGINES, default="BLENDER", description="Target program")
+    root: EnumProperty(name="Root Motion", items=rig.ROOTS, default="KEEP", description="Motion of the root bone")
+    pitch: BoolProperty(name="Pitch", default=True, description="Include grass, lines and goals")
     needs = "Show a match first", lambda context: bool(ours.bodies(context.scene))
 
     def do(self, context):
@@ -283,7 +284,7 @@ scene stays as it is"""
         everybody = ours.bodies(scene)
         bodies = [body for body in everybody if body.name in context.view_layer.objects]
         if len(bodies) < len(everybody):
-            self.report({"WARNING"}, f"{len(everybody) - len(bodies)} are left out: their collection is excluded")
+            self.report({"WARNING"}, f"{len(everybody) - len(bodies)} players left out: their collection is excluded")
         wanted = export.Wanted(path, self.format, self.engine, None, self.root)
         things = ours.meshes(scene, "ball") + (ours.meshes(scene, "pitch") if self.pitch else [])
         for line in export.write(context, bodies, wanted, things):

@@ -17,12 +17,12 @@ from ..scene.timeline.strips import show_player
 from .verb import DroppedIntoView, ImportVerb, Verb
 
 SHIRTS = {"home": ((0.75, 0.05, 0.06), (0.80, 0.30, 0.04)), "away": ((0.04, 0.14, 0.70), (0.02, 0.45, 0.60))}
-SECTION = 60.0  # seconds of a whole match that are taken at first
+SECTION = 60.0  # seconds of a whole match that are selected at first
 
 
 class BEYOND_MOCAP_OT_import_tracking(ImportVerb, bpy.types.Operator):
     """Import players' positions: CSV files with time_s, x_m, y_m, or a provider's tracking file (TRACAB, Metrica,
-SkillCorner, Sportec, Second Spectrum, Stats Perform). A text of the same name beside a CSV is taken as its words"""
+SkillCorner, Sportec, Second Spectrum, Stats Perform). A text file with the name of a CSV is read as its labels"""
 
     bl_idname = "beyond_mocap.import_tracking"
     bl_label = "Import Tracking"
@@ -30,15 +30,15 @@ SkillCorner, Sportec, Second Spectrum, Stats Perform). A text of the same name b
     filter_glob: StringProperty(default="*.csv;*.txt;*.dat;*.json;*.jsonl;*.xml", options={"HIDDEN"})
     metadata: StringProperty(
         name="Metadata", subtype="FILE_PATH",
-        description="The provider's second file; where empty, one beside the tracking file whose name fits is taken",
+        description="The provider's second file; empty finds one with a matching name beside the tracking file",
     )
     provider: EnumProperty(name="Provider",
-                           items=[("AUTO", "Guess", "By what the file looks like")]
+                           items=[("AUTO", "Automatic", "Detect the provider from the file")]
                            + [(one.name, one.title, one.files.replace("`", "")) for one in PROVIDERS.values()],
-                           description="Whose form the file has")
+                           description="Provider whose format the file has")
 
     def paths(self) -> list[str]:
-        """The chosen files, without the words that lie beside a chosen CSV and come along with it."""
+        """List the chosen files, without label files beside a chosen CSV, which are imported with it."""
         chosen = self.chosen()
         if not chosen:
             raise InputError("import", "no file given", "a tracking file", "choose one")
@@ -46,7 +46,7 @@ SkillCorner, Sportec, Second Spectrum, Stats Perform). A text of the same name b
         return [str(path) for path in chosen if path not in words]
 
     def do(self, context):
-        """Read all files, then fill the list."""
+        """Read all files, then add the players."""
         settings = context.scene.beyond_mocap
         provider = "" if self.provider == "AUTO" else self.provider
         read = [(path, *tracks.players_in(path, self.metadata, provider)) for path in self.paths()]
@@ -61,19 +61,21 @@ SkillCorner, Sportec, Second Spectrum, Stats Perform). A text of the same name b
         for player in list(settings.players)[settings.active_player :]:
             self.place(context, player)
         self.lengthen(context.scene, list(settings.players)[settings.active_player :])
-        self.report({"INFO"}, f"players in the list: {len(settings.players)}")
+        self.report({"INFO"}, f"Players in the list: {len(settings.players)}")
 
     @staticmethod
     def set_clock(settings, found):
-        """The first players' clock starts with the start frame; of a whole match the first minute is chosen."""
+        """Start the clock with the first players at the start frame; of a whole match the first minute is selected."""
         settings.start_time = min(player.start for player in found)
         if any(player.feed_id for player in found):
             settings.section_start = settings.start_time
             settings.section_end = min(settings.start_time + SECTION, max(player.end for player in found))
 
     def place(self, context, player):
-        """The player's dot, and his words as strips; a player without a track in the section or with words that cannot
-        be read stays in the list and is told."""
+        """Create the player's dot, with the player's labels as strips.
+
+        A player without a track in the section or with labels that cannot be read stays in the list, with a warning.
+        """
         try:
             dots.ensure(context, player)
             if player.annotation_file:
@@ -82,29 +84,29 @@ SkillCorner, Sportec, Second Spectrum, Stats Perform). A text of the same name b
                 strips.write(context, player, words)
                 self.tell_words(context.scene, player, words)
             elif not player.feed_id:
-                self.report({"INFO"}, f"{player.name}: no words beside the track, so gaits by speed until you add some")
+                self.report({"INFO"}, f"{player.name}: no label file beside the track; gaits follow its speed")
         except InputError as error:
             self.report({"WARNING"}, str(error))
 
     def tell_words(self, scene, player, words):
-        """What came to the timeline, and what is wrong with it."""
+        """Report the labels of the timeline and their problems."""
         found = f"{len(words.keys)} key moments, {len(words.spans)} stretches"
-        self.report({"INFO"}, f"{player.name}: words from {Path(player.annotation_file).name}: {found}")
+        self.report({"INFO"}, f"{player.name}: labels from {Path(player.annotation_file).name}: {found}")
         for frame, line in word_checks.lines_of(scene, player.dot):
             self.report({"WARNING"}, f"{player.name}, frame {frame}: {line}")
 
     def lengthen(self, scene, players):
-        """Let the scene reach to the end of what has been imported, so that all of it plays while it is annotated."""
+        """Extend the scene to the end of the imported tracks, so that all of them play during annotation."""
         before = scene.frame_end
         for player in players:
             frames = dots.keyed_frames(player.dot) if player.use and player.dot is not None else None
             if frames is not None:
                 bake.lengthen(scene, frames[1])
         if scene.frame_end != before:
-            self.report({"INFO"}, f"the scene ends at frame {scene.frame_end} now, with the tracks")
+            self.report({"INFO"}, f"Scene end set to frame {scene.frame_end}, the end of the tracks")
 
     def add(self, settings, path: str, found: tracks.Found, provider: str):
-        """One more player in the list; of a whole match only the first is ticked."""
+        """Add one player to the list; of a whole match only the first is selected."""
         entry = settings.players.add()
         entry.name = free_name(found.name, {player.name for player in settings.players})
         entry.tracking_file, entry.metadata_file = as_setting(path), as_setting(self.metadata) if self.metadata else ""
@@ -119,12 +121,12 @@ SkillCorner, Sportec, Second Spectrum, Stats Perform). A text of the same name b
 
 
 def shirt_for(number: int) -> tuple[float, float, float]:
-    """The colour of the player with that number in a list whose players belong to no team."""
+    """Choose the colour of the player with that number in a list whose players belong to no team."""
     return SHIRTS[("home", "away")[number % 2]][number // 2 % 2]
 
 
 def free_name(wanted: str, taken: set[str]) -> str:
-    """`wanted`, or the first "wanted 2", "wanted 3" ... that is not taken."""
+    """Return `name_base`, or the first of "wanted 2", "wanted 3" ... that is not taken."""
     number, name = 1, wanted
     while name in taken:
         number += 1
@@ -136,19 +138,19 @@ class BEYOND_MOCAP_FH_tracking(DroppedIntoView, bpy.types.FileHandler):
     """Tracking files dropped into the 3D view"""
 
     bl_idname = "BEYOND_MOCAP_FH_tracking"
-    bl_label = "Player tracking"
+    bl_label = "Player Tracking"
     bl_import_operator = "beyond_mocap.import_tracking"
     bl_file_extensions = ".csv;.json;.jsonl;.xml;.dat"
 
 
 class BEYOND_MOCAP_OT_choose_player(Verb, bpy.types.Operator):
-    """Make this player the active one and select his dot; pressed in the NLA editor, that shows the selected only"""
+    """Make this player active and select the player's dot; in the NLA editor, show only the selected strips"""
 
     bl_idname = "beyond_mocap.choose_player"
     bl_label = "Show Player's Strips"
     player: StringProperty(name="Player", options={"SKIP_SAVE"},
-                           description="The player's name; empty is the active one")
-    needs = ("Leave the mode that you are in first", lambda context: context.mode == "OBJECT",
+                           description="The player's name; empty uses the active player")
+    needs = ("Switch to Object Mode first", lambda context: context.mode == "OBJECT",
              "Import tracking in step 2 first", lambda context: len(context.scene.beyond_mocap.players) > 0)
 
     def do(self, context):
@@ -163,17 +165,17 @@ class BEYOND_MOCAP_OT_choose_player(Verb, bpy.types.Operator):
 
 
 class BEYOND_MOCAP_OT_place_players(Verb, bpy.types.Operator):
-    """Give every player without one a dot that runs along the track, and lay the words of his text or file on it as
-strips. Files of earlier versions need this once; texts and files stay as they are"""
+    """Add a dot that follows the track for every player without one, and their labels as strips on it; files of earlier
+versions need this once"""
 
     bl_idname = "beyond_mocap.place_players"
-    bl_label = "Bring to the Timeline"
-    needs = ("Every player in the list has strips already",
+    bl_label = "Add to Timeline"
+    needs = ("All players have strips already",
              lambda context: any(strips.dot_of(player, context.scene) is None
                                  for player in context.scene.beyond_mocap.players))
 
     def do(self, context):
-        """Read all tracks and words, then place those that could be read, and tell the others."""
+        """Read all tracks and labels, then place the players that could be read, and report the others."""
         settings, read = context.scene.beyond_mocap, []
         troubles = []
         for player in settings.players:
@@ -184,24 +186,24 @@ strips. Files of earlier versions need this once; texts and files stay as they a
             except InputError as error:
                 troubles.append(f"{player.name}: {error}")
         if not read:
-            raise InputError("no player could be brought to the timeline", troubles[0])
+            raise InputError("no player could be added to the timeline", troubles[0])
         for player, timeline in read:
             strips.write(context, player, timeline)
         for trouble in troubles:
             self.report({"WARNING"}, trouble)
-        self.report({"INFO"}, f"players brought to the timeline: {len(read)}")
+        self.report({"INFO"}, f"Players added to the timeline: {len(read)}")
 
 
 class BEYOND_MOCAP_OT_player_from_dot(Verb, bpy.types.Operator):
-    """Make players of the selected dots that no player in the list has, such as those appended from another file; their
-strips come along"""
+    """Add players for the selected dots that belong to none, such as dots appended from another file, with their
+strips"""
 
     bl_idname = "beyond_mocap.player_from_dot"
     bl_label = "Add Player from Dot"
     needs = "Select a dot that was appended from another file first", lambda context: bool(dots.orphans(context))
 
     def do(self, context):
-        """A player for each; his strips are laid for this scene's clock."""
+        """Add a player for each; the strips follow this scene's clock."""
         settings = context.scene.beyond_mocap
         found = dots.orphans(context)
         if not settings.players:
@@ -210,23 +212,23 @@ strips come along"""
             name = free_name(dot.beyond_mocap_dot.player, {player.name for player in settings.players})
             dots.adopt(settings, dot, name)
         strip_events.put_in_order(context.scene)
-        self.report({"INFO"}, f"players in the list: {len(settings.players)}")
+        self.report({"INFO"}, f"Players in the list: {len(settings.players)}")
 
 
 class BEYOND_MOCAP_OT_remove_player(Verb, bpy.types.Operator):
-    """Take the active player off the list, with his dot, his pins and the strips of his words; armature, action and
-what his track is drawn by stay in the scene, and a preview that he shows is kept"""
+    """Remove the active player with dot, pins and label strips; armature, action and drawn curve stay in the scene, and
+a preview is applied"""
 
     bl_idname = "beyond_mocap.remove_player"
     bl_label = "Remove Player"
-    needs = "The list of players is empty", lambda context: active_player(context.scene.beyond_mocap) is not None
+    needs = "No players in the list", lambda context: active_player(context.scene.beyond_mocap) is not None
 
     def do(self, context):
-        """Remove it and choose its neighbour."""
+        """Remove the player and choose the next one."""
         settings = context.scene.beyond_mocap
         player = settings.players[settings.active_player]
         if player.result.state == "PREVIEW" and preview.shown(context.scene, player):
-            preview.keep(context, player, "ACTION")  # else nobody would know any more what has been set aside
+            preview.keep(context, player, "ACTION")  # otherwise the data set aside for the preview would be lost
         elif player.result.state == "PREVIEW":
             preview.forget(player)
         pins.remove_all(player)

@@ -1,4 +1,4 @@
-"""Rigs: map bones, bake a motion onto a rig, reduce keys, export motions."""
+"""Rigs: map bones, bake a motion onto a rig, simplify keys, export motions."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ from .verb import ExportVerb, Verb
 
 
 class MapVerb(Verb):
-    """A verb about the chosen rig's map."""
+    """Base of operators about the chosen rig's bone map."""
 
     needs = "Choose a rig first", lambda context: context.scene.beyond_mocap.rig.target is not None
 
 
 class BEYOND_MOCAP_OT_map_bones(MapVerb, bpy.types.Operator):
-    """Find the rig's bones by their names, and where these say nothing by their structure"""
+    """Find the rig's bones by their names, or by their structure where names do not help"""
 
     bl_idname = "beyond_mocap.map_bones"
     bl_label = "Map Bones"
@@ -40,25 +40,25 @@ class BEYOND_MOCAP_OT_map_bones(MapVerb, bpy.types.Operator):
 
 
 class BEYOND_MOCAP_OT_keep_bone_map(MapVerb, bpy.types.Operator):
-    """Keep this map for all armatures with these bones: it is used whenever one of them is chosen"""
+    """Store this map for all armatures with the same bones; it is used whenever one of them is chosen"""
 
     bl_idname = "beyond_mocap.keep_bone_map"
-    bl_label = "Keep for This Skeleton"
+    bl_label = "Store for Skeleton"
     bl_options = {"REGISTER"}
 
     def do(self, context):
-        """Check and write it to the user's folder."""
+        """Check the map and write it to the user's folder."""
         settings = context.scene.beyond_mocap.rig
         table = rig.table_of(settings)
         bone_maps.check(settings.target, table)
         if bone_maps.keep(settings.target, table) is None:
             raise InputError("bone map", "this Blender has no folder for the extension", "an installed extension",
                              "save it as a file")
-        self.report({"INFO"}, f"Map kept for skeletons like {settings.target.name}")
+        self.report({"INFO"}, f"Map stored for skeletons like {settings.target.name}")
 
 
 class BEYOND_MOCAP_OT_save_bone_map(MapVerb, bpy.types.Operator, ExportHelper):
-    """Write the map to a JSON file"""
+    """Write the bone map to a JSON file"""
 
     bl_idname = "beyond_mocap.save_bone_map"
     bl_label = "Save Bone Map"
@@ -74,7 +74,7 @@ class BEYOND_MOCAP_OT_save_bone_map(MapVerb, bpy.types.Operator, ExportHelper):
 
 
 class BEYOND_MOCAP_OT_load_bone_map(MapVerb, bpy.types.Operator, ImportHelper):
-    """Read a map from a JSON file"""
+    """Read the bone map from a JSON file"""
 
     bl_idname = "beyond_mocap.load_bone_map"
     bl_label = "Load Bone Map"
@@ -91,32 +91,32 @@ class BEYOND_MOCAP_OT_load_bone_map(MapVerb, bpy.types.Operator, ImportHelper):
 
 
 class BEYOND_MOCAP_OT_use_selected_rig(Verb, bpy.types.Operator):
-    """Take the active armature as the rig"""
+    """Use the active armature as the rig"""
 
     bl_idname = "beyond_mocap.use_selected_rig"
     bl_label = "Use Active Armature"
     needs = "Select the rig first", lambda context: context.object is not None and context.object.type == "ARMATURE"
 
     def do(self, context):
-        """Choose it; its bones are mapped at once."""
+        """Choose the rig; its bones are mapped at once."""
         check(context.object)
         context.scene.beyond_mocap.rig.target = context.object
 
 
 TARGETS = (("CHOSEN", "The Chosen Rig", "The rig that the panel shows"),
-           ("SELECTED", "Selected Armatures", "The same motion onto every selected armature but the source"),
-           ("PLAYERS", "All Ticked Players",
-            "Each ticked player's motion onto that player's rig, or a copy of the chosen one"))
+           ("SELECTED", "Selected Armatures", "Bake the same motion onto every selected armature except the source"),
+           ("PLAYERS", "All Selected Players",
+            "Bake each selected player's motion onto their own rig, or a copy of the chosen one"))
 
 
 class BEYOND_MOCAP_OT_bake_to_rig(Verb, bpy.types.Operator):
-    """Bake the active player's motion, or the source armature's, onto the rig: as keys on its controls, with its feet
-on the ground. What the rig played before is kept as an action"""
+    """Bake the active player's motion, or the source armature's, onto the rig as keys on its controls, with feet
+planted; the rig's previous action is kept"""
 
     bl_idname = "beyond_mocap.bake_to_rig"
     bl_label = "Bake to Rig"
     targets: EnumProperty(name="Onto", items=TARGETS, default="CHOSEN", options={"SKIP_SAVE"},
-                          description="Which rigs get the motion")
+                          description="Rigs that get the motion")
 
     @classmethod
     def poll(cls, context):
@@ -125,11 +125,11 @@ on the ground. What the rig played before is kept as an action"""
         if not any(rigs) and not any(o.type == "ARMATURE" for o in context.selected_objects):
             cls.poll_message_set("Choose the rig to bake to")
             return False
-        cls.poll_message_set("Synthesize and accept first, or choose a source armature that moves")
+        cls.poll_message_set("Synthesize and press Apply first, or choose a source armature that moves")
         return source_body(settings) is not None
 
     def do(self, context):
-        """All is worked out before the first rig is changed."""
+        """Prepare all bakes before the first rig is changed."""
         scene, settings = context.scene, context.scene.beyond_mocap
         wishes, work = wishes_of(settings.rig), []
         for body, player, target, table in self.pairs(context):
@@ -146,7 +146,7 @@ on the ground. What the rig played before is kept as an action"""
             self.report({"INFO"}, line)
 
     def pairs(self, context) -> list:
-        """(source body, its player or None, rig, map) of all that is to be baked."""
+        """List (source body, its player or None, rig, map) of all bakes."""
         settings = context.scene.beyond_mocap
         chosen = settings.rig
         if self.targets == "PLAYERS":
@@ -159,17 +159,17 @@ on the ground. What the rig played before is kept as an action"""
             return [(body, player, chosen.target, rig.table_of(chosen))]
         rigs = [one for one in context.selected_objects if one.type == "ARMATURE" and one != body]
         if not rigs:
-            raise InputError("bake to rig", "no armature is selected beside the source", "rigs", "select them")
+            raise InputError("bake to rig", "no armature besides the source is selected", "rigs", "select them")
         for one in rigs:
             check(one, body)
         return [(body, player, one, table_for(chosen, one)) for one in rigs]
 
     def pairs_of_players(self, context) -> list:
-        """Each ticked player's own rig, made where it is missing."""
+        """List the bakes of all selected players; missing rigs are copied."""
         settings = context.scene.beyond_mocap
         players = [player for player in settings.players if player.use and player.body is not None]
         if not players:
-            raise InputError("bake to rig", "no ticked player has a body", "players with a result", "synthesize first")
+            raise InputError("bake to rig", "no selected player has a body", "a result", "synthesize first")
         lacking = [player for player in players if player.rig is None]
         if lacking:
             check(settings.rig.target)
@@ -187,11 +187,11 @@ on the ground. What the rig played before is kept as an action"""
 
 
 class BEYOND_MOCAP_OT_unbake(Verb, bpy.types.Operator):
-    """Take the baked action off the rig and out of the file: it plays and stands as before"""
+    """Remove the baked action from the rig and the file, and restore the rig's previous state"""
 
     bl_idname = "beyond_mocap.unbake"
     bl_label = "Remove Bake"
-    needs = ("The chosen rig plays nothing that was baked here",
+    needs = ("The chosen rig has no baked motion",
              lambda context: (target := context.scene.beyond_mocap.rig.target) is not None
              and bool((channels.playing(target)[0] or {}).get(rig_bake.MARK)))
 
@@ -200,29 +200,29 @@ class BEYOND_MOCAP_OT_unbake(Verb, bpy.types.Operator):
 
 
 class BEYOND_MOCAP_OT_reduce_keys(Verb, bpy.types.Operator):
-    """Leave out keys of the rig's action that its curves do not need: hands, feet, head and bones stay within the
-tolerances below"""
+    """Remove keys of the rig's action that its curves do not need: hands, feet, head and bones stay within the
+tolerances"""
 
     bl_idname = "beyond_mocap.reduce_keys"
-    bl_label = "Leave Out Keys"
+    bl_label = "Simplify Keys"
     needs = BEYOND_MOCAP_OT_unbake.needs
 
     def do(self, context):
-        """Fewer keys, told how many."""
+        """Reduce the keys and report the numbers."""
         chosen = context.scene.beyond_mocap.rig
         chosen.told = reduced(chosen.target, table_for(chosen, chosen.target), chosen)
         self.report({"INFO"}, chosen.told)
 
 
 def source_body(settings) -> bpy.types.Object | None:
-    """The armature whose motion is baked; None where there is none."""
+    """Find the armature whose motion is baked; None where there is none."""
     player = active_player(settings)
     return settings.rig.source or (player.body if player is not None else None)
 
 
 def standing_of(scene: bpy.types.Scene, player):
-    """Function from scene frames (F,) to which feet stand (F, 2) in the player's take, or on the path that his body
-    rides; None where there is none."""
+    """Build a function from scene frames (F,) to foot contacts (F, 2) of the player's take or path edit; None without.
+    """
     if player is not None and player.body is not None and player.body.beyond_mocap_ride.on:
         return riders.standing(player.body)
     made = session.made(player.take) if player is not None and player.take else None
@@ -239,13 +239,13 @@ def standing_of(scene: bpy.types.Scene, player):
 
 
 def wishes_of(settings) -> BakeOptions:
-    """How the panel says to bake."""
+    """Build the bake options from the panel's settings."""
     keeps = {"AUTO": None, "KEEP": True, "SCALE": False}[settings.steps]
     return BakeOptions(settings.root, keeps, settings.ik == "BAKE", settings.plants)
 
 
 def table_for(settings, target: bpy.types.Object) -> dict[str, str]:
-    """The map for a rig: the panel's where its bones are the same, else what is kept or found."""
+    """Find the map for a rig: the panel's where its bones are the same, else a stored or newly found one."""
     if settings.target is not None and settings.bones \
             and bone_maps.fingerprint(settings.target) == bone_maps.fingerprint(target):
         return rig.table_of(settings)
@@ -253,32 +253,33 @@ def table_for(settings, target: bpy.types.Object) -> dict[str, str]:
 
 
 def reduced(target: bpy.types.Object, table: dict[str, str], settings) -> str:
-    """Leave out keys, and a line about it."""
+    """Reduce the keys; returns a message."""
     from ..scene.rigs import key_reduction
 
     before, after = key_reduction.reduce(target, table, bpy.context.scene, settings.tolerance, settings.turn_tolerance)
-    return f"keys: {after} of {before} left"
+    return f"Keys: {after} of {before} remain"
 
 
 class BEYOND_MOCAP_OT_export_motion(ExportVerb, bpy.types.Operator):
-    """Write what the rig shows, with its meshes, to a file: baked to one action first. The scene stays as it is"""
+    """Export the displayed motion of a rig, with its meshes, to a file; it is baked to one action first and the scene
+stays unchanged"""
 
     bl_idname = "beyond_mocap.export_motion"
     bl_label = "Export Motion"
     filter_glob: StringProperty(default="*.fbx;*.glb;*.usdc;*.bvh", options={"HIDDEN"})
-    format: EnumProperty(name="Format", items=rig.FORMATS, default="FBX", description="Form of the file")
-    engine: EnumProperty(name="For", items=rig.ENGINES, default="BLENDER", description="Axes and units of")
-    who: EnumProperty(name="Who", items=rig.WHO, default="ACTIVE", description="Whose motion")
-    root: EnumProperty(name="Root Motion", items=rig.ROOTS, default="KEEP", description="What the root bone carries")
-    own_rate: BoolProperty(name="Own Rate", default=False, description="At the rate that was synthesized")
-    deform_only: BoolProperty(name="Deform Bones Only", default=True, description="Leave controls out")
-    meshes: BoolProperty(name="Meshes", default=True, description="Export the meshes that the armature moves, too")
-    needs = ("Synthesize and accept first, or select an armature that moves",
+    format: EnumProperty(name="Format", items=rig.FORMATS, default="FBX", description="Format of the file")
+    engine: EnumProperty(name="For", items=rig.ENGINES, default="BLENDER", description="Program to export for")
+    who: EnumProperty(name="Export", items=rig.WHO, default="ACTIVE", description="Armatures to export")
+    root: EnumProperty(name="Root Motion", items=rig.ROOTS, default="KEEP", description="Motion of the root bone")
+    own_rate: BoolProperty(name="Take Rate", default=False, description="Export at the frame rate of the take")
+    deform_only: BoolProperty(name="Deform Bones Only", default=True, description="Leave out control bones")
+    meshes: BoolProperty(name="Meshes", default=True, description="Also export the meshes that the armature moves")
+    needs = ("Synthesize and press Apply first, or select an armature that moves",
              lambda context: bool((settings := context.scene.beyond_mocap).players) or settings.rig.target is not None
              or any(one.type == "ARMATURE" for one in context.selected_objects))
 
     def invoke(self, context, event):
-        """The panel's choices, then the file browser."""
+        """Copy the panel's settings, then open the file browser."""
         settings = context.scene.beyond_mocap.rig
         for name in ("format", "engine", "who", "root", "own_rate", "deform_only", "meshes"):
             setattr(self, name, getattr(settings, name))
@@ -294,7 +295,7 @@ class BEYOND_MOCAP_OT_export_motion(ExportVerb, bpy.types.Operator):
         self.report({"INFO"}, f"Written: {path}")
 
     def rigs(self, context) -> list[bpy.types.Object]:
-        """Whose motion is asked for."""
+        """List the armatures to export."""
         settings = context.scene.beyond_mocap
         if self.who == "SELECTED":
             return [one for one in context.selected_objects if one.type == "ARMATURE"]
@@ -310,7 +311,7 @@ class BEYOND_MOCAP_OT_export_motion(ExportVerb, bpy.types.Operator):
         return [active] if active is not None and active.type == "ARMATURE" else []
 
     def rate(self, context) -> float | None:
-        """The rate that the active player's take was made at; the scene's where that is not known."""
+        """Find the frame rate of the active player's take; None for the scene's."""
         if not self.own_rate:
             return None
         player = active_player(context.scene.beyond_mocap)

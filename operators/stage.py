@@ -1,4 +1,4 @@
-"""The stage: pitch, light, and cameras, also those along a path."""
+"""Operators of the stage: pitch, light, and cameras, also those for paths."""
 
 from __future__ import annotations
 
@@ -13,45 +13,45 @@ from .verb import NEEDS_NO_EDITING, Verb
 
 
 class BEYOND_MOCAP_OT_add_stage(Verb, bpy.types.Operator):
-    """Add a pitch with its lines, a sun and a camera that follows the players once they move"""
+    """Add a pitch with its lines, a sun and a camera that follows the players"""
 
     bl_idname = "beyond_mocap.add_stage"
     bl_label = "Add Pitch, Light and Camera"
-    camera: BoolProperty(name="Camera", default=True, description="Add a camera and look through it when rendering")
+    camera: BoolProperty(name="Camera", default=True, description="Add a camera and use it for rendering")
 
     def do(self, context):
+        """Create the stage."""
         stage.create(context, self.camera)
 
 
 class BEYOND_MOCAP_OT_path_cameras(Verb, bpy.types.Operator):
-    """Set up four cameras on all riders and their paths: from above, from the side, from three quarters, and following
-behind the active one. Pressed again it lays only those anew that nobody has moved or changed"""
+    """Add four cameras on all edited paths, or update those that you have not changed"""
 
     bl_idname = "beyond_mocap.path_cameras"
     bl_label = "Path Cameras"
-    needs = (*NEEDS_NO_EDITING,  # edit mode has an undo of its own, which knows nothing of cameras
+    needs = (*NEEDS_NO_EDITING,  # Edit Mode has its own undo, which does not include cameras
              "Select an armature and press Edit Path first", lambda context: bool(riders(context.scene)))
 
     def do(self, context):
-        """Look at all of them, and lay the cameras."""
+        """Collect all paths and place the cameras."""
         first = next(iter(meant(context)), None)
         kept = path_cameras.set_up(context.scene, path_cameras.route(context.scene, first))
         if kept:
-            self.report({"INFO"}, f"kept as you have changed them: {', '.join(kept)}")
+            self.report({"INFO"}, f"kept with your changes: {', '.join(kept)}")
 
 
-WHICH = (("NEXT", "Next", "The next one; after the last the free view, from the free view the first"),
-         ("ABOVE", "Above", "From above, as a map: X to the right, Y up"),
-         ("SIDE", "Side", "From the side, the path across the picture"),
-         ("QUARTER", "Quarter", "From three quarters, a little above"),
-         ("BEHIND", "Behind", "Behind the body, following it"),
-         ("FREE", "Free View", "The view as it was before, and the scene's own camera"))
-VIEW = ("view_perspective", "view_location", "view_rotation", "view_distance")  # looking through a camera turns a view
-_free: dict[int, tuple] = {}  # by the area's pointer: its VIEW before the first of these cameras
+WHICH = (("NEXT", "Next", "Next camera; after the last one the free view, then the first"),
+         ("ABOVE", "Above", "From above, like a map: X to the right, Y up"),
+         ("SIDE", "Side", "From the side, with the path across the picture"),
+         ("QUARTER", "Quarter", "From three quarters, slightly above"),
+         ("BEHIND", "Behind", "From behind the body, following it"),
+         ("FREE", "Free View", "Previous view and the scene's own camera"))
+VIEW = ("view_perspective", "view_location", "view_rotation", "view_distance")  # looking through a camera changes these
+_free: dict[int, tuple] = {}  # area pointer -> its VIEW before the first of these cameras
 
 
 class BEYOND_MOCAP_OT_path_camera(Verb, bpy.types.Operator):
-    """Look through the next path camera; after the last one the free view comes back"""
+    """Look through the next path camera, or return to the free view after the last one"""
 
     bl_idname = "beyond_mocap.path_camera"
     bl_label = "Path Camera"
@@ -60,7 +60,7 @@ class BEYOND_MOCAP_OT_path_camera(Verb, bpy.types.Operator):
 
     @classmethod
     def description(cls, _context, properties):
-        """What this button shows, with the key that flicks."""
+        """Return what this button shows, with the key for the next camera."""
         told = next(item[2] for item in WHICH if item[0] == properties.which)
         return f"{told}.\nShift + J or Shift + Numpad 0: the next one"
 
@@ -75,7 +75,7 @@ class BEYOND_MOCAP_OT_path_camera(Verb, bpy.types.Operator):
             return
         camera = path_cameras.found(scene, kind)
         if camera is None:
-            raise InputError("path cameras", f"no camera {path_cameras.NAMES[kind]}", "all four",
+            raise InputError("path cameras", f"no camera {path_cameras.NAMES[kind]}", "all four cameras",
                              "press Path Cameras in the panel Path Editing")
         if kind == "BEHIND" and riders(scene):
             path_cameras.follow(scene, path_cameras.route(scene, next(iter(meant(context)), None)))
@@ -85,7 +85,7 @@ class BEYOND_MOCAP_OT_path_camera(Verb, bpy.types.Operator):
 
 
 def _view(context) -> bpy.types.Area | None:
-    """The 3D view in which the key or button was pressed, or the largest; None without a window."""
+    """Return the 3D view in which the key or button was pressed, or the largest; None without a window."""
     if bpy.app.background or context.window is None:
         return None
     if context.area is not None and context.area.type == "VIEW_3D":
@@ -94,7 +94,7 @@ def _view(context) -> bpy.types.Area | None:
 
 
 def _after(scene: bpy.types.Scene, area: bpy.types.Area | None) -> str:
-    """What comes next: the free view is one of the row where there is a view."""
+    """Return the next camera kind; the free view is included where there is a view."""
     row = [kind for kind in path_cameras.KINDS if path_cameras.found(scene, kind)]
     looked = area is None or area.spaces.active.region_3d.view_perspective == "CAMERA"
     seen = scene.camera.get(path_cameras.MARK, "") if looked and scene.camera is not None else ""
@@ -104,6 +104,7 @@ def _after(scene: bpy.types.Scene, area: bpy.types.Area | None) -> str:
 
 
 def _look_through(area: bpy.types.Area, before: bpy.types.Object | None, camera: bpy.types.Object) -> None:
+    """Look through a camera in a 3D view, and store the view from before the first path camera."""
     space = area.spaces.active
     view = space.region_3d
     if view.view_perspective != "CAMERA" or before is None or not before.get(path_cameras.MARK):
@@ -115,7 +116,7 @@ def _look_through(area: bpy.types.Area, before: bpy.types.Object | None, camera:
 
 
 def _look_freely(area: bpy.types.Area) -> None:
-    """The view as it was before; where that is not known any more, from where the camera stands."""
+    """Restore the earlier view; where it is unknown, keep the camera's place."""
     view = area.spaces.active.region_3d
     if view.view_perspective != "CAMERA":
         return

@@ -1,4 +1,4 @@
-"""Render Study Clips: every clip of a naturalness study by itself, under its neutral name."""
+"""Render Study Clips: render every clip of a naturalness study under its neutral name."""
 
 from __future__ import annotations
 
@@ -21,43 +21,42 @@ CLIPS = "clips"
 
 
 class BEYOND_MOCAP_OT_study_render(Verb, bpy.types.Operator):
-    """Render every clip of a naturalness study by itself: the same grey body, floor, light and distance of the camera,
-under the neutral names of study.json. Movies are copied. Clips that are there already are left"""
+    """Render every clip of a naturalness study with the same body, floor, light and camera, under its neutral name"""
 
     bl_idname = "beyond_mocap.study_render"
     bl_label = "Render Study Clips"
     bl_options = {"REGISTER"}
     directory: StringProperty(name="Study", subtype="DIR_PATH", description="Folder with study.json")
     engine: EnumProperty(
-        name="Engine", default="AUTO", description="What renders",
-        items=(("AUTO", "EEVEE or Cycles", "EEVEE in a window, Cycles where Blender runs without one"),
+        name="Engine", default="AUTO", description="Render engine",
+        items=(("AUTO", "EEVEE or Cycles", "EEVEE in a window, Cycles if Blender runs without one"),
                ("EEVEE", "EEVEE", "Fast with a graphics card, very slow without"),
-               ("CYCLES", "Cycles", "Works everywhere, slowly"), ("WORKBENCH", "Workbench", "Fast and plain")),
+               ("CYCLES", "Cycles", "Slow, works everywhere"), ("WORKBENCH", "Workbench", "Fast and plain")),
     )  # fmt: skip
-    width: IntProperty(name="Width", default=960, min=16, max=7680, description="Pixels of the picture")
-    height: IntProperty(name="Height", default=540, min=16, max=4320, description="Pixels of the picture")
-    fps: IntProperty(name="Frame Rate", default=30, min=1, max=240, description="Frames a second, of all clips")
-    samples: IntProperty(name="Samples", default=16, min=1, max=4096, description="Of a pixel")
-    pictures: BoolProperty(name="Pictures", description="A folder of numbered PNGs for each clip instead of a movie")
-    again: BoolProperty(name="Again", description="Also clips that are there already")
+    width: IntProperty(name="Width", default=960, min=16, max=7680, description="Width of the picture in pixels")
+    height: IntProperty(name="Height", default=540, min=16, max=4320, description="Height of the picture in pixels")
+    fps: IntProperty(name="Frame Rate", default=30, min=1, max=240, description="Frames per second of all clips")
+    samples: IntProperty(name="Samples", default=16, min=1, max=4096, description="Render samples per pixel")
+    pictures: BoolProperty(name="Pictures", description="Write numbered PNGs in a folder per clip instead of a movie")
+    again: BoolProperty(name="Render Again", description="Render existing clips again")
 
     def invoke(self, context, _event):
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
 
     def do(self, context):
-        """All clips, read before the first is rendered."""
+        """Read all clips, then render those that are missing."""
         if not self.directory:
-            raise InputError("study", "no folder given", "the folder with study.json", "choose it")
+            raise InputError("study", "no folder given", "the folder with study.json", "choose the folder")
         folder = Path(bpy.path.abspath(self.directory))
         study = read_study(folder)
         out = folder / CLIPS
         wanted = [clip for clip in study.clips if self.again or not _there(out, clip.name)]
         sources = [(clip, _read(folder, clip)) for clip in wanted]
-        size = self.width // 2 * 2, self.height // 2 * 2  # of pixels in H.264
+        size = self.width // 2 * 2, self.height // 2 * 2  # H.264 needs even sizes
         look = filming.Look(filming.engine_here(self.engine), size, self.fps, self.samples, not self.pictures)
         if self.engine == "CYCLES" != look.engine:
-            self.report({"WARNING"}, "The Cycles add-on is off: EEVEE renders instead")
+            self.report({"WARNING"}, "The Cycles add-on is disabled: EEVEE renders instead")
         out.mkdir(exist_ok=True)
         windows = context.window_manager
         windows.progress_begin(0, max(len(sources), 1))
@@ -67,10 +66,10 @@ under the neutral names of study.json. Movies are copied. Clips that are there a
                 self.one(out, clip, source, look)
         finally:
             windows.progress_end()
-        self.report({"INFO"}, f"{out}: {len(sources)} clips rendered, {len(study.clips) - len(sources)} were there")
+        self.report({"INFO"}, f"{out}: {len(sources)} clips rendered, {len(study.clips) - len(sources)} existed")
 
     def one(self, out: Path, clip, source, look) -> None:
-        """One clip, rendered or copied."""
+        """Render or copy one clip."""
         if isinstance(source, Path):
             with beside(out / f"{clip.name}{source.suffix.lower()}") as part:
                 shutil.copyfile(source, part)
@@ -80,26 +79,26 @@ under the neutral names of study.json. Movies are copied. Clips that are there a
             filming.film(target, *source, look)
             return
         anew = target.with_name(f".{target.name}.anew")
-        shutil.rmtree(anew, ignore_errors=True)  # of a run that was killed
+        shutil.rmtree(anew, ignore_errors=True)  # left by an interrupted run
         filming.film(anew, *source, look)
         shutil.rmtree(target)
         anew.rename(target)
 
 
 def _there(out: Path, name: str) -> bool:
-    """Whether a clip has been rendered, as a movie or as pictures."""
+    """Return whether a clip is rendered, as a movie or as pictures."""
     return clip_source(out, name) is not None or any((out / name).glob("*.png"))
 
 
 def _read(folder: Path, clip):
-    """A movie's path, or the motion and ball of a clip; InputError where it is neither."""
+    """Read a clip: a movie's path, or motion and ball; InputError for other files."""
     path = folder / clip.file
     if path.suffix.lower() in MOVIES:
         if not path.is_file():
-            raise InputError(path, "no such file", "a movie", "correct the table and make the study again")
+            raise InputError(path, "no such file", "a movie", "correct the table and create the study again")
         return path
     if path.suffix.lower() != ".bvh":
-        raise InputError(path, f"a file ending in {path.suffix}", f"a .bvh file or a movie ({', '.join(MOVIES)})",
+        raise InputError(path, f"file type {path.suffix}", f"a .bvh file or a movie ({', '.join(MOVIES)})",
                          "convert it, or render it yourself")  # fmt: skip
     beside_it = path.with_suffix(".ball.csv")
     return bvh.read(path).motion, read_ball(beside_it) if beside_it.is_file() else None

@@ -1,4 +1,4 @@
-"""Synthesize: new takes, updates, other solutions, and the presets of its settings."""
+"""Operators of Synthesize: new takes, updates, other solutions, and the presets of its settings."""
 
 from __future__ import annotations
 
@@ -16,17 +16,15 @@ from .verb import NEEDS_LIBRARY
 
 
 class BEYOND_MOCAP_OT_synthesize(TurnsVerb, bpy.types.Operator):
-    """Find clips for every ticked player's track and words, and join them into one motion.
-It is shown as a preview, until it is accepted or discarded. Players queue; ESC cancels"""
+    """Find clips for the track and labels of every selected player and join them into one motion, shown as a preview
+until it is applied or reverted"""
 
     bl_idname = "beyond_mocap.synthesize"
     bl_label = "Synthesize"
 
 
 class BEYOND_MOCAP_OT_update(TurnsVerb, bpy.types.Operator):
-    """Make anew only what changes of the words or the track touch since the last Synthesize or Update.
-The rest stays as it is, to the last bit; shown as a preview, until it is accepted or discarded.
-After the file was opened again the take is made again as it was"""
+    """Regenerate only what changed in labels or track since the last synthesis; everything else stays bit for bit"""
 
     bl_idname = "beyond_mocap.update"
     bl_label = "Update"
@@ -35,8 +33,10 @@ After the file was opened again the take is made again as it was"""
              lambda context: any(player.use and player.take for player in context.scene.beyond_mocap.players))
 
     def wanted(self, context):
-        """Where something is out of date about some of the players, only those; the others stay untouched. Drawn tracks
-        are read anew in any case, since `look` does not play what has to be played."""
+        """List the players that are out of date; without any, all selected ones.
+
+        Drawn tracks are read again in any case, since `look` does not play what has to be played.
+        """
         found = super().wanted(context)
         if len(found) == 1:
             return found
@@ -46,49 +46,49 @@ After the file was opened again the take is made again as it was"""
 
 
 class BEYOND_MOCAP_OT_update_live(TurnsVerb, bpy.types.Operator):
-    """Update one player, quickly or as a whole; Live does it by itself"""
+    """Update one player, quickly or completely; Live runs this automatically"""
 
     bl_idname = "beyond_mocap.update_live"
     bl_label = "Live Update"
     bl_options = {"UNDO", "INTERNAL"}
     player: bpy.props.StringProperty(name="Player", description="Name of the player in the list", options={"SKIP_SAVE"})
-    kind: bpy.props.EnumProperty(name="Kind", items=(("quick", "Quick", "By a narrow search"),
-                                                     ("whole", "Whole", "As well as can be, with figures")),
-                                 description="How it is made")
+    kind: bpy.props.EnumProperty(name="Kind", items=(("quick", "Quick", "With a narrow search"),
+                                                     ("whole", "Full", "In full quality, with figures")),
+                                 description="Quality of the update")
 
     def wanted(self, context):
-        """The one player, from his take."""
+        """Return the one player, from its take."""
         found = context.scene.beyond_mocap.players.get(self.player)
         if found is None:
             raise InputError("Live Update", f"no player {self.player!r}", "a player of the list")
-        if self.kind == "whole":  # what was quick and yet as good as it can be only lacks its figures
+        if self.kind == "whole":  # a quick take that the narrow search did not affect only lacks its figures
             made = session.made(found.take)
             return [(found, orders.How("whole" if made is None or made.take.cut_short else "update"))]
         return [(found, orders.How(self.kind))]
 
 
 class BEYOND_MOCAP_OT_cancel(bpy.types.Operator):
-    """End what runs in the background and what waits: nothing changes"""
+    """Stop running jobs and clear the queue without changing anything"""
 
     bl_idname = "beyond_mocap.cancel"
     bl_label = "Cancel"
     bl_options = {"INTERNAL"}
     keep: BoolProperty(
         name="Finish Early", options={"SKIP_SAVE"},
-        description="Come to an end with the best that has been found so far; players that wait are left as they are",
+        description="Finish with the best result found so far; waiting players stay as they are",
     )
-    player: StringProperty(name="Player", options={"SKIP_SAVE"}, description="Only take this player out of the queue")
+    player: StringProperty(name="Player", options={"SKIP_SAVE"}, description="Remove only this player from the queue")
 
     @classmethod
     def description(cls, _context, properties):
         if properties.player:
-            return f"Leave {properties.player} as it is: take it out of the queue"
+            return f"Remove {properties.player} from the queue without changing it"
         if properties.keep:
-            return "Finish early: keep the best that has been found so far"
-        return "Cancel what runs and what waits: nothing changes"
+            return "Finish early and keep the best result found so far"
+        return "Cancel running and waiting jobs without changing anything"
 
     def execute(self, context):
-        """Ask every job to end."""
+        """Ask every job to end, or remove one player from the queue."""
         if self.player:
             queue.remove(self.player)
             context.window_manager.beyond_mocap_work.waiting = "\n".join(queue.names())
@@ -101,49 +101,49 @@ class BEYOND_MOCAP_OT_cancel(bpy.types.Operator):
 
 
 class BEYOND_MOCAP_OT_resynthesize_stretch(TurnsVerb, bpy.types.Operator):
-    """Search these seconds anew, without the clips that are shown there where that can be: those of the selected strip
-of an accepted result, of a selected span of words, or the preview range. All else stays to the last bit"""
+    """Search the seconds of the selected strip, of a selected label span or of the preview range again with other clips
+where possible; everything else stays bit for bit"""
 
     bl_idname = "beyond_mocap.resynthesize_stretch"
     bl_label = "Resynthesize Stretch"
     start: FloatProperty(name="From", options={"SKIP_SAVE"}, unit="TIME_ABSOLUTE",
-                         description="Second on the track's clock")
+                         description="First second on the track's clock")
     end: FloatProperty(name="To", options={"SKIP_SAVE"}, unit="TIME_ABSOLUTE",
-                       description="Second on the track's clock; 0: as selected")
+                       description="Last second on the track's clock; 0 for the selection")
     needs = "Synthesize first", lambda context: any(player.take for player in context.scene.beyond_mocap.players)
 
     def wanted(self, context):
-        """The seconds that were named, or those of what is selected."""
+        """Return the seconds that are set, or those of the selection."""
         settings = context.scene.beyond_mocap
         if self.end > self.start:
             player = settings.players.get(self.player) if self.player else plans.player_shown(context.scene)
             if player is None:
-                raise InputError("a stretch made anew", f"no player {self.player!r}", "a player with a take")
+                raise InputError("resynthesize stretch", f"no player {self.player!r}", "a player with a take")
             return [(player, orders.How("stretch", self.start, self.end))]
         player, start, end = plans.selected_stretch(context.scene)
         return [(player, orders.How("stretch", start, end))]
 
 
 class BEYOND_MOCAP_OT_variants(TurnsVerb, bpy.types.Operator):
-    """Make several takes of the active player, each without the footage of those before where that can be.
-They are switched by the row of numbers; Accept keeps the one that is shown, the others go"""
+    """Create several takes of the active player, each with other clips where possible; a row of numbers switches
+between them, and Apply keeps the one shown"""
 
     bl_idname = "beyond_mocap.variants"
     bl_label = "Variants"
     count: IntProperty(name="How Many", default=3, min=2, max=9, description="How many takes to choose from")
-    needs = (*NEEDS_LIBRARY, "Import tracking and choose a player in step 2 first",
+    needs = (*NEEDS_LIBRARY, "Import tracking and select a player in step 2 first",
              lambda context: active_player(context.scene.beyond_mocap) is not None)
 
     def wanted(self, context):
-        """The active player."""
+        """Return the active player."""
         player = active_player(context.scene.beyond_mocap)
         if player is None:
-            raise InputError("variants", "no player is chosen", "a player", "choose one in step 2")
+            raise InputError("variants", "no active player", "a player", "select one in step 2")
         return [(player, orders.How("variants", count=self.count))]
 
 
 class BEYOND_MOCAP_OT_add_preset(AddPresetBase, bpy.types.Operator):
-    """Keep the settings of Synthesize (method, weights, windows) under a name, for this and all other files"""
+    """Save the settings of Synthesize (method, weights, windows) under a name, for this and all other files"""
 
     bl_idname = "beyond_mocap.add_preset"
     bl_label = "Add Synthesis Preset"

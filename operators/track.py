@@ -1,4 +1,4 @@
-"""A player's track: drawn as a curve, taken from a moving object, its speeds; pins for hands, feet and gaze."""
+"""A player's track: drawn as a curve or taken from a moving object, with speeds; pins for hands, feet and gaze."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from .verb import Verb
 
 
 class BEYOND_MOCAP_OT_draw_track(Verb, bpy.types.Operator):
-    """Add a player whose track is a curve from the 3D cursor on, to be bent in edit mode. Each point has its speed in
-m/s: Set Speed, or its Radius in the Item tab (Alt-S). At a point of speed 0 he waits"""
+    """Add a player whose track is a curve from the 3D cursor. Set the speed of each point with Set Speed, or its Radius
+in the Item tab (Alt-S); the player waits at points of speed 0"""
 
     bl_idname = "beyond_mocap.draw_track"
     bl_label = "Draw Track"
@@ -31,11 +31,11 @@ m/s: Set Speed, or its Radius in the Item tab (Alt-S). At a point of speed 0 he 
         drawn = drawn_track.create(context, f"{name} curve", context.collection)
         add_player(context, drawn, name)
         window.select_only(context, drawn)
-        self.report({"INFO"}, f"{name}: bend the curve in edit mode (Tab), set speeds of its points, then Synthesize")
+        self.report({"INFO"}, f"{name}: edit the curve (Tab), set the speeds of its points, then press Synthesize")
 
 
 def add_player(context, drawn: bpy.types.Object, name: str):
-    """One more player in the list, who goes where `drawn` leads; his dot is in the scene."""
+    """Add a player who follows `drawn` to the list, with a dot in the scene."""
     settings = context.scene.beyond_mocap
     player = settings.players.add()
     player.name, player.drawn_track = name, drawn
@@ -46,24 +46,24 @@ def add_player(context, drawn: bpy.types.Object, name: str):
 
 
 class BEYOND_MOCAP_OT_track_object(Verb, bpy.types.Operator):
-    """Take the active object as a track: a curve with speeds at its points, or anything that moves (an Empty, a mesh,
-another armature's hips), by keys or constraints. It becomes a new player's, or the active player's"""
+    """Use the active object as a track of a new or the active player: a curve with speeds at its points, or any object
+that moves by keys or constraints (an Empty, a mesh, another armature's hips)"""
 
     bl_idname = "beyond_mocap.track_object"
     bl_label = "Track from Object"
     for_active: bpy.props.BoolProperty(name="Active Player",
-                                       description="Give it to the active player in the list instead of adding one",
+                                       description="Use it for the active player instead of adding one",
                                        options={"SKIP_SAVE"})
     needs = ("Choose a curve or a moving object first",
              lambda context: context.object is not None and is_track(None, context.object))
 
     def do(self, context):
-        """Read it, so that what is wrong is told, and take it."""
+        """Read the track first, so that errors are reported, then use it."""
         scene, chosen = context.scene, context.object
         channels.check_local(scene)
         player = active_player(scene.beyond_mocap)
         if self.for_active and player is None:
-            raise InputError("players", "none in the list", "a player", "switch Active Player off to add one")
+            raise InputError("players", "no player in the list", "a player", "switch Active Player off to add one")
         track = drawn_track.read(scene, chosen)
         if self.for_active:
             player.drawn_track = chosen
@@ -75,15 +75,15 @@ another armature's hips), by keys or constraints. It becomes a new player's, or 
 
 
 class BEYOND_MOCAP_OT_set_speed(Verb, bpy.types.Operator):
-    """Set the speed at the selected points of the active curve, in metres per second; outside edit mode at all of them.
-At a point of speed 0 the player waits. The speed is the point's Radius, the wait its Weight"""
+    """Set the speed in metres per second at the selected points of the active curve, outside edit mode at all points.
+The player waits at points of speed 0. Radius stores the speed, Weight the wait"""
 
     bl_idname = "beyond_mocap.set_speed"
     bl_label = "Set Speed"
     speed: bpy.props.FloatProperty(name="Speed", default=3.0, min=0.0, max=FASTEST, precision=2,
-                                   description="Metres per second; 0: a stop")
+                                   description="Metres per second; 0 for a stop")
     wait: bpy.props.FloatProperty(name="Wait", default=1.0, min=0.01, max=60.0, precision=2, unit="TIME_ABSOLUTE",
-                                  description="Seconds that are waited at a stop")
+                                  description="Seconds of waiting at a stop")
     needs = "Choose a drawn curve first", lambda context: context.object is not None and context.object.type == "CURVE"
 
     def invoke(self, context, _event):
@@ -100,11 +100,11 @@ At a point of speed 0 the player waits. The speed is the point's Radius, the wai
             raise InputError(f"curve {drawn.name}", "no point selected", "one or more", "select points in edit mode")
         drawn_track.set_speed(points, self.speed, self.wait)
         drawn.data.update_tag()
-        self.report({"INFO"}, f"points set: {len(points)}")
+        self.report({"INFO"}, f"Points set: {len(points)}")
 
 
 def chosen(drawn: bpy.types.Object) -> list:
-    """The selected control points of a curve in edit mode, all of them otherwise."""
+    """List the selected control points of a curve in edit mode, all of them otherwise."""
     points = [point for spline in drawn.data.splines for point in drawn_track.points_of(spline)]
     if drawn.mode != "EDIT":
         return points
@@ -112,41 +112,41 @@ def chosen(drawn: bpy.types.Object) -> list:
 
 
 class BEYOND_MOCAP_OT_add_pin(Verb, bpy.types.Operator):
-    """Add an Empty at which a hand, a foot or the gaze of the active player has to be on the present frame. Move it
-with G; time and hold stand in the list of pins"""
+    """Add an Empty at which a hand, a foot or the gaze of the active player has to be on the current frame. Move it
+with G; set time and hold in the list of pins"""
 
     bl_idname = "beyond_mocap.add_pin"
     bl_label = "Add Pin"
-    part: bpy.props.EnumProperty(name="Part", items=pins.PARTS, description="What is held")
+    part: bpy.props.EnumProperty(name="Part", items=pins.PARTS, description="Part of the body to pin")
     at: bpy.props.EnumProperty(
-        name="At", items=(("BODY", "Body", "Where the part is now"), ("CURSOR", "3D Cursor", "At the 3D cursor")),
-        description="Where the pin is made",
+        name="At", items=(("BODY", "Body", "Current position of the part"), ("CURSOR", "3D Cursor", "3D cursor")),
+        description="Position of the new pin",
     )
     hold: bpy.props.FloatProperty(name="Hold", default=0.0, min=0.0, precision=2, unit="TIME_ABSOLUTE",
-                                  description="Seconds for which it stays there")
+                                  description="Seconds for which the part stays there")
     needs = ("Import tracking or draw a track in step 2 first",
              lambda context: active_player(context.scene.beyond_mocap) is not None,
              "Leave edit mode first (Tab)", lambda context: context.mode == "OBJECT")
 
     def do(self, context):
-        """Find the place, refuse a second pin of the part at that time, make it."""
+        """Find the position, check for another pin of the part at that time, add the pin."""
         scene, part = context.scene, self.part.replace("_", " ")
         channels.check_local(scene)
         player, seconds = active_player(scene.beyond_mocap), pins.second_now(scene)
         for other in player.pins:
             if other.part == self.part and other.time <= seconds + self.hold and seconds <= other.time + other.hold:
-                found, step = f"a pin of {part} at {other.time:.2f} s", "go to another frame, or move that one"
-                raise InputError(f"player {player.name}", found, "one place at a time", step)
+                found, step = f"a pin of {part} at {other.time:.2f} s", "go to another frame or move that pin"
+                raise InputError(f"player {player.name}", found, "one position at a time", step)
         if self.at == "BODY":
             place = pins.body_place(context, player, self.part)
         else:
             place = np.array(scene.cursor.location) / units_per_metre(scene)
         pins.add(context, player, self.part, seconds=seconds, hold=self.hold, place=place, room=bake.collection(scene))
-        self.report({"INFO"}, f"{player.name}: {part} pinned at {seconds:.2f} s; move it with G, then Update")
+        self.report({"INFO"}, f"{player.name}: {part} pinned at {seconds:.2f} s; move it with G, then press Update")
 
 
 class BEYOND_MOCAP_OT_remove_pin(Verb, bpy.types.Operator):
-    """Take the pin that is chosen in the list away, with its Empty"""
+    """Remove the active pin in the list with its Empty"""
 
     bl_idname = "beyond_mocap.remove_pin"
     bl_label = "Remove Pin"
@@ -154,7 +154,7 @@ class BEYOND_MOCAP_OT_remove_pin(Verb, bpy.types.Operator):
              lambda context: (player := active_player(context.scene.beyond_mocap)) is not None and len(player.pins) > 0)
 
     def do(self, context):
-        """Remove it and choose its neighbour."""
+        """Remove the pin and choose the next one."""
         channels.check_local(context.scene)
         player = active_player(context.scene.beyond_mocap)
         pins.remove(player, min(player.active_pin, len(player.pins) - 1))

@@ -1,8 +1,8 @@
-"""One player after the other: the verbs that make takes share a queue, a thread and one modal operator.
+"""The queue of players: the operators that generate takes share a queue, a thread and one modal operator.
 
-Called from a script everything is made at once. Pressed as a button, players queue: the first verb that is pressed
-works the queue off, those pressed meanwhile only add to it. Each player's result is written as it arrives, with an undo
-step of its own, and only where the player still asks for what it was made of.
+Called from a script, all takes are generated at once. Pressed as a button, players are queued: the first operator
+processes the queue, later ones only add to it. Each player's result is stored as it arrives, with its own undo step,
+and only if the player's request is still the same.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from .verb import NEEDS_LIBRARY, Verb
 
 
 def written(context, player, order, result) -> None:
-    """Keep the takes of a result in the session, show the first of them, and renew what goes with it."""
+    """Store the takes of a result in the session, show the first of them, and update what depends on it."""
     session.keep_library(result.library, order.unit)
     context.scene.beyond_mocap.library_holds = summary(result.library)
     shown = []
@@ -45,37 +45,40 @@ def written(context, player, order, result) -> None:
 
 
 def show_automatic(context, player) -> None:
-    """Let the player's automatic strips be those of its take; a player without strips, whose words are in a text or a
-    file, is left without, since strips count more."""
+    """Update the player's automatic strips from its take.
+
+    A player without strips, whose labels are in a text or a file, gets none, since strips would override them.
+    """
     made = session.made(player.take)
     if strips.read(player, context.scene) is not None and (made is not None or not player.take):
         strips.set_automatic(context, player, made.take.timeline if made is not None else Timeline())
 
 
 KIND = "synthesis"
-BETWEEN = 0.2  # seconds between two pictures of the progress
-TRIES = 3  # how often a player whose wishes keep changing is begun anew
+BETWEEN = 0.2  # seconds between two redraws of the progress
+TRIES = 3  # how often a player whose settings keep changing is started again
 HOLDING = ("TRANSFORM_OT", "PAINT_OT", "SCULPT_OT", "POSE_OT", "VIEW3D_OT_select", "MESH_OT", "ARMATURE_OT")
 
 
 class TurnsVerb(Verb):
-    """A verb that makes takes. `wanted(context)`: pairs of a player and `orders.How`."""
+    """Base of operators that generate takes. `list_requests(context)`: pairs of a player and the mode of its request.
+    """
 
-    player: StringProperty(name="Player", options={"SKIP_SAVE"}, description="Only this one; empty: all ticked players")
+    player: StringProperty(name="Player", options={"SKIP_SAVE"}, description="Name of a player; empty for all selected")
     kind = "whole"
-    needs = (*NEEDS_LIBRARY, "Import tracking and tick a player in step 2 first",
+    needs = (*NEEDS_LIBRARY, "Import tracking and select a player in step 2 first",
              lambda context: any(player.use for player in context.scene.beyond_mocap.players))
 
     def wanted(self, context):
-        """The named player, or every ticked one."""
+        """List the named player, or every selected one."""
         settings = context.scene.beyond_mocap
         if self.player and self.player not in settings.players:
-            raise InputError("player", self.player, "a name in the list", "look at step 2")
+            raise InputError("player", self.player, "a name in the list", "see step 2")
         players = [settings.players[self.player]] if self.player else plans.chosen(settings)
         return [(player, orders.How(self.kind)) for player in players]
 
     def entries(self, context) -> list[queue.Entry]:
-        """What is wanted, as orders."""
+        """Build the requests as queue entries."""
         settings = context.scene.beyond_mocap
         found = []
         for player, how in self.wanted(context):
@@ -84,7 +87,7 @@ class TurnsVerb(Verb):
         return found
 
     def do(self, context):
-        """All players in one go: first everything is made, then everything is written."""
+        """Process all players at once: generate everything first, then store everything."""
         window = context.window_manager
         window.progress_begin(0, 100)
         try:
@@ -102,10 +105,10 @@ class TurnsVerb(Verb):
             written(context, context.scene.beyond_mocap.players[entry.player], entry.order, result)
         players = [context.scene.beyond_mocap.players[entry.player] for entry in entries]
         names = ", ".join(player.name for player in players)
-        self.report({"INFO"}, f"made: {names}{_kept(players)}; Accept keeps, Discard undoes")
+        self.report({"INFO"}, f"Generated: {names}{_kept(players)}; press Apply or Revert")
 
     def invoke(self, context, event):
-        """Let the players wait, and work the queue off where nobody does it yet."""
+        """Queue the players, and process the queue if no other operator does."""
         if bpy.app.background:
             return self.execute(context)
         try:
@@ -117,18 +120,18 @@ class TurnsVerb(Verb):
         running = context.window_manager.beyond_mocap_work
         if queue.worked():
             running.waiting = "\n".join(queue.names())
-            self.report({"INFO"}, f"waiting: {', '.join(queue.names())}")
-            return {"CANCELLED"}  # nothing has changed yet, so no step for undo
+            self.report({"INFO"}, f"Waiting: {', '.join(queue.names())}")
+            return {"CANCELLED"}  # nothing has changed yet, so no undo step
         queue.work(True)
         self.entry, self.job, self.told, self.wrote = None, None, [], 0
         self.seen, self.drawn = None, 0.0
         self.clock = start_clock(context)
         context.window_manager.modal_handler_add(self)
-        self.show(context, "Beginning")
+        self.show(context, "Starting")
         return {"RUNNING_MODAL"}
 
     def modal(self, context, event):
-        """Poll; whatever goes wrong, the queue is free again for the next verb."""
+        """Poll; after any error the queue is free again for the next operator."""
         try:
             return self.turn(context, event)
         except Exception:
@@ -136,7 +139,7 @@ class TurnsVerb(Verb):
             raise
 
     def turn(self, context, event):
-        """Poll, pass on all other events, write what has arrived and begin the next."""
+        """Poll, pass on all other events, store what has arrived and start the next."""
         if event.type == "ESC" and event.value == "PRESS":
             queue.clear()
             if self.job is not None:
@@ -154,14 +157,14 @@ class TurnsVerb(Verb):
         return self.over(context)
 
     def next(self, context):
-        """Begin the next one that waits and still asks."""
+        """Start the next waiting request that is still valid."""
         self.job = None
         while self.job is None and (entry := queue.take()) is not None:
             self.last = False
             scene = _scene(entry)
             player = _found(scene, entry) if scene is not None else None
             if player is None:
-                self.tell(f"{entry.player} is not in the list any more and was left out")
+                self.tell(f"{entry.player} is no longer in the list and was skipped")
                 continue
             try:
                 entry.order = orders.order_of(scene.beyond_mocap, player, entry.how)
@@ -171,10 +174,10 @@ class TurnsVerb(Verb):
             entry.player, entry.fingerprint = player.name, entry.order.fingerprint
             self.entry, order, library = entry, entry.order, _library(entry)
             self.job = background.Job(KIND, lambda *asking: orders.work(order, library, *asking), keeps=True)
-            self.show(context, "Beginning")
+            self.show(context, "Starting")
 
     def arrived(self, context) -> bool:
-        """Write what the thread brings; False where that has to wait a moment."""
+        """Store the thread's result; False if that has to wait."""
         job, entry, self.last = self.job, self.entry, False
         if background.cancelled(job):
             self.tell(f"{entry.player}: cancelled, nothing has changed")
@@ -186,11 +189,11 @@ class TurnsVerb(Verb):
             return True
         scene = _scene(entry)
         if scene is None:
-            self.tell(f"{entry.player}: its scene is gone, the take is dropped")
+            self.tell(f"{entry.player}: the scene was removed, the take is discarded")
             return True
         window = next((window for window in context.window_manager.windows if window.scene == scene), None)
         if window is None or _holds(context):
-            self.show(context, f"made; waits for scene {scene.name}" if window is None else "made; waits for your hand")
+            self.show(context, f"Ready; waits for scene {scene.name}" if window is None else "Finish the transform")
             return False
         player = _asking(scene, entry)
         if player is None:
@@ -200,51 +203,51 @@ class TurnsVerb(Verb):
             queue.clear()
         with context.temp_override(window=window):
             ok = self.attempt(lambda: written(bpy.context, player, entry.order, job.result)) == {"FINISHED"}
-            if ok and queue.names():  # the last one's step is the operator's own
+            if ok and queue.names():  # the last one's undo step is the operator's own
                 bpy.ops.ed.undo_push(message=f"{self.bl_label} {player.name}")
         self.wrote += ok
         self.last = ok
         if ok:
-            self.tell(f"{player.name}: made{_kept([player])}; Accept keeps it, Discard undoes it")
+            self.tell(f"{player.name}: generated{_kept([player])}; press Apply or Revert")
         return True
 
-    last = False  # whether the newest result was written and has no step for undo yet
+    last = False  # whether the newest result was stored and has no undo step yet
 
     def again(self, scene):
-        """The player asks for something else by now: order it once more, or drop it."""
+        """Queue a player again whose request has changed, or discard the take."""
         entry = self.entry
         player = _found(scene, entry)
         if player is None:
-            self.tell(f"{entry.player} is not in the list any more, its take is dropped")
+            self.tell(f"{entry.player} is no longer in the list; the take is discarded")
         elif entry.tries >= TRIES:
-            self.tell(f"{entry.player} keeps changing, its take is dropped; press {self.bl_label} again", "WARNING")
+            self.tell(f"{entry.player} keeps changing; the take is discarded, press {self.bl_label} again", "WARNING")
         else:
-            self.tell(f"{entry.player} has changed meanwhile and is made again")
+            self.tell(f"{entry.player} has changed and is generated again")
             queue.add(queue.Entry(entry.scene, player.name, entry.how, order=None, fingerprint="",
                                   tries=entry.tries + 1))
 
     def over(self, context):
-        """Nothing waits any more."""
+        """Finish when the queue is empty."""
         self.close(context)
         for kind, text in self.told:
             self.report({kind}, text)
         if self.wrote > 1:
-            self.report({"INFO"}, f"players made: {self.wrote}; Accept keeps them, Discard undoes them")
+            self.report({"INFO"}, f"Players generated: {self.wrote}; press Apply or Revert")
         return {"FINISHED"} if self.last else {"CANCELLED"}
 
     def tell(self, text, kind="INFO"):
-        """Keep a line for the end: Blender shows what a modal operator reports only then."""
+        """Store a message for the end: Blender shows a modal operator's reports only then."""
         self.told.append((kind, text))
 
     def cancel(self, context):
-        """Blender takes the operator away (a file is loaded, the window closes): let the thread end unheard."""
+        """Stop when Blender ends the operator (a file is loaded, the window closes); the running job is discarded."""
         queue.clear()
         if self.job is not None:
             self.job.cancel()
         self.close(context)
 
     def show(self, context, text):
-        """Progress in the status bar, at the pointer and for the panel."""
+        """Show progress in the status bar, at the pointer and in the panel."""
         running, fraction = context.window_manager.beyond_mocap_work, self.job.fraction if self.job else 0.0
         name = self.entry.player if self.entry else ""
         running.kind, running.fraction, running.text = KIND, fraction, f"{name}: {text}" if name else text
@@ -261,7 +264,7 @@ class TurnsVerb(Verb):
         _redraw(context)
 
     def close(self, context):
-        """Take progress display and clock away."""
+        """Remove progress display and timer."""
         running = context.window_manager.beyond_mocap_work
         queue.work(False)
         running.kind = running.waiting = ""
@@ -270,7 +273,7 @@ class TurnsVerb(Verb):
 
 
 def _kept(players) -> str:
-    """How many hand-made keys these players' results have kept, in words."""
+    """Describe how many hand-made keys these players' results have kept."""
     count = sum(player.result.hand_keys for player in players)
     return f", {count} hand-made {'key' if count == 1 else 'keys'} kept" if count else ""
 
@@ -284,13 +287,13 @@ def _scene(entry: queue.Entry):
 
 
 def _found(scene, entry: queue.Entry):
-    """The player that an entry means, under its new name where it has been renamed; None where it is gone."""
+    """Find the player of an entry, under its new name if it was renamed; None where it was removed."""
     players = scene.beyond_mocap.players
     return players[entry.player] if entry.player in players else _asking(scene, entry)
 
 
 def _asking(scene, entry: queue.Entry):
-    """The player that asks for just what the entry was made of; None where none does."""
+    """Find the player whose request equals the entry's; None where there is none."""
     players, busy = scene.beyond_mocap.players, queue.names()
     named = players.get(entry.player)
     for player in [named] if named is not None else [player for player in players if player.name not in busy]:
@@ -303,13 +306,13 @@ def _asking(scene, entry: queue.Entry):
 
 
 def _holds(context) -> bool:
-    """Whether the user is in the middle of moving, painting or choosing something."""
+    """Whether the user is moving, painting or selecting something."""
     running = [operator.bl_idname for window in context.window_manager.windows for operator in window.modal_operators]
     return any(name.startswith(HOLDING) for name in running)
 
 
 def _redraw(context) -> None:
-    """Let the sidebars of all 3D views be drawn again."""
+    """Redraw the sidebars of all 3D views."""
     for window in context.window_manager.windows:
         for area in window.screen.areas:
             if area.type == "VIEW_3D":

@@ -1,4 +1,5 @@
-"""What all verbs share: trouble becomes a report with a cause and a next step; long work may run in the background."""
+"""Base classes of operators: errors become reports with a cause and a next step; long work may run in the background.
+"""
 
 from __future__ import annotations
 
@@ -12,17 +13,20 @@ from ..beyond_mocap.base.errors import BeyondMocapError, InputError
 from ..scene.core import background, window
 from ..scene.rigs import export
 
-NEEDS_LIBRARY = ("Choose the library's folder in step 1 first",
+NEEDS_LIBRARY = ("Choose the library's folder first",
                  lambda context: bool(context.scene.beyond_mocap.library_folder))
 NEEDS_NO_EDITING = "Leave edit mode first (Tab)", lambda context: context.mode in {"OBJECT", "POSE"}
 
 
 class Verb:
-    """An operator whose `do(context)` does the work; where it raises, the trouble is reported and nothing has changed.
+    """An operator whose `do(context)` does the work; an error in it is reported and leaves the scene unchanged.
 
-    `do` reads and computes first and touches the scene last, so that a step that fails leaves the scene as it was.
-    needs: what the user is told where the operator is greyed, and a function of the context that is true where it can
-    be called; as many pairs of these as there are, asked in turn.
+    `do` reads and computes first and changes the scene last, so that a failing step leaves the scene as it was.
+
+    Attributes:
+        needs: pairs of a message for the user while the operator is disabled, and a function of the context that
+            returns
+            whether it is enabled; they are checked in order.
     """
 
     bl_options = {"REGISTER", "UNDO"}
@@ -30,7 +34,7 @@ class Verb:
 
     @classmethod
     def poll(cls, context):
-        """Whether what it needs is there."""
+        """Return whether all needs are met."""
         for message, is_met in zip(cls.needs[::2], cls.needs[1::2]):
             if not is_met(context):
                 cls.poll_message_set(message)
@@ -38,11 +42,11 @@ class Verb:
         return True
 
     def execute(self, context):
-        """Do it now."""
+        """Run the operator now."""
         return self.attempt(lambda: self.do(context))
 
     def attempt(self, action):
-        """FINISHED where `action` runs through, else a report and CANCELLED."""
+        """Run `action`: FINISHED if it succeeds, else a report and CANCELLED."""
         try:
             action()
         except BeyondMocapError as error:
@@ -59,27 +63,27 @@ class Verb:
 
 
 class ImportVerb(Verb, ImportHelper):
-    """A verb that reads files: chosen in the file browser, dropped into a view, or named by a script."""
+    """An operator that reads files: chosen in the file browser, dropped into a view, or set by a script."""
 
     bl_options = {"REGISTER", "UNDO", "PRESET"}
     directory: StringProperty(subtype="DIR_PATH", options={"SKIP_SAVE", "HIDDEN"})
     files: CollectionProperty(type=bpy.types.OperatorFileListElement, options={"SKIP_SAVE", "HIDDEN"})
 
     def invoke(self, context, event):
-        """Dropped files are imported at once; else the file browser opens."""
+        """Import dropped files at once; otherwise open the file browser."""
         if self.directory and self.files:
             return self.execute(context)
         return ImportHelper.invoke(self, context, event)
 
     def chosen(self) -> list[Path]:
-        """The chosen files; where none is, the path of the file browser's name field, if there is one."""
+        """List the chosen files; without any, the path in the file browser's name field, if there is one."""
         names = [file.name for file in self.files if file.name]
         if names:
             return [Path(self.directory or Path(self.filepath).parent, name) for name in names]
         return [Path(bpy.path.abspath(self.filepath))] if self.filepath else []
 
     def chosen_one(self, expected: str) -> Path:
-        """The one chosen file; InputError where there are none or several."""
+        """Return the one chosen file; InputError if there are none or several."""
         chosen = self.chosen()
         if len(chosen) != 1:
             raise InputError("import", f"{len(chosen)} files" if chosen else "no file given", expected)
@@ -87,28 +91,28 @@ class ImportVerb(Verb, ImportHelper):
 
 
 class DroppedIntoView:
-    """To be mixed into a file handler: its files are dropped into a 3D view."""
+    """Mix-in of a file handler whose files are dropped into a 3D view."""
 
     @classmethod
     def poll_drop(cls, context):
-        """A 3D view is under the pointer."""
+        """Return whether a 3D view is under the pointer."""
         return context.area is not None and context.area.type == "VIEW_3D"
 
 
 class ExportVerb(Verb, ExportHelper):
-    """A verb that writes a file in the form that its property `format` names."""
+    """An operator that writes a file in the format of its property `format`."""
 
     bl_options = {"REGISTER"}
     filename_ext = ""
     check_extension = None
 
     def invoke(self, context, event):
-        """The file browser."""
+        """Open the file browser."""
         self.filename_ext = export.SUFFIXES[self.format]
         return ExportHelper.invoke(self, context, event)
 
     def check(self, _context):
-        """The name in the file browser ends as the file will, so that Blender warns of one that is there."""
+        """Give the name in the file browser the file's suffix, so that Blender warns of an existing file."""
         named = Path(self.filepath)
         if not named.name:
             return False
@@ -116,26 +120,29 @@ class ExportVerb(Verb, ExportHelper):
         return self.filepath != before
 
     def out(self) -> Path:
-        """Where to write; InputError where nothing is chosen."""
+        """Return the file to write; InputError if none is chosen."""
         if not self.filepath:
-            raise InputError("export", "no file given", "where to write it", "choose a place")
+            raise InputError("export", "no file given", "a file to write", "choose a file")
         return export.with_ending(Path(bpy.path.abspath(self.filepath)), export.SUFFIXES[self.format])
 
 
 class BackgroundVerb(Verb):
-    """A verb in three parts, so that the middle one can run in a thread while the window stays alive.
+    """An operator in three parts, so that the middle one can run in a thread while the window stays responsive.
 
-    `kind`: name of the work. `order(context)` collects plain values from the scene; `work(order, progress, cancelled,
-    hurry)`, a static function that never touches bpy, computes; `apply(scene, result)` writes what came out. Called
-    from a script (`execute`) all three run at once; pressed as a button (`invoke`) the work goes to a thread. ESC
-    cancels it.
+    Attributes:
+        kind: name of the work.
+        left: message after ESC.
+
+    `order(context)` collects plain values from the scene. `work(order, progress, cancelled, hurry)`, a static function
+    that never uses bpy, computes. `apply(scene, result)` writes the result. Called from a script (`execute`), all three
+    run at once; started by a button (`invoke`), the work runs in a thread and ESC cancels it.
     """
 
     kind = ""
-    left = "cancelled, nothing has changed"  # what is told after ESC
+    left = "cancelled, nothing has changed"  # message after ESC
 
     def do(self, context):
-        """Order, work and apply in one go."""
+        """Collect the order, work and apply the result in one call."""
         manager = context.window_manager
         manager.progress_begin(0, 100)
         try:
@@ -147,26 +154,26 @@ class BackgroundVerb(Verb):
         self.apply(context.scene, result)
 
     def invoke(self, context, _event):
-        """Start the thread and come back later."""
+        """Start the thread and poll for its result."""
         if bpy.app.background:
             return self.execute(context)
         return self.started(context) if self.attempt(lambda: self.start(context)) == {"FINISHED"} else {"CANCELLED"}
 
     def start(self, context):
-        """Collect the order and hand it to a thread."""
+        """Collect the order and start the thread."""
         order, work = self.order(context), self.work
         self.scene = context.scene.session_uid
         self.job = background.Job(self.kind, lambda *asking: work(order, *asking))
 
     def started(self, context):
-        """Begin to poll."""
+        """Start polling."""
         self.clock = window.start_clock(context)
         context.window_manager.modal_handler_add(self)
         self.show(context)
         return {"RUNNING_MODAL"}
 
     def modal(self, context, event):
-        """Poll, pass on all other events, and write the result once it is there."""
+        """Poll, pass on all other events, and apply the result when it is ready."""
         if event.type == "ESC" and event.value == "PRESS":
             self.job.cancel()
         elif event.type != "TIMER":
@@ -183,18 +190,19 @@ class BackgroundVerb(Verb):
         return self.attempt(lambda: self.finish(scene))
 
     def finish(self, scene):
-        """Raise what the thread raised, or apply its result."""
+        """Raise the thread's error, or apply its result."""
         if self.job.error is not None:
             raise self.job.error
         self.apply(scene, self.job.result)
 
     def cancel(self, context):
-        """Blender takes the operator away (a file is loaded, the window closes): let the thread end unheard."""
+        """Cancel the thread when Blender ends the operator (a file is loaded, the window closes); its result is
+        discarded."""
         self.job.cancel()
         self.ended(context)
 
     def show(self, context):
-        """Progress in the status bar, at the pointer and for the panel."""
+        """Show the progress in the status bar, at the pointer and in the panel."""
         running = context.window_manager.beyond_mocap_work
         text = self.job.text or f"{self.bl_label} ..."
         running.kind, running.fraction, running.text = self.kind, self.job.fraction, text
@@ -203,7 +211,7 @@ class BackgroundVerb(Verb):
         window.redraw()
 
     def ended(self, context):
-        """Take progress display and clock away."""
+        """Remove the progress display and the timer."""
         context.window_manager.beyond_mocap_work.kind = ""
         window.stop_clock(context, self.clock)
         window.redraw()

@@ -1,5 +1,6 @@
-"""Build the extension's zips into build/extension: one per platform, laid out from our code, the wheels and
-the complete manifest, packed and validated by Blender's own tool.
+"""Build the extension's zips into build/extension, one per platform.
+
+Each contains the extension's code, the wheels and the complete manifest, packed and validated by Blender's own tool.
 
     .venv/bin/python packaging/build.py --platforms linux-x64 windows-x64
 """
@@ -21,7 +22,7 @@ LEFT_OUT = shutil.ignore_patterns("__pycache__", "*.pyc")
 
 
 def main(argv=None):
-    """Fetch, stage, lint, validate, build, lint again; 0 where the zips stand."""
+    """Fetch, stage, lint, validate, build and lint again; return 0 if the zips are complete."""
     known = bundle.platforms()
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--platforms", nargs="+", choices=sorted(known), default=["linux-x64"])
@@ -36,7 +37,14 @@ def main(argv=None):
 
 
 def build(packages, platform):
-    """The zip for one platform."""
+    """Build the zip for one platform.
+
+    Args:
+        packages: the bundled packages.
+        platform: the platform.
+    Returns:
+        The zip's path.
+    """
     folder = OUT / "stage" / platform.name
     lay_out(folder, packages, platform)
     complain(lint.lint_stage(folder, packages, platform))
@@ -47,7 +55,13 @@ def build(packages, platform):
 
 
 def lay_out(folder, packages, platform):
-    """Fill the staging folder that Blender's own tool packs."""
+    """Fill the staging folder that Blender's own tool packs.
+
+    Args:
+        folder: the staging folder.
+        packages: the bundled packages.
+        platform: the platform.
+    """
     names = wheels.gather(packages, platform, folder / "wheels")
     copy_parts(TOP, folder)
     text = (TOP / "blender_manifest.toml").read_text("utf-8")
@@ -56,29 +70,29 @@ def lay_out(folder, packages, platform):
 
 
 def version():
-    """The version that the manifest gives."""
+    """Read the version from the manifest."""
     return tomllib.loads((TOP / "blender_manifest.toml").read_text("utf-8"))["version"]
 
 
 def pack(folder, out):
-    """Let Blender's own tool validate the folder and build the zip of its one platform."""
+    """Validate the folder and build the zip of its one platform with Blender's own tool."""
     import bpy  # noqa: F401  (brings bl_pkg)
     from bl_pkg.bl_extension_cli import cli_extension_handler as extension_tool
 
     for verb in (["validate", str(folder)],
                  ["build", "--source-dir", str(folder), "--output-dir", str(out), "--split-platforms"]):
         if extension_tool(verb) != 0:
-            sys.exit(f"Blender's own tool refused: {verb[0]} {folder}")
+            sys.exit(f"Blender's extension tool failed: {verb[0]} {folder}")
 
 
 def complain(lines):
-    """Stop with these lines, if there are any."""
+    """Exit with these lines, if there are any."""
     if lines:
         sys.exit("\n".join(lines))
 
 
 def copy_parts(source, folder):
-    """Copy what ships from the clone at `source` into `folder`; a text that is not written yet is passed over."""
+    """Copy the shipped parts of the clone at `source` into `folder`; missing files are skipped."""
     for part in PARTS:
         path = source / part
         if path.is_dir():
@@ -88,7 +102,16 @@ def copy_parts(source, folder):
 
 
 def complete_manifest(text, packages, platform, wheels):
-    """The committed manifest's text, with the platform, the wheels and a copyright line per bundled package."""
+    """Complete the manifest with the platform, the wheels and a copyright line per bundled package.
+
+    Args:
+        text: the committed manifest.
+        packages: the bundled packages.
+        platform: the platform's name.
+        wheels: file names of the wheels.
+    Returns:
+        The manifest's text.
+    """
     holders = [
         f"{package.copyright} ({package.name} {package.bundled_version}, {package.license})" for package in packages
     ]

@@ -1,4 +1,4 @@
-"""What the zip carries, read from bundle.toml, and how a wheel's file name is understood."""
+"""The contents of the zip, read from bundle.toml, and the parts of a wheel's file name."""
 
 import pathlib
 import re
@@ -9,7 +9,14 @@ HERE = pathlib.Path(__file__).resolve().parent
 
 
 class Package(NamedTuple):
-    """One bundled package: its name and version as released, whom it belongs to, whether it goes in slimmed."""
+    """One bundled package.
+
+    Attributes:
+        name, version: as released.
+        copyright: the copyright holder.
+        license: SPDX name.
+        slimmed: whether the zip's wheel is reduced.
+    """
 
     name: str
     version: str
@@ -19,12 +26,18 @@ class Package(NamedTuple):
 
     @property
     def bundled_version(self):
-        """The version the zip's wheel carries: marked where we took something out."""
+        """The version of the zip's wheel, marked if the wheel is reduced."""
         return self.version + ("+slim" if self.slimmed else "")
 
 
 class Platform(NamedTuple):
-    """One of Blender's platforms: the Pythons to serve and the wheel tags that fit, the best first."""
+    """One of Blender's platforms.
+
+    Attributes:
+        name: Blender's name.
+        pythons: the Python versions to support.
+        tags: the wheel tags that fit, the best first.
+    """
 
     name: str
     pythons: list[str]
@@ -32,7 +45,7 @@ class Platform(NamedTuple):
 
 
 class Wheel(NamedTuple):
-    """A wheel's file name, taken apart; each tag set is what stands between the dots."""
+    """The parts of a wheel's file name; each tag set is split at the dots."""
 
     name: str
     version: str
@@ -41,7 +54,12 @@ class Wheel(NamedTuple):
     platforms: frozenset[str]
 
     def serves(self, platform, python):
-        """Whether Blender would unpack this wheel on that platform under that Python ("311")."""
+        """Return whether Blender unpacks this wheel on a platform under a Python version.
+
+        Args:
+            platform: the platform.
+            python: the version, such as "311".
+        """
         fits_python = f"cp{python}" in self.pythons or "py3" in self.pythons or (
             "abi3" in self.abis and any(_older(tag, python) for tag in self.pythons))
         return fits_python and ("any" in self.platforms or bool(self.platforms & set(platform.tags)))
@@ -52,26 +70,31 @@ def _older(tag, python):
 
 
 def wheel(filename):
-    """Take a wheel's file name apart.
+    """Split a wheel's file name into its parts.
 
     >>> wheel("lxml-6.1.3-cp311-cp311-win_amd64.whl").platforms
-    frozenset({'win_amd64'})"""
+    frozenset({'win_amd64'})
+    """
     name, version, *_, python, abi, platform = filename.removesuffix(".whl").split("-")
     return Wheel(plain(name), version, *(frozenset(tags.split(".")) for tags in (python, abi, platform)))
 
 
 def plain(name):
-    """A package's name in the form in which two spellings are equal."""
+    """Normalize a package's name, so that equivalent spellings are equal."""
     return re.sub(r"[-_.]+", "-", name).lower()
 
 
 def packages():
-    """All bundled packages, in the file's order."""
+    """List all bundled packages, in the file's order."""
     return [Package(**row) for row in _table()["package"]]
 
 
 def platforms():
-    """Blender's platforms that a zip can be built for, by name."""
+    """Read the platforms that a zip can be built for.
+
+    Returns:
+        Name -> platform.
+    """
     return {name: Platform(name, **row) for name, row in _table()["platform"].items()}
 
 

@@ -1,10 +1,10 @@
-"""Draws the rooms of the core and what they import as docs/pictures/architecture.svg, from the source itself.
+"""Draw the packages of the core and their imports as docs/pictures/architecture.svg, from the source itself.
 
-    python packaging/draw_house.py            write the picture
-    python packaging/draw_house.py --check    exit with 1 where the picture is out of date
+    python packaging/draw_architecture.py            write the picture
+    python packaging/draw_architecture.py --check    exit with 1 if the picture is out of date
 
-Rooms stand as in `house.LAYERS`, the ground at the bottom. An arrow means "imports"; an arrow that follows from others
-is left out (transitive reduction), or the picture would be black.
+Packages are arranged as in `architecture.LAYERS`, the lowest layer at the bottom. An arrow means "imports"; arrows that
+follow from others are left out (transitive reduction), to keep the picture readable.
 """
 
 from __future__ import annotations
@@ -20,15 +20,15 @@ from house import CORE, LAYERS, TOP, layer_of, room_graph
 PICTURE = TOP / "docs" / "pictures" / "architecture.svg"
 COLUMNS = {"annotation": 0, "synthetic": 1, "appearance": 5, "files": 0, "ball": 2, "library": 1, "synthesis": 1,
            "evaluation": 3, "path_editing": 0, "passes": 1, "throws": 2, "markers": 3, "study": 4, "match": 5}
-"""Where a room stands in its layer; rooms that are not named here go right across."""
-BLENDER = {"panels": "What is shown", "scene": "Data in Blender, the live watcher", "operators": "What buttons do"}
+"""Column of a package in its layer; other packages fill the width."""
+BLENDER = {"panels": "Panels in the sidebar", "scene": "Data in Blender, updates", "operators": "Actions of buttons"}
 _MARGIN, _STEP, _BOX, _RISE, _TALL = 36, 200, 180, 84, 56
 _ACROSS = 5 * _STEP + _BOX
 _TOP = _MARGIN + _RISE + 20
 
 
 def draw_house() -> str:
-    """The picture as the text of an SVG file."""
+    """Draw the picture; return the text of an SVG file."""
     boxes = [_draw_box(*_corner(room), _first_words(room), room) for rooms in LAYERS for room in rooms]
     arrows = [_draw_arrow(_route(room, other)) for room, others in _reduced().items() for other in sorted(others)]
     right, bottom = _ACROSS + 2 * _MARGIN, _TOP + len(LAYERS) * _RISE + 20
@@ -44,7 +44,7 @@ def draw_house() -> str:
 
 
 def _draw_blender() -> list[str]:
-    """What puts the core into Blender: a row of its own above the core."""
+    """Draw the packages for Blender in a row above the core."""
     lefts = [_MARGIN + column * _STEP for column in (0, 2, 4)]
     middle = _MARGIN + _TALL / 2 - 14
     arrows = [_draw_arrow([(lefts[0] + _BOX, middle), (lefts[1], middle)]),
@@ -55,13 +55,13 @@ def _draw_blender() -> list[str]:
 
 
 def _corner(room: str) -> tuple[float, float, float]:
-    """Left, top and width of a room's box."""
+    """Compute left, top and width of a package's box."""
     y = _TOP + (len(LAYERS) - 1 - layer_of(room)) * _RISE
     return (_MARGIN + COLUMNS[room] * _STEP, y, _BOX) if room in COLUMNS else (_MARGIN, y, _ACROSS)
 
 
 def _reduced() -> dict[str, set[str]]:
-    """The rooms' imports without those that follow from others; those of `synthetic.ground_truth` are left out too."""
+    """Reduce the packages' imports to those that do not follow from others; `synthetic.ground_truth` is left out."""
     graph = {room: {o for o in others if layer_of(o) < layer_of(room)} for room, others in room_graph().items()}
 
     def reach(room: str) -> set[str]:
@@ -72,7 +72,7 @@ def _reduced() -> dict[str, set[str]]:
 
 
 def _route(room: str, other: str) -> list[tuple[float, float]]:
-    """The corners of an arrow: straight down, or down and aside, or aside and down where a box stands below."""
+    """Compute the corners of an arrow: straight down, or down and aside, or aside and down if a box is in the way."""
     (left, top, wide), (to_left, to_top, to_wide) = _corner(room), _corner(other)
     start, end = left + wide / 2, to_left + to_wide / 2
     if room not in COLUMNS or other not in COLUMNS or start == end:
@@ -87,7 +87,7 @@ def _route(room: str, other: str) -> list[tuple[float, float]]:
 
 
 def _first_words(room: str) -> str:
-    """What the room's own docstring begins with."""
+    """Return the beginning of the package's docstring."""
     text = ast.get_docstring(ast.parse((TOP / CORE / room / "__init__.py").read_text("utf-8"))) or ""
     return re.split(r"[.:;(]", text.split("\n")[0])[0].strip()
 

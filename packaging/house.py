@@ -1,7 +1,7 @@
-"""The plan of the house: which room may import which, and what the source really imports, read without running it.
+"""The architecture: which package may import which, and the actual imports of the source, read without running it.
 
-`tests/core/test_house.py` keeps the plan, `packaging/draw_house.py` draws it. Every import is written as one dotted
-name from the clone's top: `from ..plan import Plan` in `beyond_mocap/synthesis/search/wanted.py` is
+`tests/core/test_architecture.py` checks it, `packaging/draw_architecture.py` draws it. Every import is one dotted name
+from the clone's top: `from ..plan import Plan` in `beyond_mocap/synthesis/search/wanted.py` is
 `beyond_mocap.synthesis.plan.Plan`.
 """
 
@@ -19,21 +19,27 @@ CORE = "beyond_mocap"
 FEATURES = ("path_editing", "passes", "throws", "markers", "study")
 LAYERS = (("base",), ("motion",), ("annotation", "appearance"), ("synthetic",), ("files", "ball"), ("library",),
           ("synthesis",), ("evaluation",), FEATURES, ("match",), ("cli",))
-"""The rooms of the core from the ground up: a room imports rooms of lower layers only, never one beside it."""
+"""The packages of the core from the bottom up: a package imports only packages of lower layers."""
 GROUND_TRUTH = "synthetic.ground_truth"
-"""Recordings with known answers, made with the features that tests ask about them: above the features, below
-`match`."""
+"""Synthetic recordings with ground truth, built with the features that tests check with them: its layer is above the
+features and below `match`."""
 FILES_MAY = ("base", "motion", "annotation")
 BLENDER = {"bpy", "mathutils", "gpu", "gpu_extras", "bpy_extras", "blf", "bl_ui", "bl_operators", "bmesh",
            "addon_utils", "rna_prop_ui", "rna_keymap_ui", "imbuf", "aud", "idprop", "pxr"}  # fmt: skip
 MOST_FILES = 25
-"""Files side by side in one folder."""
+"""Python files in one folder at most."""
 parse_source = functools.cache(ast.parse)
 
 
 class Import(NamedTuple):
-    """One imported name: where it stands, dotted from the top, whether inside a function, whether written
-    relatively."""
+    """One imported name.
+
+    Attributes:
+        where: file and line.
+        name: dotted from the top.
+        lazy: whether it is inside a function.
+        relative: whether it is written relatively.
+    """
 
     where: str
     name: str
@@ -42,12 +48,25 @@ class Import(NamedTuple):
 
 
 def list_sources(*folders: str) -> list[pathlib.Path]:
-    """Paths of the Python files below these folders, relative to the top."""
+    """List the Python files below some folders.
+
+    Args:
+        folders: relative to the top.
+    Returns:
+        Paths relative to the top.
+    """
     return sorted(path.relative_to(TOP) for folder in folders for path in (TOP / folder).rglob("*.py"))
 
 
 def read_imports(path: pathlib.Path, text: str) -> list[Import]:
-    """All imports in the text of the file at `path` (relative to the top)."""
+    """Read all imports of a file.
+
+    Args:
+        path: relative to the top.
+        text: the file's content.
+    Returns:
+        The imports.
+    """
     found: list[Import] = []
 
     def visit(node: ast.AST, lazy: bool) -> None:
@@ -65,6 +84,7 @@ def read_imports(path: pathlib.Path, text: str) -> list[Import]:
 
 
 def _absolute_names(path: pathlib.Path, node: ast.ImportFrom) -> list[str]:
+    """List the absolute dotted names that a `from ... import` imports."""
     if node.level == 0:
         return [node.module or ""]
     above = path.parts[: len(path.parts) - node.level]
@@ -73,25 +93,25 @@ def _absolute_names(path: pathlib.Path, node: ast.ImportFrom) -> list[str]:
 
 
 def is_below(name: str, prefix: str) -> bool:
-    """Whether a dotted name is a prefix or lies below it."""
+    """Return whether a dotted name is a prefix or lies below it."""
     return name == prefix or name.startswith(prefix + ".")
 
 
 def room_of(name: str) -> str:
-    """The room of a dotted name of the core; "" for what stands at the core's top."""
+    """Find the package of a dotted name of the core; "" for modules at the core's top."""
     inner = name.removeprefix(CORE + ".")
     return GROUND_TRUTH if is_below(inner, GROUND_TRUTH) else inner.partition(".")[0] if "." in inner else ""
 
 
 def layer_of(room: str) -> float:
-    """The height of a room; higher ones import lower ones."""
+    """Find the layer of a package; higher layers import lower ones."""
     if room == GROUND_TRUTH:
         return layer_of("match") - 0.5
     return next((height for height, rooms in enumerate(LAYERS) if room in rooms), len(LAYERS))
 
 
 def may_import(room: str, other: str) -> bool:
-    """Whether a file of `room` may import from `other`."""
+    """Return whether a file of `room` may import from `other`."""
     if room == other or not other:
         return True
     return layer_of(other) < layer_of(room) and (room != "files" or other in FILES_MAY)
@@ -99,19 +119,27 @@ def may_import(room: str, other: str) -> bool:
 
 @functools.cache
 def module_files() -> dict[str, pathlib.Path]:
-    """Dotted name of every module of the product -> its file, relative to the top."""
+    """List the modules of the product.
+
+    Returns:
+        Dotted name -> file, relative to the top.
+    """
     files = list_sources(CORE, "scene", "operators", "panels")
     return {".".join(path.with_suffix("").parts).removesuffix(".__init__"): path for path in files}
 
 
 def file_of(name: str) -> pathlib.Path | None:
-    """The file that an imported dotted name comes from: the module itself, or the one that defines it."""
+    """Find the file of an imported dotted name: the module itself, or the one that defines it."""
     files = module_files()
     return files.get(name) or files.get(name.rpartition(".")[0])
 
 
 def file_graph() -> dict[pathlib.Path, set[pathlib.Path]]:
-    """For each file of the product the files that it imports, inside functions too."""
+    """Build the graph of imports between files, those inside functions included.
+
+    Returns:
+        File -> the files that it imports.
+    """
     graph = {}
     for path in module_files().values():
         imported = (file_of(one.name) for one in read_imports(path, (TOP / path).read_text("utf-8")))
@@ -120,7 +148,13 @@ def file_graph() -> dict[pathlib.Path, set[pathlib.Path]]:
 
 
 def find_circles(graph: dict) -> list[list]:
-    """Groups of nodes that reach one another (Tarjan's strongly connected components of more than one node)."""
+    """Find import cycles: Tarjan's strongly connected components of more than one node.
+
+    Args:
+        graph: node -> the nodes that it reaches directly.
+    Returns:
+        The groups of nodes.
+    """
     sys.setrecursionlimit(max(sys.getrecursionlimit(), 10 * len(graph) + 1000))
     order: dict = {}
     low: dict = {}
@@ -128,6 +162,7 @@ def find_circles(graph: dict) -> list[list]:
     circles: list[list] = []
 
     def visit(node) -> None:
+        # order: discovery number; low: smallest discovery number on the stack that the node reaches.
         order[node] = low[node] = len(order)
         stack.append(node)
         for other in graph.get(node, ()):
@@ -148,7 +183,11 @@ def find_circles(graph: dict) -> list[list]:
 
 
 def room_graph() -> dict[str, set[str]]:
-    """For each room of the core the rooms that it imports; ground truth is left out."""
+    """Build the graph of imports between the core's packages, without ground truth.
+
+    Returns:
+        Package -> the packages that it imports.
+    """
     graph: dict[str, set[str]] = {room: set() for rooms in LAYERS for room in rooms}
     for path, others in file_graph().items():
         room, *below = (room_of(".".join(one.with_suffix("").parts)) for one in (path, *others))
@@ -158,6 +197,6 @@ def room_graph() -> dict[str, set[str]]:
 
 
 def count_side_by_side(*folders: str) -> Iterator[tuple[str, int]]:
-    """(folder, how many Python files lie in it) of each folder."""
+    """Iterate over (folder, number of its Python files) of each folder."""
     parents = [path.parent.as_posix() for path in list_sources(*folders)]
     yield from ((folder, parents.count(folder)) for folder in sorted(set(parents)))

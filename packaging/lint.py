@@ -1,7 +1,7 @@
-"""What Blender's `validate` lets through and a user would meet.
+"""Checks of the extension that Blender's `validate` does not make.
 
-A platform with a typo, a wheel that is not there, a Python without its wheel, a bundled package that the copyright
-does not name, a file in the zip that is not ours to ship.
+A platform with a typo, a missing wheel, a Python version without its wheel, a bundled package that the copyright does
+not name, a file that must not be in the zip.
 """
 
 import tomllib
@@ -14,13 +14,21 @@ NEVER = ("tests/", "benchmarks/", "docs/", "packaging/", "build/", "training/", 
 
 
 def lint_stage(folder, packages, platform):
-    """Complaints about the folder staged for one platform, one line each; empty where all is well."""
+    """Check the folder staged for one platform.
+
+    Args:
+        folder: the staging folder.
+        packages: the bundled packages.
+        platform: the platform.
+    Returns:
+        Complaints, one line each.
+    """
     manifest = tomllib.loads((folder / "blender_manifest.toml").read_text("utf-8"))
     listed = [path.removeprefix("./wheels/") for path in manifest["wheels"]]
     there = {path.name for path in (folder / "wheels").iterdir()}
-    return [*(f"platform {name!r} is none of Blender's" for name in manifest["platforms"] if name not in BLENDERS),
-            *(f"wheel {name} is listed but not there" for name in listed if name not in there),
-            *(f"wheel {name} is there but not listed" for name in sorted(there) if name not in listed),
+    return [*(f"platform {name!r} is not one of Blender's" for name in manifest["platforms"] if name not in BLENDERS),
+            *(f"wheel {name} is listed but missing" for name in listed if name not in there),
+            *(f"wheel {name} exists but is not listed" for name in sorted(there) if name not in listed),
             *(f"licence {name!r} has no SPDX name" for name in manifest["license"] if not name.startswith("SPDX:")),
             *_copyright(manifest, packages), *_coverage(listed, packages, platform)]
 
@@ -33,7 +41,7 @@ def _copyright(manifest, packages):
 
 
 def _coverage(listed, packages, platform):
-    """Every Python gets exactly one wheel of each package, and no wheel serves nobody."""
+    """Check that each Python version gets exactly one wheel of each package, and that each wheel is used."""
     wheels = {name: wheel(name) for name in listed}
     idle = set(listed)
     for python in platform.pythons:
@@ -43,11 +51,18 @@ def _coverage(listed, packages, platform):
             idle -= fitting
             if len(fitting) != 1:
                 yield f"{len(fitting)} wheels of {package.name} for {platform.name}, Python {python}: {sorted(fitting)}"
-    yield from (f"wheel {name} serves no Python of {platform.name}" for name in sorted(idle))
+    yield from (f"wheel {name} fits no Python version of {platform.name}" for name in sorted(idle))
 
 
 def lint_zip(path, platform):
-    """Complaints about a finished zip for one platform."""
+    """Check a finished zip for one platform.
+
+    Args:
+        path: the zip.
+        platform: the platform.
+    Returns:
+        Complaints, one line each.
+    """
     with zipfile.ZipFile(path) as archive:
         names = archive.namelist()
     wheels = [name.removeprefix("wheels/") for name in names if name.startswith("wheels/") and name.endswith(".whl")]
@@ -63,7 +78,7 @@ def lint_zip(path, platform):
             if not any(wheel(name).serves(platform, python) for python in platform.pythons)
         ),
         *(
-            f"{path.name}: lacks {name}"
+            f"{path.name}: {name} is missing"
             for name in ("__init__.py", "LICENSE", "blender_manifest.toml")
             if name not in names
         ),

@@ -1,5 +1,7 @@
-"""Pages made from the code: docs/settings.md from the table of settings, and the tables of providers in
-docs/match/match-input.md from their records. `make tables` in the project's folder writes both."""
+"""Generate pages from the code: docs/settings.md from the settings table, and the tables in docs/match/match-input.md.
+
+`make tables` in the project's folder writes both.
+"""
 
 from __future__ import annotations
 
@@ -13,15 +15,19 @@ SETTINGS_PAGE = TOP / "docs" / "settings.md"
 PROVIDERS_PAGE = TOP / "docs" / "match" / "match-input.md"
 HEAD = """# Settings
 
-All settings, by feature. This page is made from the table in `beyond_mocap/base/settings` by
+All settings, by feature. This page is generated from the table in `beyond_mocap/base/settings` by
 `make tables`; a test checks that it is up to date. Options are those of the command line, panel
-names those in Blender. Files and objects that are only read or written are on the feature's own page.
+names those in Blender. Files and objects that are only read or written are on each feature's own page.
 """
 COLUMNS = ("setting", "option", "in Blender", "default", "limits", "meaning")
 
 
 def settings_page() -> str:
-    """The page as text."""
+    """Build the settings page.
+
+    Returns:
+        The page as text.
+    """
     from beyond_mocap.base.settings import TABLES
 
     parts = [HEAD]
@@ -35,19 +41,19 @@ def settings_page() -> str:
 
 
 def _cells(row) -> list[str]:
-    """The cells of a setting."""
+    """Build the cells of a setting."""
     option = " ".join(f"`{flag}`" for flag in row.option.split())
     return [f"`{row.name}`", option, row.title if row.tooltip else "", _default(row), _limits(row), _meaning(row)]
 
 
 def _default(row) -> str:
-    """The default in code; behind it that of the panel, where it differs."""
+    """Format the default in code, and the panel's if it differs."""
     usual, shown = (_written(value) for value in (row.default, row.panel_more.get("default", row.default)))
     return usual if usual == shown else f"{usual}; in Blender {shown}"
 
 
 def _written(value) -> str:
-    """A value as users write it."""
+    """Format a value as users write it."""
     if isinstance(value, bool):
         return "on" if value else "off"
     if value is None or value in ("", ()):
@@ -58,7 +64,7 @@ def _written(value) -> str:
 
 
 def _limits(row) -> str:
-    """The choices or the limits; those of the option and of the panel where they differ."""
+    """Format the choices or the limits, and those of the option and of the panel if they differ."""
     if row.choices:
         return ", ".join(f"`{name}`" for name in row.choice_names)
     own, option, panel = (row.least, row.most), row.option_more, row.panel_more
@@ -75,7 +81,7 @@ def _range(pair: tuple) -> str:
 
 
 def _meaning(row) -> str:
-    """The sentence of the panel, else that of the option."""
+    """Return the tooltip of the panel, else the help of the option."""
     return row.tooltip or re.sub(r"[;(] ?default %\(default\)[gs]\)?", "", row.help or "").strip()
 
 
@@ -84,7 +90,13 @@ def _line(cells) -> str:
 
 
 def with_tables(text: str) -> str:
-    """The page of providers with the rows of both tables, in their order, as the records have them."""
+    """Replace both tables of providers in a page, in the order of their records.
+
+    Args:
+        text: the page.
+    Returns:
+        The new page.
+    """
     from beyond_mocap.files.event_providers import EVENT_PROVIDERS
     from beyond_mocap.files.tracking.providers import PROVIDERS
 

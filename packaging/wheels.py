@@ -1,9 +1,9 @@
-"""Fetch the wheels of the bundle, once per platform and Python, into a cache outside the clone, and slim kloppy's.
+"""Fetch the bundle's wheels, once per platform and Python version, into a cache outside the clone, and reduce kloppy's.
 
-kloppy goes in without its weight: 213 MB of test recordings, and the HTTP client that only its downloads need. We read
-files that lie on disk. What stays is kloppy's code as released, its licence and its metadata; the metadata no longer
-asks for `fsspec[http]` (the aiohttp family), the version says that something was taken out, and RECORD lists what is
-really there.
+kloppy is bundled without its 213 MB of test recordings and without the HTTP client that only its downloads need; the
+extension reads local files. The rest is kloppy's code as released, its licence and its metadata. The metadata no longer
+requires `fsspec[http]` (the aiohttp family), the version shows that the wheel is reduced, and RECORD lists its actual
+files.
 """
 
 import base64
@@ -23,11 +23,19 @@ from bundle import plain, wheel
 
 CACHE = pathlib.Path(os.environ.get("XDG_CACHE_HOME") or pathlib.Path.home() / ".cache") / "beyond-mocap" / "wheels"
 LEFT_OUT = ("kloppy/tests/",)
-STAMP = (2020, 1, 1, 0, 0, 0)  # the same wheel, bit for bit, whenever it is made
+STAMP = (2020, 1, 1, 0, 0, 0)  # fixed, so that the wheel is reproducible bit for bit
 
 
 def gather(packages, platform, folder):
-    """Put every wheel that this platform needs into `folder`; return the file names, sorted."""
+    """Copy every wheel that a platform needs into a folder.
+
+    Args:
+        packages: the bundled packages.
+        platform: the platform.
+        folder: a new folder.
+    Returns:
+        The file names, sorted.
+    """
     folder.mkdir(parents=True)
     with ThreadPoolExecutor(2) as pool:
         fetched = list(pool.map(lambda python: _fetch(packages, platform, python), platform.pythons))
@@ -41,7 +49,7 @@ def gather(packages, platform, folder):
 
 
 def _fetch(packages, platform, python):
-    """The cached wheels for one platform and Python; downloaded where the cache has not all of them."""
+    """Return the cached wheels for one platform and Python version; download them if the cache is incomplete."""
     pins = [f"{package.name}=={package.version}" for package in packages]
     folder = CACHE / f"{platform.name}-cp{python}"
     if not _complete(folder, packages):
@@ -56,7 +64,7 @@ def _complete(folder, packages):
 
 
 def _download(pins, platform, python, folder):
-    """Download beside the folder and move each file in when it is whole, so that two builds at once do no harm."""
+    """Download to a temporary folder and move complete files, so that simultaneous builds do not interfere."""
     print(f"wheels: fetching {len(pins)} packages for {platform.name}, Python {python[0]}.{python[1:]}", flush=True)
     folder.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=CACHE) as fresh:
@@ -70,7 +78,15 @@ def _download(pins, platform, python, folder):
 
 
 def slim(source, folder, package):
-    """Write the slimmed wheel of `source` (a path) into `folder` and return its path."""
+    """Write the reduced wheel of a package.
+
+    Args:
+        source: the released wheel.
+        folder: the folder to write to.
+        package: the package.
+    Returns:
+        The new wheel's path.
+    """
     old, new = (f"{package.name}-{version}" for version in (package.version, package.bundled_version))
     target = folder / source.name.replace(old, new)
     files = {name.replace(f"{old}.dist-info/", f"{new}.dist-info/"): text for name, text in _kept(source)}
@@ -92,7 +108,7 @@ def _kept(source):
 
 
 def _slim_metadata(text, package):
-    """The same metadata with the marked version and fsspec without its "http" extra."""
+    """Return the metadata with the marked version and with fsspec without its "http" extra."""
     head, gap, description = text.partition("\n\n")
     lines = [line.replace("fsspec[http]", "fsspec") for line in head.splitlines()]
     lines[lines.index(f"Version: {package.version}")] = f"Version: {package.bundled_version}"

@@ -1,4 +1,4 @@
-"""The "Beyond Mocap" tab in the 3D viewport's sidebar: a module per feature, shown in the order of `bl_order`."""
+"""The "Beyond Mocap" tab in the 3D viewport's sidebar: one module per feature, displayed in the order of `bl_order`."""
 
 from ..scene.core import registration
 
@@ -9,5 +9,5 @@ def register():
 
 
 def unregister():
-    """Undo it, the last step first."""
+    """Unregister them in reverse order."""
     registration.unregister_package(__name__)

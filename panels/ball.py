@@ -1,5 +1,6 @@
-"""Ball & Passes: the panel and its parts: players who keep a ball going; the ball tracked, struck, carried, aimed; live
-streams, in which a user's own motion arrives while it is made."""
+"""Panel "Ball & Passes" and its sections: players who pass a ball; the ball tracked, struck, carried and aimed; live
+streams, which receive a user's motion while it is performed.
+"""
 
 from __future__ import annotations
 
@@ -31,14 +32,14 @@ class BEYOND_MOCAP_UL_touches(bpy.types.UIList):
 
 
 class BEYOND_MOCAP_PT_ball(Step, bpy.types.Panel):
-    """The ball and the players who keep it going."""
+    """The ball and the players who pass it."""
 
     bl_label = "Ball & Passes"
     bl_order = 8
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context):
-        """Its parts, each folded until it is wanted."""
+        """Draw the sections; most are closed at first."""
         layout = self.layout
         section(layout, "ball_scene", "Passing Scene", lambda opened: passing(self, opened, context), closed=False)
         section(layout, "ball_tracked", "Ball from Tracking", lambda opened: tracked(self, opened, context))
@@ -61,13 +62,13 @@ def tracked(panel, layout, context) -> None:
     layout.template_list("BEYOND_MOCAP_UL_touches", "", settings, "touches", settings, active_propname="active_touch",
                          rows=5)
     if touch := active_row(settings.touches, settings.active_touch):
-        layout.label(text=f"{touch.kind} by the {touch.part}, {touch.confidence:.0%} sure")
+        layout.label(text=f"{touch.kind} by the {touch.part}, confidence {touch.confidence:.0%}")
         row = layout.row(align=True)
         row.prop(touch, "words", text="")
         row.operator("beyond_mocap.jump_to", text="", icon="PLAY").seconds = touch.time
     row = layout.row(align=True)
     row.operator("beyond_mocap.accept_touches", icon="CHECKMARK")
-    row.operator("beyond_mocap.accept_touches", text="of Active").active = True
+    row.operator("beyond_mocap.accept_touches", text="Of Active").active = True
 
 
 def hits(layout, context) -> None:
@@ -124,7 +125,7 @@ def carried(layout, context) -> None:
 
 
 def aim(layout, context) -> None:
-    """The button; of the ball that is meant, who strikes it, towards what and how, and what comes of it."""
+    """Draw the button, and the aimed ball's settings and result."""
     ball = aimed_ball(context)
     layout.operator("beyond_mocap.aim_ball", icon="CON_TRACKTO", text="Aim Again" if ball is not None else "Aim Ball")
     if ball is not None:
@@ -133,7 +134,7 @@ def aim(layout, context) -> None:
 
 
 def of_aimed_ball(layout, ball) -> None:
-    """An aimed ball's settings and figures."""
+    """Draw an aimed ball's settings and figures."""
     settings = ball.beyond_mocap_aim
     row = layout.row(align=True)
     row.label(text=ball.name, icon="SPHERE")
@@ -166,7 +167,7 @@ def of_aimed_ball(layout, ball) -> None:
 
 
 def physics(layout, context, ball) -> None:
-    """To Blender's rigid bodies and back."""
+    """Draw the handover to Blender's rigid bodies and back."""
     row = layout.row(align=True)
     if ball is not None and ball.beyond_mocap_aim.handed:
         row.operator("beyond_mocap.ball_from_physics", icon="LOOP_BACK")
@@ -275,7 +276,7 @@ def passing(panel, layout, context) -> None:
         paragraph(layout, line, "INFO")
     if settings.strikes:
         section(layout, "ball_strikes", "Strikes", lambda opened: strikes(opened, settings))
-    section(layout, "ball_choices", "Choices", lambda opened: choices(opened, settings))
+    section(layout, "ball_choices", "Options", lambda opened: choices(opened, settings))
     section(layout, "ball_ball", "Ball & Air", lambda opened: of_ball(opened, settings))
 
 

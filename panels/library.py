@@ -1,4 +1,4 @@
-"""Step 1: which clips we choose from."""
+"""Step 1: the library of clips."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ STATES = {"OPEN": "RADIOBUT_OFF", "ACCEPTED": "CHECKMARK", "REFUSED": "X"}
 
 
 class BEYOND_MOCAP_UL_clips(bpy.types.UIList):
-    """The clips of the library that fit what is looked for: quality, name, words, length, and a button that imports."""
+    """The clips that match the search: quality, name, label, and a button that imports."""
 
     def draw_item(self, _context, layout, _data, clip, _icon, _active_data, _active_property):
         row = layout.row(align=True)
@@ -21,11 +21,11 @@ class BEYOND_MOCAP_UL_clips(bpy.types.UIList):
         row.operator("beyond_mocap.import_clip", text="", icon="IMPORT", emboss=False).path = clip.path
 
     def draw_filter(self, _context, _layout):
-        """Filter and order stand above the list, and work there for any number of clips."""
+        """Draw nothing: search and order are above the list, where they work for any number of clips."""
 
 
 class BEYOND_MOCAP_UL_proposals(bpy.types.UIList):
-    """What was proposed for a clip: what became of it, the words, how sure they are, and buttons to judge them."""
+    """The proposals for a clip: state, labels, confidence, and buttons to review them."""
 
     def draw_item(self, _context, layout, _data, one, _icon, _active_data, _active_property, index=0):
         row = layout.row(align=True)
@@ -38,23 +38,23 @@ class BEYOND_MOCAP_UL_proposals(bpy.types.UIList):
             button.what, button.index = what, index
 
     def draw_filter(self, _context, _layout):
-        """The list is short."""
+        """Draw nothing: the list is short."""
 
 
 class BEYOND_MOCAP_PT_library(Step, bpy.types.Panel):
-    """The library's folder, what it holds, its clips, and tools."""
+    """The library's folder, its content, its clips, and tools."""
 
     bl_label = "1  Library"
     bl_order = 1
 
     def draw(self, context):
-        """Folder, button, what was found, the clips."""
+        """Draw folder, button, content and clips."""
         layout, settings = self.layout, context.scene.beyond_mocap
         listing = context.window_manager.beyond_mocap_clips
         layout.prop(settings, "library_folder", text="")
         if listing.missing:
             box = layout.box()
-            paragraph(box, "This folder is not there.", "ERROR")
+            paragraph(box, "This folder does not exist", "ERROR")
             box.operator("beyond_mocap.relink_library", icon="FILE_FOLDER")
         row = layout.row(align=True)
         row.scale_y = 1.3
@@ -63,8 +63,8 @@ class BEYOND_MOCAP_PT_library(Step, bpy.types.Panel):
         current = listing.folder == settings.library_folder
         if current and listing.news:
             box = layout.box()
-            paragraph(box, f"{listing.news}. Building reads the whole folder anew.", "INFO")
-            box.operator("beyond_mocap.build_library", text="Build Anew", icon="FILE_REFRESH")
+            paragraph(box, f"{listing.news}; build the library again to use them", "INFO")
+            box.operator("beyond_mocap.build_library", text="Build Again", icon="FILE_REFRESH")
         first, *held = settings.library_holds.splitlines() or ("",)
         if held:
             if body := part(layout, "library_holds", first):
@@ -79,7 +79,7 @@ class BEYOND_MOCAP_PT_library(Step, bpy.types.Panel):
 
 
 def draw_clips(layout, settings, listing, current) -> None:
-    """The list and what it says of the chosen clip."""
+    """Draw the list and the details of the chosen clip."""
     if not current or not listing.total:
         layout.operator("beyond_mocap.list_clips", icon="PRESET")
         return
@@ -89,12 +89,12 @@ def draw_clips(layout, settings, listing, current) -> None:
     row.operator("beyond_mocap.list_clips", text="", icon="FILE_REFRESH")
     layout.template_list("BEYOND_MOCAP_UL_clips", "", listing, "shown", listing, active_propname="active", rows=6)
     if not 0 <= listing.active < len(listing.shown):
-        layout.label(text="No clip fits", icon="INFO")
+        layout.label(text="No matching clips", icon="INFO")
         return
     clip = listing.shown[listing.active]
     column = layout.column(align=True)
     paragraph(column, clip.path, "FILE")
-    paragraph(column, clip.words.replace("_", " ") or "no words: the library does not use it", "BOOKMARKS")
+    paragraph(column, clip.words.replace("_", " ") or "No labels: the library does not use this clip", "BOOKMARKS")
     paragraph(column, clip.figures, "TIME")
     table(column, clip.told.splitlines())
     row = layout.row(align=True)
@@ -105,23 +105,23 @@ def draw_clips(layout, settings, listing, current) -> None:
 
 
 def draw_assets(layout, listing) -> None:
-    """Clips for the Asset Browser."""
+    """Draw buttons that make assets of clips."""
     column = layout.column(align=True)
-    column.operator("beyond_mocap.make_assets", text="Chosen Clip in This File", icon="ASSET_MANAGER").which = "CHOSEN"
-    for apart, text, icon in ((False, "in This File", "ASSET_MANAGER"), (True, "as a File ...", "FILE_BLEND")):
-        button = column.operator("beyond_mocap.make_assets", text=f"{len(listing.shown)} Shown {text}", icon=icon)
+    column.operator("beyond_mocap.make_assets", text="Chosen Clip, This File", icon="ASSET_MANAGER").which = "CHOSEN"
+    for apart, text, icon in ((False, "Listed, This File", "ASSET_MANAGER"), (True, "Listed, New File", "FILE_BLEND")):
+        button = column.operator("beyond_mocap.make_assets", text=f"{len(listing.shown)} {text}", icon=icon)
         button.which, button.apart = "SHOWN", apart
     column.operator("beyond_mocap.make_assets", text="Selected Armatures", icon="ARMATURE_DATA").which = "SELECTED"
 
 
 def draw_opened(layout, thing, settings) -> None:
-    """What can be done with a clip that is in the scene."""
+    """Draw the operators for a clip that is in the scene."""
     box = layout.box()
     box.label(text=thing.name, icon="ARMATURE_DATA")
     column = box.column(align=True)
     row = column.row(align=True)
     row.operator("beyond_mocap.propose_words", icon="LIGHT")
-    row.operator("beyond_mocap.propose_words", text="Look Through", icon="VIEWZOOM").review = True
+    row.operator("beyond_mocap.propose_words", text="Review", icon="VIEWZOOM").review = True
     row = column.row(align=True)
     row.prop(settings, "words_model", text="")
     row.operator("beyond_mocap.learn_words", text="Learn", icon="OUTLINER_OB_LIGHTPROBE")
@@ -133,7 +133,7 @@ def draw_opened(layout, thing, settings) -> None:
 
 
 def draw_proposals(layout, group) -> None:
-    """What was proposed, and the keys to judge it."""
+    """Draw the list of proposals and its buttons."""
     layout.template_list("BEYOND_MOCAP_UL_proposals", "", group, "listed", group, active_propname="active", rows=4)
     if 0 <= group.active < len(group.listed):
         one = group.listed[group.active]
@@ -147,7 +147,7 @@ def draw_proposals(layout, group) -> None:
 
 
 def draw_tools(body, settings) -> None:
-    """What is seldom needed."""
+    """Draw rarely needed settings and operators."""
     body.use_property_split, body.use_property_decorate = True, False
     body.prop(settings, "library_unit")
     body.prop(settings, "library_watch")

@@ -1,4 +1,4 @@
-"""Optical Markers: a recording of markers, what they are on, and the body that moved under them."""
+"""The panel Optical Markers: a recording, its labels, and the reconstructed body."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import bpy
 from ..scene.markers.settings import active_label, cloud_meant
 from .tab import Step, paragraph, section, split, table
 
-MOST = 6  # lines of what was told
+MOST = 6  # messages that are shown
 ROLE_ICONS = {"OPTIONAL": "CHECKBOX_DEHLT", "STATIC": "ARMATURE_DATA", "BALL": "MESH_UVSPHERE", "OTHER": "CANCEL"}
 
 
@@ -15,6 +15,7 @@ class BEYOND_MOCAP_UL_markers(bpy.types.UIList):
     """The markers of a cloud."""
 
     def draw_item(self, _context, layout, _data, item, _icon, _active_data, _active_property):
+        """Draw a marker: label, segment or role, and how often it is visible."""
         row = layout.split(factor=0.38)
         row.prop(item, "name", text="", emboss=False)
         right = row.split(factor=0.64)
@@ -27,14 +28,14 @@ class BEYOND_MOCAP_UL_markers(bpy.types.UIList):
 
 
 class BEYOND_MOCAP_PT_markers(Step, bpy.types.Panel):
-    """Recordings of optical markers, and the way from them to a body."""
+    """Recordings of optical markers, and their reconstruction."""
 
     bl_label = "Optical Markers"
     bl_order = 11
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context):
-        """The active cloud, part by part."""
+        """Draw the active cloud, section by section."""
         layout, cloud = self.layout, cloud_meant(context)
         layout.operator("beyond_mocap.import_markers", icon="IMPORT")
         settings = context.scene.beyond_mocap_markers
@@ -56,7 +57,7 @@ class BEYOND_MOCAP_PT_markers(Step, bpy.types.Panel):
 
 
 def labels(layout, kept) -> None:
-    """The list, and what is known of the marker that is chosen."""
+    """Draw the list and the properties of the active marker."""
     row = layout.row(align=True)
     row.operator_menu_enum("beyond_mocap.use_marker_set", "which", text=kept.set_name or "Marker Set", icon="PRESET")
     row.operator("beyond_mocap.load_marker_set", text="", icon="FILE_FOLDER")
@@ -71,7 +72,7 @@ def labels(layout, kept) -> None:
 
 
 def lines(layout, text: str, icon: str) -> None:
-    """The first lines of a text, and how many more there are."""
+    """Draw the first lines of a text, and how many more there are."""
     told = text.splitlines()
     for line in told[:MOST]:
         paragraph(layout, line, icon)
@@ -80,14 +81,14 @@ def lines(layout, text: str, icon: str) -> None:
 
 
 def clean(panel, layout, context, kept) -> None:
-    """The button, and what was done."""
+    """Draw the clean-up button and its report."""
     layout.operator("beyond_mocap.clean_markers", icon="BRUSH_DATA")
     panel.progress(context, "clean markers")
     lines(layout, kept.cleaned, "DOT")
 
 
 def model(layout, kept) -> None:
-    """From what the body's joints are found."""
+    """Draw static trial and model."""
     column = split(layout)
     column.prop(kept, "static")
     layout.operator("beyond_mocap.set_static", icon="ARMATURE_DATA")
@@ -100,7 +101,7 @@ def model(layout, kept) -> None:
 
 
 def pose(panel, layout, context, kept) -> None:
-    """The settings, the button, and what came out."""
+    """Draw the settings of the reconstruction, its button and its figures."""
     settings = context.scene.beyond_mocap_markers
     column = split(layout)
     column.prop(settings, "filter")
@@ -119,7 +120,7 @@ def pose(panel, layout, context, kept) -> None:
 
 
 def release(panel, layout, context, kept) -> None:
-    """When and how the ball left the hand."""
+    """Draw settings, button and figures of the release."""
     settings = context.scene.beyond_mocap_markers
     column = split(layout)
     for name in ("hand", "thrown", "radius"):

@@ -1,4 +1,4 @@
-"""Match: a whole match from a provider's files, everybody at once."""
+"""Panel "Match": a whole match from a provider's files, all players together."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ import bpy
 from ..scene.match.settings import active_of
 from .tab import Step, paragraph, section, split
 
-LINES = 12  # of the data report that the panel shows
+LINES = 12  # lines of a report shown in the panel
 TEAM_ICONS = {"home": "EVENT_H", "away": "EVENT_A", "referee": "EVENT_R"}
 
 
 class BEYOND_MOCAP_UL_match(bpy.types.UIList):
-    """Everybody in the match, with team and number; a tick for those who are made and shown."""
+    """Players of the match, with team and number, and a checkbox to include them."""
 
     def draw_item(self, _context, layout, _data, item, _icon, _active_data, _active_property):
         row = layout.row(align=True)
@@ -25,14 +25,14 @@ class BEYOND_MOCAP_UL_match(bpy.types.UIList):
 
 
 class BEYOND_MOCAP_PT_match(Step, bpy.types.Panel):
-    """Which match, which minute, who, and what it becomes."""
+    """Files, players, time and result of a match."""
 
     bl_label = "Match"
     bl_order = 10
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context):
-        """Files, the list, the stretch, the buttons."""
+        """Draw files, list, time and buttons."""
         layout, match = self.layout, context.scene.beyond_mocap_match
         column = split(layout)
         column.prop(match, "tracking_file")
@@ -40,7 +40,7 @@ class BEYOND_MOCAP_PT_match(Step, bpy.types.Panel):
         layout.operator("beyond_mocap.read_match", icon="FILE_REFRESH")
         self.progress(context, "match file")
         if not match.tracking_file:
-            paragraph(layout, "Choose a provider's tracking of a match, or drop it into the view", "INFO")
+            paragraph(layout, "Choose a provider's tracking file, or drop it into the view", "INFO")
         if match.players:
             people(layout, match)
         if match.report:
@@ -48,7 +48,7 @@ class BEYOND_MOCAP_PT_match(Step, bpy.types.Panel):
         column = split(layout)
         for name in ("start", "end", "folder"):
             column.prop(match, name)
-        section(layout, "match_work", "Work", lambda opened: work(opened, context.scene))
+        section(layout, "match_work", "Processing", lambda opened: work(opened, context.scene))
         row = layout.row(align=True)
         row.scale_y = 1.3
         row.operator("beyond_mocap.make_match", icon="PLAY")
@@ -59,7 +59,7 @@ class BEYOND_MOCAP_PT_match(Step, bpy.types.Panel):
 
 
 def more_files(layout, match) -> None:
-    """What the tracking file's name does not lead to."""
+    """Draw the files that are not found from the tracking file's name."""
     column = split(layout)
     for name in ("metadata_file", "provider", "events_file"):
         column.prop(match, name)
@@ -69,10 +69,10 @@ def more_files(layout, match) -> None:
 
 
 def people(layout, match) -> None:
-    """The list, ticks for many at once, and the teams' colours."""
+    """Draw the list, buttons to select many players, and the teams' colours."""
     layout.template_list("BEYOND_MOCAP_UL_match", "", match, "players", match, active_propname="active", rows=5)
     row = layout.row(align=True)
-    for whom, text in (("ALL", "All"), ("NONE", "None"), ("home", "Home"), ("away", "Away"), ("ONE", "Chosen")):
+    for whom, text in (("ALL", "All"), ("NONE", "None"), ("home", "Home"), ("away", "Away"), ("ONE", "Active")):
         row.operator("beyond_mocap.tick_match", text=text).whom = whom
     row = layout.row(align=True)
     for team in ("home", "away", "referee"):
@@ -80,7 +80,7 @@ def people(layout, match) -> None:
 
 
 def told(layout, lines: str) -> None:
-    """What was guessed and put right."""
+    """Draw messages about detected and corrected data."""
     found = lines.splitlines()
     for line in found[:LINES]:
         paragraph(layout, line, "DOT")
@@ -89,7 +89,7 @@ def told(layout, lines: str) -> None:
 
 
 def work(layout, scene) -> None:
-    """Who does it, and how."""
+    """Draw how the work is done."""
     match = scene.beyond_mocap_match
     column = split(layout)
     for name in ("solve_touches", "workers", "scheduler", "first_frame"):
@@ -98,7 +98,7 @@ def work(layout, scene) -> None:
 
 
 def look(layout, match) -> None:
-    """The cameras, and lines about what is shown."""
+    """Draw the cameras, and messages about the displayed match."""
     row = layout.row(align=True)
     row.operator("beyond_mocap.match_camera", text="Broadcast", icon="VIEW_CAMERA").which = "STAND"
     chosen = active_of(match)

@@ -1,4 +1,4 @@
-"""Players: their list with its pins, and within it annotating by keys and the reference video."""
+"""Players: their list with its pins, annotation by keys and the reference video."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from .tab import Step, paragraph, part, split
 
 
 class BEYOND_MOCAP_UL_players(bpy.types.UIList):
-    """Players with their shirts; a tick for those that the next steps are about."""
+    """Players with their shirts; a check box selects those that the next steps use."""
 
     def draw_item(self, _context, layout, _data, item, _icon, _active_data, _active_property):
         row = layout.row(align=True)
@@ -22,13 +22,13 @@ class BEYOND_MOCAP_UL_players(bpy.types.UIList):
 
 
 class BEYOND_MOCAP_PT_players(Step, bpy.types.Panel):
-    """Who plays, where they run, and what is said about it."""
+    """The players, their tracks and their labels."""
 
-    bl_label = "2  Track & Words"
+    bl_label = "2  Track & Labels"
     bl_order = 2
 
     def draw(self, context):
-        """List of players, and the files of the active one."""
+        """Draw the list of players, and the files of the active one."""
         layout, settings = self.layout, context.scene.beyond_mocap
         layout.operator("beyond_mocap.import_tracking", icon="IMPORT")
         row = layout.row(align=True)
@@ -42,7 +42,7 @@ class BEYOND_MOCAP_PT_players(Step, bpy.types.Panel):
             layout.operator("beyond_mocap.place_players", icon="NLA")
         player = active_player(settings)
         if player is None:
-            paragraph(layout, "Import a file with positions, drop it into the view, or draw a track", "INFO")
+            paragraph(layout, "Import a tracking file, drop one into the view, or draw a track", "INFO")
             return
         column = split(layout)
         column.prop(player, "drawn_track")
@@ -55,7 +55,7 @@ class BEYOND_MOCAP_PT_players(Step, bpy.types.Panel):
             column.prop(settings, "section_start")
             column.prop(settings, "section_end")
         file = column.column()
-        file.active = player.annotation_text is None  # the text counts more
+        file.active = player.annotation_text is None  # the text has priority
         file.prop(player, "annotation_file")
         row = column.row(align=True)
         row.prop(player, "annotation_text")
@@ -66,27 +66,27 @@ class BEYOND_MOCAP_PT_players(Step, bpy.types.Panel):
 
 
 class BEYOND_MOCAP_UL_pins(bpy.types.UIList):
-    """A player's pins: what is held, when and how long."""
+    """A player's pins: the part, its time and its duration."""
 
     def draw_item(self, _context, layout, _data, item, _icon, _active_data, _active_property):
         row = layout.row(align=True)
         row.prop(item, "part", text="", emboss=False)
         if item.target is None:
-            row.label(text="its Empty is gone", icon="ERROR")
+            row.label(text="Empty is missing", icon="ERROR")
             return
         row.prop(item, "time", text="")
         row.prop(item, "hold", text="")
 
 
 def drawn_on(column, player) -> None:
-    """What belongs to a drawn track."""
+    """Draw the settings of a drawn track."""
     if player.drawn_track.type == "CURVE":
         column.prop(player, "drawn_start")
         column.operator("beyond_mocap.set_speed", icon="DRIVER_DISTANCE")
 
 
 def own(layout, player) -> None:
-    """What is this player's own: height, foot, style."""
+    """Draw the settings of this player: height, foot, style."""
     if body := part(layout, "player_own", "Player"):
         body.use_property_split, body.use_property_decorate = True, False
         for name in ("height", "strong_foot", "style", "style_weight"):
@@ -94,7 +94,7 @@ def own(layout, player) -> None:
 
 
 def pinned(layout, player) -> None:
-    """Where hands, feet and gaze have to be."""
+    """Draw the pins of hands, feet and gaze."""
     if body := part(layout, "player_pins", f"Pins: {len(player.pins)}" if player.pins else "Pins"):
         row = body.row()
         row.template_list("BEYOND_MOCAP_UL_pins", "", player, "pins", player, active_propname="active_pin", rows=2)
@@ -105,13 +105,13 @@ def pinned(layout, player) -> None:
 
 
 class BEYOND_MOCAP_PT_annotate(Step, bpy.types.Panel):
-    """Where annotating begins."""
+    """Start of annotation."""
 
     bl_label = "Annotate"
     bl_parent_id = "BEYOND_MOCAP_PT_players"
 
     def draw(self, context):
-        """The button, and one for the editor of strips."""
+        """Draw the button that starts annotation, and one for the strip editor."""
         row = self.layout.row(align=True)
         row.scale_y = 1.3
         row.operator("beyond_mocap.annotate", icon="SYNTAX_ON", text="Annotate by Keys")
@@ -126,7 +126,7 @@ class BEYOND_MOCAP_PT_video(Step, bpy.types.Panel):
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context):
-        """Load it, or where it is."""
+        """Draw the load button, and the video's settings."""
         layout, video = self.layout, context.scene.beyond_mocap.video
         row = layout.row(align=True)
         row.operator("beyond_mocap.load_video", icon="FILE_MOVIE", text=video.clip.name if video.clip else None)

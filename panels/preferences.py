@@ -1,8 +1,6 @@
-"""What stands in Blender's own places: the add-on's page in the preferences (where caches go, threads, keys), and
-entries of the menus.
+"""The extension's page in Blender's preferences (cache folder, threads, keys), and its menu entries.
 
-The keys that are drawn are the user's own configuration, found by our operators' names, so that changes are kept by
-Blender.
+The displayed keys are those of the user's configuration, found by the operators' names, so that Blender stores changes.
 """
 
 from __future__ import annotations
@@ -15,7 +13,7 @@ from .tab import part
 
 
 def draw_keys(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
-    """A row for every key of the extension, under the name of the editor in which it works."""
+    """Draw a row for every key of the extension, under the name of its editor."""
     configurations = context.window_manager.keyconfigs
     for keymap in _with_our_keys(configurations.addon):
         own = configurations.user.keymaps.find(keymap.name, space_type=keymap.space_type,
@@ -31,12 +29,12 @@ def draw_keys(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
 
 
 class BeyondMocapPreferences(Preferences, bpy.types.AddonPreferences):
-    """Cache folder, threads, and every key of the extension."""
+    """Cache folder, threads and keys of the extension."""
 
     bl_idname = EXTENSION
 
     def draw(self, context):
-        """Two settings, then the keys."""
+        """Draw the settings, then the keys."""
         layout = self.layout
         column = layout.column()
         column.use_property_split = True
@@ -47,33 +45,33 @@ class BeyondMocapPreferences(Preferences, bpy.types.AddonPreferences):
 
 
 def draw_import(self, _context):
-    """File > Import."""
+    """Draw the entries of File > Import."""
     self.layout.operator("beyond_mocap.import_clips", text="Beyond Mocap Clips (.bvh, .fbx ...)")
     self.layout.operator("beyond_mocap.import_tracking", text="Beyond Mocap Tracking (.csv ...)")
     self.layout.operator("beyond_mocap.import_markers", text="Beyond Mocap Optical Markers (.c3d, .trc)")
 
 
 def draw_export(self, _context):
-    """File > Export."""
+    """Draw the entries of File > Export."""
     self.layout.operator("beyond_mocap.export_bvh", text="Beyond Mocap Motion (.bvh)")
     self.layout.operator("beyond_mocap.study_render", text="Beyond Mocap Study Clips (.mp4)")
 
 
 def draw_strip(self, _context):
-    """The context menu of strips in the NLA editor."""
+    """Draw the entries of the strips' context menu in the NLA editor."""
     self.layout.separator()
     self.layout.operator("beyond_mocap.resynthesize_stretch", icon="UV_SYNC_SELECT")
 
 
 def register():
-    """Append ours."""
+    """Add the menu entries."""
     bpy.types.NLA_MT_context_menu.append(draw_strip)
     bpy.types.TOPBAR_MT_file_import.append(draw_import)
     bpy.types.TOPBAR_MT_file_export.append(draw_export)
 
 
 def unregister():
-    """Take ours away."""
+    """Remove the menu entries."""
     bpy.types.NLA_MT_context_menu.remove(draw_strip)
     bpy.types.TOPBAR_MT_file_import.remove(draw_import)
     bpy.types.TOPBAR_MT_file_export.remove(draw_export)

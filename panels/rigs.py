@@ -1,4 +1,4 @@
-"""Step 5: onto the user's own rig, and into a file."""
+"""Step 5: the motion on the user's own rig, and in a file."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class BEYOND_MOCAP_UL_bones(bpy.types.UIList):
 
 
 class BEYOND_MOCAP_PT_rig(Step, bpy.types.Panel):
-    """Which rig, its bones, how to bake; and export."""
+    """The rig, its bones, bake settings and export."""
 
     bl_label = "5  Rig & Export"
     bl_order = 5
@@ -52,17 +52,17 @@ class BEYOND_MOCAP_PT_rig(Step, bpy.types.Panel):
         self.draw_export(layout, rig)
 
     def draw_map(self, layout, rig) -> None:
-        """The bone map."""
+        """Draw the bone map."""
         if body := part(layout, "bone_map", "Bone Map"):
             body.template_list("BEYOND_MOCAP_UL_bones", "", rig, "bones", rig, active_propname="active_bone", rows=8)
             row = body.row(align=True)
             row.operator("beyond_mocap.map_bones", text="Map", icon="FILE_REFRESH")
-            row.operator("beyond_mocap.keep_bone_map", text="Keep", icon="PINNED")
+            row.operator("beyond_mocap.keep_bone_map", text="Store", icon="PINNED")
             row.operator("beyond_mocap.load_bone_map", text="", icon="FILEBROWSER")
             row.operator("beyond_mocap.save_bone_map", text="", icon="FILE_TICK")
 
     def draw_export(self, layout, rig) -> None:
-        """What goes out, and how."""
+        """Draw the export settings."""
         if body := part(layout, "export", "Export", closed=False):
             body.use_property_split, body.use_property_decorate = True, False
             for name in ("format", "engine", "who", "own_rate", "deform_only", "meshes"):

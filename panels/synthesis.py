@@ -1,4 +1,4 @@
-"""Synthesize: the step's settings, its button and its presets."""
+"""Panel of Synthesize: the step's button, its progress, its settings and presets."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from .tab import Step, part
 
 
 class BEYOND_MOCAP_MT_presets(bpy.types.Menu):
-    """The presets as a menu."""
+    """Menu of the synthesis presets."""
 
     bl_label = "Synthesis Presets"
     preset_subdir = "beyond_mocap/synthesis"
@@ -18,7 +18,7 @@ class BEYOND_MOCAP_MT_presets(bpy.types.Menu):
 
 
 class BEYOND_MOCAP_PT_presets(PresetPanel, bpy.types.Panel):
-    """The presets, with buttons that add and remove one."""
+    """Popover of the synthesis presets, with buttons that add and remove one."""
 
     bl_label = "Synthesis Presets"
     preset_subdir = "beyond_mocap/synthesis"
@@ -27,7 +27,7 @@ class BEYOND_MOCAP_PT_presets(PresetPanel, bpy.types.Panel):
 
 
 class BEYOND_MOCAP_PT_synthesis(Step, bpy.types.Panel):
-    """The button, and how it goes about it."""
+    """Synthesize button, progress and settings."""
 
     bl_label = "3  Synthesize"
     bl_order = 3
@@ -43,7 +43,7 @@ class BEYOND_MOCAP_PT_synthesis(Step, bpy.types.Panel):
         row.operator("beyond_mocap.update", icon="FILE_REFRESH")
         row.prop(settings, "live", text="", icon="UV_SYNC_SELECT")
         self.queue(context)
-        if body := part(layout, "synthesis_more", "Choices"):
+        if body := part(layout, "synthesis_more", "Settings"):
             body.use_property_split, body.use_property_decorate = True, False
             body.prop(settings, "method")
             if settings.method == "distance":
@@ -53,7 +53,7 @@ class BEYOND_MOCAP_PT_synthesis(Step, bpy.types.Panel):
             self.fine_tuning(body, settings)
 
     def queue(self, context):
-        """What is being made, how far it is, and who waits."""
+        """Draw the running job, its progress, and the waiting players."""
         running = context.window_manager.beyond_mocap_work
         if running.trouble:
             self.layout.label(text=running.trouble, icon="ERROR")
@@ -68,12 +68,12 @@ class BEYOND_MOCAP_PT_synthesis(Step, bpy.types.Panel):
         row.operator("beyond_mocap.cancel", text="Cancel", icon="X")
         for name in running.waiting.splitlines():
             row = box.row(align=True)
-            row.label(text=f"{name} waits", icon="TIME")
+            row.label(text=f"{name} (waiting)", icon="TIME")
             row.operator("beyond_mocap.cancel", text="", icon="X", emboss=False).player = name
 
     def fine_tuning(self, layout, settings):
-        """What seldom needs another value, closed at first."""
-        body = part(layout, "synthesis_tuning", "Fine Tuning")
+        """Draw the settings that seldom need another value, closed at first."""
+        body = part(layout, "synthesis_tuning", "Fine-Tuning")
         if not body:
             return
         for name in settings.list_tuning():

@@ -1,4 +1,4 @@
-"""What all steps of the "Beyond Mocap" tab share."""
+"""Layout functions shared by all panels of the "Beyond Mocap" tab."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ import textwrap
 
 import bpy
 
-LETTER = 5.7  # pixels that a letter of the interface takes on the average, at a scale of 1
+LETTER = 5.7  # mean width of an interface letter in pixels, at a scale of 1
 MARKS = {"met": "CHECKMARK", "missed": "ERROR", "": "BLANK1"}
-EDGES = 70  # pixels of a sidebar that are no text: tabs, the box and its icon
+EDGES = 70  # pixels of a sidebar without text: tabs, the box and its icon
 
 
 def table(layout, lines) -> None:
-    """Lines "name: value" in two columns; a line without a colon goes right across."""
+    """Draw lines "name: value" in two columns; a line without a colon fills the width."""
     column = layout.column(align=True)
     column.scale_y = 0.85
     for line in lines:
@@ -26,7 +26,7 @@ def table(layout, lines) -> None:
 
 
 def paragraph(layout, text: str, icon: str) -> None:
-    """Text over as many lines as the sidebar's width asks for, since labels are cut; an icon before the first."""
+    """Draw text over as many lines as the sidebar's width needs, because labels are cut; an icon precedes the first."""
     column = layout.column(align=True)
     column.scale_y = 0.85
     for number, line in enumerate(wrapped(text)):
@@ -34,7 +34,7 @@ def paragraph(layout, text: str, icon: str) -> None:
 
 
 def figures(layout, text: str) -> None:
-    """Lines "name: value", target and status with tabs between: whether it is met as a mark."""
+    """Draw lines "name: value" with target and status separated by tabs; an icon shows whether the target is met."""
     column = layout.column(align=True)
     column.scale_y = 0.85
     for line in text.splitlines():
@@ -50,40 +50,50 @@ def figures(layout, text: str) -> None:
 
 
 def wrapped(text: str) -> list[str]:
-    """Text as lines that fit the sidebar's width."""
+    """Wrap text to the sidebar's width."""
     width = bpy.context.region.width / bpy.context.preferences.system.ui_scale
     return textwrap.wrap(text, max(16, int((width - EDGES) / LETTER)))
 
 
 def part(layout, name: str, title: str, closed: bool = True, icon: str = "NONE"):
-    """A part that can be folded, to draw into; None while it is closed. name: its own among all panels."""
+    """Draw the header of a collapsible part.
+
+    Args:
+        layout: the layout to draw into.
+        name: identifier, unique among all panels.
+        title: the header's text.
+        closed: whether it is closed at first.
+        icon: Blender's icon name.
+    Returns:
+        The layout of its body; None while it is closed.
+    """
     header, body = layout.panel(f"beyond_mocap_{name}", default_closed=closed)
     header.label(text=title, icon=icon)
     return body
 
 
 def section(layout, name: str, title: str, draw, closed: bool = True) -> None:
-    """A part that can be folded, drawn by `draw` while it is open."""
+    """Draw a collapsible part with the function `draw` while it is open."""
     if body := part(layout, name, title, closed):
         draw(body)
 
 
 def split(layout):
-    """A column of named values."""
+    """Create a column of named values."""
     column = layout.column()
     column.use_property_split, column.use_property_decorate = True, False
     return column
 
 
 class Step:
-    """One step: a collapsible panel in the 3D view's sidebar. The steps stand in the order of `bl_order`."""
+    """A collapsible panel in the 3D view's sidebar; the panels are ordered by `bl_order`."""
 
     bl_space_type = "VIEW_3D"
     bl_region_type = "UI"
     bl_category = "Beyond Mocap"
 
     def progress(self, context, kind: str) -> None:
-        """A bar and a Cancel button while work of this kind runs in the background."""
+        """Draw a progress bar and a Cancel button while work of this kind runs in the background."""
         running = context.window_manager.beyond_mocap_work
         if running.kind == kind:
             row = self.layout.row(align=True)

@@ -1,8 +1,9 @@
-"""Pictures of motions: rows of bodies rendered with Cycles on the CPU, to look at and to show.
+"""Pictures of motions: rows of characters rendered with Cycles on the CPU.
 
     python sample_blend/contact_sheet.py CLIP.bvh OUT.png [FIRST_SECOND LAST_SECOND [COUNT]]
 
-Bodies are skinned here, one mesh per moment, so no armature is needed; any Blender from 4.5 on, or pip's bpy.
+Characters are skinned here, one mesh per moment, so no armature is needed. Needs Blender 4.5 or newer, or its Python
+module.
 """
 
 from __future__ import annotations
@@ -27,13 +28,18 @@ from beyond_mocap.motion.quaternion import turned_about_up  # noqa: E402
 
 COLOURS = {"skin": (0.60, 0.36, 0.24), "shirt": (0.72, 0.06, 0.05), "shorts": (0.86, 0.86, 0.84),
            "socks": (0.72, 0.06, 0.05), "boots": (0.03, 0.03, 0.035), "hair": (0.045, 0.028, 0.02)}
-BALL_RADIUS = 0.11
+BALL_RADIUS = 0.11  # m
 
 
 @dataclass(frozen=True)
 class Actor:
-    """Who is drawn: a motion on the pitch, the colours of the shirt, and how to skin it (made from the skeleton if
-    None)."""
+    """A character that is drawn.
+
+    Attributes:
+        motion: the motion on the pitch.
+        colours: colours by material, over the default ones.
+        body: the mesh to skin; None: built from the skeleton.
+    """
 
     motion: Motion
     colours: dict | None = None
@@ -41,7 +47,7 @@ class Actor:
 
 
 def new_scene(width: int, height: int, samples: int = 24) -> bpy.types.Scene:
-    """An empty file with sun, sky and grass, set to render with Cycles on the CPU."""
+    """Create an empty file with sun, sky and grass, set to render with Cycles on the CPU."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     scene = bpy.context.scene
     scene.render.engine = "CYCLES"
@@ -67,7 +73,7 @@ def new_scene(width: int, height: int, samples: int = 24) -> bpy.types.Scene:
 
 
 def paint(name: str, colour) -> bpy.types.Material:
-    """A plain matt material."""
+    """Create a matt material."""
     material = bpy.data.materials.new(name)
     material.use_nodes = True
     shader = material.node_tree.nodes["Principled BSDF"]
@@ -77,7 +83,7 @@ def paint(name: str, colour) -> bpy.types.Material:
 
 
 def add_mesh(name: str, vertices, faces, materials, material=None, smooth: bool = False) -> bpy.types.Object:
-    """A mesh object in the scene; material: index per face."""
+    """Create a mesh object in the scene; material: index per face."""
     mesh = bpy.data.meshes.new(name)
     mesh.from_pydata([tuple(v) for v in np.asarray(vertices, dtype=float)], [], [tuple(f) for f in faces])
     for entry in materials:
@@ -92,7 +98,13 @@ def add_mesh(name: str, vertices, faces, materials, material=None, smooth: bool 
 
 
 def add_bodies(actor: Actor, frames: np.ndarray, moved: np.ndarray | None = None) -> None:
-    """The actor's body at fractional `frames` (N,), each moved by `moved` (N, 3) metres."""
+    """Add the character at some moments.
+
+    Args:
+        actor: the character.
+        frames: (N,) fractional frames.
+        moved: (N, 3) m by which each is moved, None for none.
+    """
     body = actor.body or low_poly_body(actor.motion.skeleton, example=actor.motion)
     root, local = at_frames(actor.motion, np.asarray(frames, dtype=float))
     places, world = pose_kinematics(actor.motion.skeleton, root, local)
@@ -105,7 +117,7 @@ def add_bodies(actor: Actor, frames: np.ndarray, moved: np.ndarray | None = None
 
 
 def add_ball(centres: np.ndarray) -> None:
-    """The ball at `centres` (N, 3) metres."""
+    """Add the ball at `centres` (N, 3) m."""
     material = paint("ball", (0.9, 0.9, 0.88))
     for centre in np.atleast_2d(centres):
         bpy.ops.mesh.primitive_uv_sphere_add(segments=20, ring_count=12, radius=BALL_RADIUS, location=tuple(centre))
@@ -115,7 +127,15 @@ def add_ball(centres: np.ndarray) -> None:
 
 
 def look(scene: bpy.types.Scene, eye, at, wide: float | None = None, lens: float = 50.0) -> None:
-    """A camera at `eye` that looks at `at`; `wide`: metres across for a parallel view, else `lens` millimetres."""
+    """Add a camera.
+
+    Args:
+        scene: the scene.
+        eye: (3,) m, where it is.
+        at: (3,) m, where it looks.
+        wide: m across for a parallel view, None for a perspective one.
+        lens: mm, of the perspective view.
+    """
     camera = bpy.data.cameras.new("camera")
     camera.clip_end = 500.0
     if wide is not None:
@@ -130,7 +150,11 @@ def look(scene: bpy.types.Scene, eye, at, wide: float | None = None, lens: float
 
 
 def render(scene: bpy.types.Scene, path: Path) -> np.ndarray:
-    """Renders to `path` (PNG) and returns the picture (H, W, 4), top row first, 0 .. 1."""
+    """Render to a PNG file.
+
+    Returns:
+        The picture (H, W, 4), top row first, 0 to 1.
+    """
     scene.render.filepath = str(path)
     scene.render.image_settings.file_format = "PNG"
     bpy.ops.render.render(write_still=True)
@@ -141,7 +165,7 @@ def render(scene: bpy.types.Scene, path: Path) -> np.ndarray:
 
 
 def save(picture: np.ndarray, path: Path) -> None:
-    """A picture (H, W, 4) as PNG."""
+    """Save a picture (H, W, 4) as PNG."""
     height, width = picture.shape[:2]
     image = bpy.data.images.new("sheet", width, height)
     image.pixels.foreach_set(np.ascontiguousarray(picture[::-1], np.float32).ravel())
@@ -150,11 +174,13 @@ def save(picture: np.ndarray, path: Path) -> None:
 
 
 def _follow(scene, centres: np.ndarray) -> None:
+    """Add a camera beside a place (1, 3) m."""
     middle = centres[0] * [1, 1, 0] + [0, 0, 0.85]
     look(scene, middle + np.array([2.2, -6.0, 1.9]), middle, lens=45.0)
 
 
 def _grid(tiles: list[np.ndarray], columns: int) -> np.ndarray:
+    """Arrange pictures of one size in a grid."""
     height, width = tiles[0].shape[:2]
     rows = -(-len(tiles) // columns)
     sheet = np.ones((rows * height, columns * width, 4), np.float32)
@@ -166,11 +192,19 @@ def _grid(tiles: list[np.ndarray], columns: int) -> np.ndarray:
 
 def strip(motion: Motion, frames: np.ndarray, out_png, *, ball=None, spacing: float = 1.15, samples: int = 12,
           width: int = 1300) -> None:
-    """One motion at `frames` (N,) side by side, seen from the side and (below) half from the front: for looking at a
-    cycle.
+    """Render moments of one motion side by side, seen from the side and (below) half from the front.
 
-    ball (N, 3): where the ball is at these frames, or None. Figures face right; each stands `spacing` metres from the
-    last."""
+    Figures face right.
+
+    Args:
+        motion: the motion.
+        frames: (N,) moments.
+        out_png: the file.
+        ball: (N, 3) m, the ball at these moments, or None.
+        spacing: m between figures.
+        samples: of Cycles.
+        width: pixels.
+    """
     frames = np.asarray(frames, dtype=float)
     facing = float(heading(motion)[int(frames[0])])
     out = Path(out_png)
@@ -194,6 +228,7 @@ def strip(motion: Motion, frames: np.ndarray, out_png, *, ball=None, spacing: fl
 
 
 def main(arguments: list[str]) -> None:
+    """Parse the command line and render."""
     clip, out, *span = arguments
     motion = bvh.read(clip).motion
     first, last = (float(span[0]), float(span[1])) if len(span) >= 2 else (0.5, 1.5)

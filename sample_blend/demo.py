@@ -1,4 +1,5 @@
-"""The main job on the sample, without a window: two players and the ball, from dots and words to a Blender file.
+"""The main workflow on the sample, without a window: two players and the ball, from tracking data and labels to a
+.blend.
 
     python sample_blend/demo.py --out build/demo
 
@@ -23,7 +24,11 @@ TILE = (480, 270)  # pixels
 
 
 def load_extension():
-    """The extension from this clone, switched on: a function that imports its modules by name, one to switch it off."""
+    """Register the extension from this clone.
+
+    Returns:
+        A function that imports its modules by name, and one that unregisters it.
+    """
     os.environ.setdefault("BLENDER_USER_RESOURCES", tempfile.mkdtemp(prefix="beyond-mocap-demo-"))
     sys.path.insert(0, str(HERE.parent))
     import batch
@@ -35,10 +40,15 @@ def load_extension():
 
 
 class Steps:
-    """The parts of the job, each with its share of one progress bar."""
+    """The parts of the workflow, each with its share of one progress bar."""
 
     def __init__(self, told, shares: dict[str, float]):
-        """told: the command line's progress bar. shares: part -> share of the time it takes."""
+        """Begin the progress bar.
+
+        Args:
+            reporter: the command line's progress bar.
+            shares: part -> share of the time it takes.
+        """
         self.told, self.shares, self.done, self.now = told, shares, 0.0, ""
         self.begun = time.perf_counter()
 
@@ -51,13 +61,13 @@ class Steps:
             print(f"{time.perf_counter() - self.begun:5.1f} s  {part}", flush=True)
 
     def progress(self, fraction: float, text: str) -> None:
-        """How far the part is."""
+        """Show the progress of the part."""
         self.told.progress(self.done + fraction * self.shares[self.now], f"{self.now}: {text}")
 
 
 @contextlib.contextmanager
 def quiet():
-    """Keep what Blender prints while it works from tearing the progress bar."""
+    """Hide what Blender prints, so that the progress bar stays intact."""
     sys.stdout.flush()
     terminal, nowhere = os.dup(1), os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, 1)
@@ -71,7 +81,7 @@ def quiet():
 
 
 def prepare(bpy) -> None:
-    """An empty file with the stage, and the settings that an animator would fill in."""
+    """Create an empty file with the stage, and the settings that an animator would fill in."""
     bpy.ops.wm.read_homefile(use_empty=True)
     scene = bpy.context.scene
     scene.render.fps, scene.frame_start = 30, 1
@@ -82,7 +92,11 @@ def prepare(bpy) -> None:
 
 
 def synthesize(load, settings, steps) -> list[dict]:
-    """Library and takes, kept for Accept; returns the players' reports."""
+    """Build the library, synthesize the takes and store them for Apply.
+
+    Returns:
+        The players' reports.
+    """
     plans, session = load("scene.result.plans"), load("scene.core.session")
     quality, recipe = load("scene.result.quality"), load("beyond_mocap.synthesis.synthesize")
     steps.enter("Library")
@@ -107,8 +121,17 @@ def synthesize(load, settings, steps) -> list[dict]:
 
 
 def moments(plans, takes, count: int) -> list[tuple[float, int]]:
-    """`count` moments to show, (seconds, which player to look at): key moments first, then the middles of what was
-    asked for by words, then whatever lies in the widest gaps."""
+    """Choose the moments to show.
+
+    Key moments first, then the middles of labelled spans, then moments in the widest gaps.
+
+    Args:
+        plans: plans of the players.
+        takes: takes of the players.
+        count: how many moments.
+    Returns:
+        (seconds, number of the player to look at) of each, in order of time.
+    """
     start, end = takes[0].start_time, takes[0].start_time + takes[0].motion.duration
     keys = [(key.asked.time, player) for player, take in enumerate(takes) for key in take.keys]
     asked = [(span, player) for player, plan in enumerate(plans) for span in plan.timeline.spans]
@@ -123,20 +146,20 @@ def moments(plans, takes, count: int) -> list[tuple[float, int]]:
 
 
 def hips_at(take, seconds: float):
-    """Where a player's hips are at a time on the track's clock: (3,) metres."""
+    """Return where a player's hips are at a time on the track's clock: (3,) m."""
     frame = round((seconds - take.start_time) * take.motion.fps)
     return take.motion.root_positions[min(max(frame, 0), len(take.motion) - 1)]
 
 
 def nearest_to_ball(takes, seconds: float) -> int:
-    """Which player is nearest to the ball."""
+    """Return the number of the player nearest to the ball."""
     ball = next(take.ball for take in takes if take.ball is not None)
     place = ball.positions[abs(ball.times - seconds).argmin()]
     return min(range(len(takes)), key=lambda i: float(sum((hips_at(takes[i], seconds)[:2] - place[:2]) ** 2)))
 
 
 def words_at(take, seconds: float) -> str:
-    """What the player does at a time on the track's clock."""
+    """Return what the player does at a time on the track's clock."""
     for key in take.keys:
         if abs(key.asked.time - seconds) < 0.15:
             return " ".join(key.asked.words)
@@ -145,7 +168,7 @@ def words_at(take, seconds: float) -> str:
 
 
 def render(bpy, load, plans, takes, out: pathlib.Path, steps) -> None:
-    """The sheet of rendered frames: Cycles on the CPU, which needs no graphics card and no window."""
+    """Render the sheet of frames with Cycles on the CPU, which needs no graphics card and no window."""
     import numpy as np
 
     scene, frame_at = bpy.context.scene, load("scene.result.bake").frame_at
@@ -176,7 +199,7 @@ def render(bpy, load, plans, takes, out: pathlib.Path, steps) -> None:
 
 
 def close_camera(bpy):
-    """A camera that is put beside one player after the other."""
+    """Create a camera that is placed beside one player after the other."""
     camera = bpy.data.objects.new("Close", bpy.data.cameras.new("Close"))
     camera.data.lens = 42.0
     bpy.context.scene.collection.objects.link(camera)
@@ -184,7 +207,7 @@ def close_camera(bpy):
 
 
 def look_at(load, camera, take, seconds: float) -> None:
-    """Put the camera half in front of the player, at the height of the chest."""
+    """Place the camera half in front of the player, at the height of the chest."""
     import numpy as np
     from mathutils import Vector
 
@@ -197,6 +220,7 @@ def look_at(load, camera, take, seconds: float) -> None:
 
 
 def _stamp(settings) -> None:
+    """Show only the note in renders."""
     settings.use_stamp = settings.use_stamp_note = True
     for name in ("date", "time", "render_time", "frame", "camera", "scene", "filename", "lens", "memory", "hostname",
                  "marker", "sequencer_strip", "frame_range"):
@@ -206,7 +230,7 @@ def _stamp(settings) -> None:
 
 
 def _pixels(bpy, path: str):
-    """A picture's pixels (height, width, 4), from below."""
+    """Load the pixels (height, width, 4) of a picture, bottom row first."""
     import numpy as np
 
     picture = bpy.data.images.load(path)
@@ -217,6 +241,7 @@ def _pixels(bpy, path: str):
 
 
 def _write_picture(bpy, pixels, out: pathlib.Path) -> None:
+    """Write pixels as a PNG file."""
     picture = bpy.data.images.new("preview", pixels.shape[1], pixels.shape[0])
     picture.pixels.foreach_set(pixels.ravel())
     picture.filepath_raw, picture.file_format = str(out), "PNG"
@@ -225,7 +250,7 @@ def _write_picture(bpy, pixels, out: pathlib.Path) -> None:
 
 
 def run(out: pathlib.Path) -> None:
-    """The whole job."""
+    """Run the whole workflow."""
     load, switch_off = load_extension()
     import bpy
 
@@ -254,16 +279,17 @@ def run(out: pathlib.Path) -> None:
     told.end()
     switch_off()
     print(f"""
-Made in {time.perf_counter() - steps.begun:.0f} s:
+Finished in {time.perf_counter() - steps.begun:.0f} s:
   {out / "match.blend"}   two players, the ball and a following camera: open it with Blender 4.5 or newer, press Space
   {out / "player.bvh"}    the first player's motion, for any other tool
-  {out / "report.json"}   how good it is, in figures
-  {out / "preview.png"}   the same in eight pictures""")
+  {out / "report.json"}   quality figures
+  {out / "preview.png"}   eight rendered frames""")
 
 
 def main() -> int:
-    """Parse the command line and go."""
-    parser = argparse.ArgumentParser(description="Two players and a ball, from the sample's dots and words to Blender.")
+    """Parse the command line and run."""
+    parser = argparse.ArgumentParser(
+        description="Two players and a ball, from the sample's tracking data and labels to Blender.")
     parser.add_argument("--out", type=pathlib.Path, default=HERE.parent / "build" / "demo", help="folder to write into")
     options = parser.parse_args()
     try:

@@ -1,11 +1,11 @@
-"""A quick look at a take without Blender: its body, shadow and ball, frame by frame, in one picture.
+"""Draw a take without Blender: its character, shadow and ball, frame by frame, in one picture.
 
     python sample_blend/look.py TAKE.bvh --out sheet.png --ball ball.csv --provenance p.csv --from 8.5 --to 10 --every
     0.1
 
-The lines on the grass are half a metre apart and stay where they are, so a foot that slides is seen to slide; what is
-more than 1 cm below the grass is drawn in magenta. `--camera follow` stays beside the player, `fixed` stands still and
-sees the whole way, `strobe` puts all moments into one picture. Needs numpy and Pillow.
+The lines on the grass are half a metre apart and do not move, so a sliding foot is visible; what is more than 1 cm
+below the grass is drawn in magenta. `--camera follow` stays beside the player, `fixed` does not move and shows the
+whole path, `strobe` puts all moments into one picture. Needs numpy and Pillow.
 """
 
 from __future__ import annotations
@@ -35,8 +35,14 @@ BALL_RADIUS = 0.11
 
 @dataclass(frozen=True)
 class View:
-    """A camera at `eye` (3,) m that looks at `at` (3,) m, `size` pixels square, `wide` metres across at that
-    distance."""
+    """A camera.
+
+    Attributes:
+        eye: (3,) m, where it is.
+        at: (3,) m, where it looks.
+        size: pixels of the square picture.
+        wide: m across at that distance.
+    """
 
     eye: np.ndarray
     at: np.ndarray
@@ -44,7 +50,13 @@ class View:
     wide: float
 
     def __call__(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Pixels (..., 2) and depth (...,) m of points (..., 3) m."""
+        """Project points.
+
+        Args:
+            points: (..., 3) m.
+        Returns:
+            Pixels (..., 2) and depth (...,) m.
+        """
         ahead = self.at - self.eye
         far = np.linalg.norm(ahead)
         ahead = ahead / far
@@ -56,7 +68,7 @@ class View:
 
 
 def picture(view: View, skins, body, balls):
-    """One picture (Pillow) of bodies `skins` (N, V, 3) m and `balls` (N, 3) m, NaN rows for none."""
+    """Draw one picture (Pillow) of characters `skins` (N, V, 3) m and `balls` (N, 3) m, NaN rows for none."""
     from PIL import Image, ImageDraw
 
     image = Image.new("RGB", (view.size, view.size), GRASS)
@@ -77,7 +89,7 @@ def picture(view: View, skins, body, balls):
 
 
 def _body(draw, view: View, skin, quads, material, balls) -> None:
-    """The faces of one body and the balls (N, 3) m, the far ones first."""
+    """Draw the faces of one character and the balls (N, 3) m, the far ones first."""
     flat, depth = view(skin)
     corners = skin[quads]
     normal = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
@@ -95,11 +107,12 @@ def _body(draw, view: View, skin, quads, material, balls) -> None:
 
 
 def _on_grass(points: np.ndarray) -> np.ndarray:
-    """Where the sun throws points (..., 3) onto the ground."""
+    """Return where the sun casts the shadow of points (..., 3) on the ground."""
     return points - np.maximum(points[..., 2:], 0.0) * SUN / SUN[2] * [1.0, 1.0, 1.0]
 
 
 def _disc(draw, view: View, centre, colour, flat: float) -> None:
+    """Draw a ball or its shadow."""
     (x, y), depth = view(centre)
     if depth > 0.1:
         r = view.size * BALL_RADIUS / depth * np.linalg.norm(view.at - view.eye) / view.wide
@@ -107,7 +120,7 @@ def _disc(draw, view: View, centre, colour, flat: float) -> None:
 
 
 def _grid(draw, view: View, step: float = 0.5) -> None:
-    """The sky, and lines on the grass around what the camera looks at; every second metre is brighter."""
+    """Draw the sky, and lines on the grass around the camera's target; every second metre is brighter."""
     reach = min(3.0 * view.wide, 60.0)
     middle = np.round(view.at[:2] / step) * step
     for axis in (0, 1):
@@ -128,8 +141,20 @@ def _grid(draw, view: View, step: float = 0.5) -> None:
 
 def sheet(motion: Motion, frames, out, *, camera="follow", side=-90.0, ball=None, labels=None, columns=6, tile=220,
           wide=2.2):
-    """Writes the contact sheet of `frames` (N,) to `out`. side: degrees from +x at which the camera stands; ball:
-    (N, 3) m or None; labels: N texts or None; wide: metres across a tile of the following camera."""
+    """Write the contact sheet of some frames.
+
+    Args:
+        motion: the motion.
+        frames: (N,) frames.
+        out: the PNG file.
+        camera: "follow", "fixed" or "strobe".
+        side: degrees from +x of the camera.
+        ball: (N, 3) m, or None.
+        labels: N texts, or None.
+        columns: pictures in a row.
+        tile: pixels of a picture.
+        wide: m across a picture of the following camera.
+    """
     from PIL import Image, ImageDraw
 
     frames = np.asarray(frames, dtype=float)
@@ -156,6 +181,7 @@ def sheet(motion: Motion, frames, out, *, camera="follow", side=-90.0, ball=None
 
 
 def _view(ground, side: float, wide: float, size: int) -> View:
+    """Build the camera of a place on the ground."""
     at = np.array([*ground, 0.85 if wide < 4 else 0.5])
     way = np.array([np.cos(np.radians(side)), np.sin(np.radians(side)), 0.0])
     return View(at + (2.5 * wide) * way + [0.0, 0.0, 0.55 * wide], at, size, wide)
@@ -168,9 +194,9 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--out", required=True, help="PNG to write")
     parser.add_argument("--ball", help="its ball CSV")
     parser.add_argument("--provenance",
-                        help="its provenance CSV: marks standing feet (L, R) and seams (|) on the labels")
+                        help="its provenance CSV: marks planted feet (L, R) and transitions (|) in the captions")
     parser.add_argument("--camera", choices=("follow", "fixed", "strobe"), default="follow")
-    parser.add_argument("--side", type=float, default=-90.0, help="degrees from +x at which the camera stands")
+    parser.add_argument("--side", type=float, default=-90.0, help="degrees from +x of the camera")
     parser.add_argument("--from", dest="start", type=float, default=0.0, help="seconds from the take's first frame")
     parser.add_argument("--to", dest="end", type=float, help="seconds from the take's first frame")
     parser.add_argument("--every", type=float, default=0.2, help="seconds between pictures; 0: every frame")

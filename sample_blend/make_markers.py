@@ -1,11 +1,12 @@
-"""Makes the sample's optical recordings: a body that is made, with markers as a laboratory puts them on.
+"""Generate the sample's optical recordings: a synthetic performer with markers placed as in a laboratory.
 
     python sample_blend/make_markers.py [FOLDER]
 
-`static.trc` somebody who stands still, `throw.c3d` the same body and a ball with one marker thrown at 28 m/s,
-`walk.trc` another body walking, without a static trial, with gaps, a swap and an unlabeled stretch. Whatever is found
-in them can be compared with what was made (`beyond_mocap.synthetic.ground_truth.planted_markers`). The same code gives
-the same bytes. Needs the core and the C3D package."""
+`static.trc` is a performer who stands still, `throw.c3d` the same performer throwing a ball with one marker at 28 m/s,
+`walk.trc` another performer walking, without a static trial, with gaps, a swap and an unlabeled stretch. What is
+reconstructed from them can be compared with the ground truth (`beyond_mocap.synthetic.ground_truth.synthetic_markers`).
+The same code gives the same bytes. Needs the core and the C3D package.
+"""
 
 from __future__ import annotations
 
@@ -28,26 +29,26 @@ from beyond_mocap.synthetic.ground_truth.planted_markers import Planted, planted
 from beyond_mocap.synthetic.throws import throw  # noqa: E402
 
 SPEED, TARGET = 28.0, (18.0, 0.0, 1.0)
-"""The throw: metres a second, and the place that it hits without air."""
-_THROW_FPS, _WALK_FPS = 240.0, 100.0
-_STATIC_FRAMES = 60
+"""The throw: m/s, and the place (3,) m that it hits without air."""
+_THROW_FPS, _WALK_FPS = 240.0, 100.0  # frames per second
+_STATIC_FRAMES = 60  # frames of the static trial
 
 
 def thrown() -> Planted:
-    """The throw, its static trial and the truth of both; the second around the ball's release."""
+    """Generate the throw, its static trial and the ground truth of both; the second around the ball's release."""
     made = throw(TARGET, SPEED, fps=_THROW_FPS)
     return planted(made.motion, "driveline", seed=11, ball=PlantedBall(made.release, turns=18.0, seen=0.12),
                    occlusion=0.01)
 
 
 def walked() -> Planted:
-    """The walk of somebody smaller, with what goes wrong."""
+    """Generate the walk of a smaller performer, with faults."""
     motion = gait(1.4, 1.8, fps=_WALK_FPS, skeleton=adult_skeleton(1.68), seed=4)
     return planted(motion, "plug_in_gait", seed=12, occlusion=0.03, swaps=1, jumps=2, unlabeled=1)
 
 
 def make(folder: Path = HERE / "markers") -> None:
-    """The recordings in `folder`."""
+    """Write the recordings to `folder`."""
     folder.mkdir(parents=True, exist_ok=True)
     throwing, walking = thrown(), walked()
     write_trc(throwing.static.frames(0, _STATIC_FRAMES), folder / "static.trc")
@@ -57,7 +58,7 @@ def make(folder: Path = HERE / "markers") -> None:
 
 
 def write_c3d(trial: MarkerTrial, path: Path) -> None:
-    """The trial as a C3D file in millimetres, Z up; markers that are not seen have the residual -1."""
+    """Write a trial as a C3D file in millimetres, Z up; markers that are not seen have the residual -1."""
     import c3d
 
     writer = c3d.Writer(point_rate=trial.fps, analog_rate=0, point_scale=-1.0)

@@ -1,12 +1,13 @@
-"""Makes the small match: nine players, one ball, of which every touch is known.
+"""Generate the small match: nine players, one ball, every touch known.
 
     python sample_blend/make_match.py [FOLDER]
 
-Twenty-four seconds, four players a side; the away team changes a player halfway. The ball obeys `ball.flight`; whoever
-touches it is there, on a smooth course. `small_Home.csv` and `small_Away.csv` are the tracking in Metrica's form,
-`small.dat` and `small_meta.xml` the same in TRACAB's (which has heights and names), with the noise of a tracking
-system; `small_events.csv` is a provider's list of events, whose clock is late by CLOCK_LATE seconds and roughly read;
-`small_touches.csv` is the truth. The same code gives the same bytes. Needs the core only."""
+Twenty-four seconds, four players a side; the away team changes a player halfway. The ball obeys `ball.flight`; the
+player who touches it is there, on a smooth path. `small_Home.csv` and `small_Away.csv` are the tracking in Metrica's
+form, `small.dat` and `small_meta.xml` the same in TRACAB's (which has heights and names), with the noise of a tracking
+system; `small_events.csv` is a provider's list of events, whose clock is late by CLOCK_LATE seconds and which is
+roughly timed; `small_touches.csv` is the ground truth. The same code gives the same bytes. Needs the core only.
+"""
 
 from __future__ import annotations
 
@@ -27,10 +28,10 @@ from beyond_mocap.ball.aim import aim, along_ground  # noqa: E402
 from beyond_mocap.ball.flight import Flight, Launch, fly  # noqa: E402
 from beyond_mocap.ball.physics import FOOTBALL  # noqa: E402
 
-SECONDS, RATE = 24.0, 25.0
-LENGTH, WIDTH = 105.0, 68.0
+SECONDS, RATE = 24.0, 25.0  # s, and frames per second
+LENGTH, WIDTH = 105.0, 68.0  # m, of the pitch
 KICK_OFF = 1.0  # s, of the first touch
-BESIDE = 0.38  # m from the middle of a player to the ball that he touches
+BESIDE = 0.38  # m from the middle of a player to the ball at a touch
 CLOCK_LATE = 2.4  # s by which the events' clock is late
 EVENTS_SCATTER = 0.12  # s, standard deviation of the events' times beside the touches
 
@@ -38,7 +39,7 @@ PLAYERS = {"home_1": "Ada Keeper", "home_4": "Ben Back", "home_7": "Cora Wing", 
            "away_1": "Eva Keeper", "away_5": "Finn Back", "away_6": "Gus Middle", "away_9": "Hana Forward",
            "away_14": "Ivo Fresh"}
 PRESENT = {"away_9": (0.0, 9.0), "away_14": (11.0, SECONDS)}
-"""Seconds in which players are on the pitch who are not there all the time."""
+"""Seconds in which players are on the pitch, for those who are not there all the time."""
 PLACES = {
     "home_1": ((0, -47, 0), (12, -44, 1.5), (24, -47, 0.5)),
     "home_4": ((0, -20, -9), (9, -12, -6), (15, -6, 2), (24, -13, 6)),
@@ -47,13 +48,20 @@ PLACES = {
     "away_5": ((0, 24, 5), (7, 38, 0), (18, 30, 4), (24, 22, 3)), "away_6": ((0, 10, -6), (6, 20, -14), (24, 3, -3)),
     "away_9": ((0, 4, 4), (5, -4, 9), (9, -3, 31)), "away_14": ((11, -3, 33.5), (13.5, -4, 24), (24, -32, 3)),
 }
-"""Where each is when he has nothing to do with the ball: (s, x, y) m."""
+"""Where each player is away from the ball: (s, x, y) m."""
 
 
 @dataclass(frozen=True)
 class Touch:
-    """One touch: player, words of the vocabulary, the part that meets the ball, then where the ball goes: target (x, y)
-    or (x, y, z) m of its centre, seconds until it is there."""
+    """One touch.
+
+    Attributes:
+        player: id of the player.
+        words: labels of the vocabulary.
+        part: the part that meets the ball.
+        target: (x, y) or (x, y, z) m of the ball's centre where it goes.
+        seconds: s until it is there.
+    """
 
     player: str
     words: str
@@ -80,12 +88,19 @@ TOUCHES = (Touch("home_10", "kick right low inside", "foot", (-13, -8), 1.5),
            Touch("home_1", "receive right foot low", "foot", (-43, 0.8), 2.0))
 """All touches in order; the first is at KICK_OFF, each later one when the ball is there."""
 EVENTS = {"kick": "pass", "header": "pass", "receive": "ball touch"}
-"""What the provider calls a touch, by its first word; it does not tell of dribbles."""
+"""What the provider calls a touch, by its first label; it does not list dribbles."""
 
 
 @dataclass(frozen=True, eq=False)
 class Played:
-    """A touch as it came about: its time s, the ball's centre (3,) m, and the ball's way from there on."""
+    """A touch with its flight.
+
+    Attributes:
+        touch: the touch.
+        time: s.
+        position: (3,) m, the ball's centre.
+        flight: the ball's trajectory from there on.
+    """
 
     touch: Touch
     time: float
@@ -95,7 +110,7 @@ class Played:
 
 @lru_cache(maxsize=1)
 def played() -> tuple[Played, ...]:
-    """Every touch with its time and flight."""
+    """Compute every touch with its time and flight."""
     time, position, found = KICK_OFF, np.array([0.0, 0.0, FOOTBALL.radius]), []
     for touch in TOUCHES:
         flight = _launched(time, position, touch)
@@ -106,7 +121,8 @@ def played() -> tuple[Played, ...]:
 
 
 def _launched(time: float, position: np.ndarray, touch: Touch) -> Flight:
-    if position[2] > 2.0 * FOOTBALL.radius and len(touch.target) == 2:  # it falls, and rolls on
+    """Compute the flight after a touch."""
+    if position[2] > 2.0 * FOOTBALL.radius and len(touch.target) == 2:  # the ball falls, and rolls on
         way = (np.array(touch.target) - position[:2]) / touch.seconds
         return fly(Launch(time, position, np.array([*way, -0.5])), FOOTBALL, touch.seconds + 6.0)
     target = np.array([*touch.target, FOOTBALL.radius][:3])
@@ -116,7 +132,7 @@ def _launched(time: float, position: np.ndarray, touch: Touch) -> Flight:
 
 
 def ball_at(times: np.ndarray) -> np.ndarray:
-    """(N, 3) m: the ball's centre at `times` (N,) s."""
+    """Compute the ball's centre (N, 3) m at `times` (N,) s."""
     touches = played()
     which = np.clip(np.searchsorted([t.time for t in touches], times, side="right") - 1, 0, None)
     out = np.empty((len(times), 3))
@@ -126,7 +142,7 @@ def ball_at(times: np.ndarray) -> np.ndarray:
 
 
 def player_at(player: str, times: np.ndarray) -> np.ndarray:
-    """(N, 2) m: where a player is at `times` (N,) s, NaN while he is not on the pitch."""
+    """Compute where a player is (N, 2) m at `times` (N,) s, NaN off the pitch."""
     from scipy.interpolate import CubicSpline
 
     knots = dict(_meetings(player))
@@ -141,7 +157,7 @@ def player_at(player: str, times: np.ndarray) -> np.ndarray:
 
 
 def _meetings(player: str) -> list[tuple[float, np.ndarray]]:
-    """(s, (2,) m): where he has to be at his touches: behind the ball as it leaves, under it where he heads it."""
+    """List (s, (2,) m) of the player at each touch: behind the ball as it leaves, under it for a header."""
     found = []
     for one in played():
         if one.touch.player == player:
@@ -152,7 +168,11 @@ def _meetings(player: str) -> list[tuple[float, np.ndarray]]:
 
 
 def feed() -> tuple[np.ndarray, dict[str, np.ndarray], np.ndarray]:
-    """What the tracking system sees: times (N,) s, per player (N, 2) m, ball (N, 3) m of its lowest point."""
+    """Simulate what the tracking system measures.
+
+    Returns:
+        Times (N,) s, per player (N, 2) m, and the lowest point of the ball (N, 3) m.
+    """
     times = np.arange(round(SECONDS * RATE) + 1) / RATE
     seen = {player: tracked(times, player_at(player, times), 10 + i) for i, player in enumerate(PLAYERS)}
     ball = ball_at(times)
@@ -162,7 +182,7 @@ def feed() -> tuple[np.ndarray, dict[str, np.ndarray], np.ndarray]:
 
 
 def write_metrica(folder: Path) -> None:
-    """`small_Home.csv`, `small_Away.csv`: places as shares of the pitch, y downward, no heights."""
+    """Write `small_Home.csv`, `small_Away.csv`: places as shares of the pitch, y downward, no heights."""
     times, seen, ball = feed()
     for team in ("Home", "Away"):
         ids = [player for player in seen if player.startswith(team.lower())]
@@ -177,7 +197,7 @@ def write_metrica(folder: Path) -> None:
 
 
 def write_tracab(folder: Path) -> None:
-    """`small.dat`, `small_meta.xml`: centimetres from the centre, heights, and names."""
+    """Write `small.dat`, `small_meta.xml`: centimetres from the centre, heights, and names."""
     times, seen, ball = feed()
     lines = []
     for row, time in enumerate(times):
@@ -194,6 +214,7 @@ def write_tracab(folder: Path) -> None:
 
 
 def _tracab_meta(frames: int) -> str:
+    """Format the TRACAB metadata."""
     teams = []
     for number, team in enumerate(("home", "away"), start=1):
         rows = []
@@ -220,7 +241,7 @@ def _tracab_meta(frames: int) -> str:
 
 
 def write_events(folder: Path) -> None:
-    """`small_events.csv`: what a provider tells, on a clock of its own."""
+    """Write `small_events.csv`: a provider's events, on a clock of its own."""
     random = np.random.default_rng(7)
     lines = ["time_s,type,player,detail,success,x,y"]
     for one in played():
@@ -234,7 +255,7 @@ def write_events(folder: Path) -> None:
 
 
 def write_truth(folder: Path) -> None:
-    """`small_touches.csv`: every touch as it was planted, the ball's centre in metres."""
+    """Write `small_touches.csv`: every touch as it was planned, the ball's centre in metres."""
     lines = ["time_s,player,part,words,x_m,y_m,z_m"]
     for one in played():
         x, y, z = one.position
@@ -243,11 +264,12 @@ def write_truth(folder: Path) -> None:
 
 
 def _write(path: Path, lines: list[str]) -> None:
+    """Write lines to a file."""
     path.write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
 
 
 def make(folder: Path = HERE / "match" / "small") -> None:
-    """All files in `folder`."""
+    """Write all files to `folder`."""
     folder.mkdir(parents=True, exist_ok=True)
     for write in (write_metrica, write_tracab, write_events, write_truth):
         write(folder)

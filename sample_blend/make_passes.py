@@ -1,9 +1,10 @@
-"""Makes the library of the passing scenes: strikes out of standing, and what players do between them.
+"""Generate the library of the passing scenes: strikes from standing, and the motion between them.
 
     python sample_blend/make_passes.py [FOLDER]
 
-It is a library of its own (`passes/library`), so that takes from the sample's other one stay what they are. The same
-code gives the same bytes. Needs the core only."""
+It is a library of its own (`passes/library`), so that takes from the sample's other one do not change. The same code
+gives the same bytes. Needs the core only.
+"""
 
 from __future__ import annotations
 
@@ -24,9 +25,9 @@ from beyond_mocap.synthetic.volleys import VOLLEYS, idle, volley  # noqa: E402
 TAKEN = ("standing_turn_left", "standing_turn_right", "walking_0_8", "walking_1_2", "walking_1_6", "walking_turn_left",
          "walking_turn_right", "walking_back", "walking_left", "walking_right", "start_stop_walking", "walk_jog_walk",
          "jogging_2_4", "jogging_3_5", "jogging_back", "header")
-"""Clips of the sample's library that are taken over."""
+"""Clips of the sample's library that are reused."""
 STOPPED = 186
-"""Frames after which who starts and stops has stopped; behind them the clip goes on with half a step."""
+"""Frames after which the player of start_stop_walking has stopped; the clip continues with half a step."""
 STRIKES = (("toss", "toss", 1.25), ("toss_quick", "toss", 1.5), ("pass", "pass", 1.25), ("pass_quick", "pass", 1.45),
            ("attack", "attack", 1.4), ("attack_quick", "attack", 1.6), ("receive", "receive", 1.0),
            ("head", "head", 1.25), ("chest", "chest", 1.0), ("hand", "hand", 1.3), ("racquet", "racquet", 1.0),
@@ -35,7 +36,7 @@ STRIKES = (("toss", "toss", 1.25), ("toss_quick", "toss", 1.5), ("pass", "pass",
 
 
 def library() -> list[Clip]:
-    """All clips of the library."""
+    """Build all clips of the library."""
     taken = [clip for clip in clips() if clip.name in TAKEN]
     taken = [replace(c, motion=c.motion.frames(0, STOPPED)) if c.name == "start_stop_walking" else c for c in taken]
     ready = [Clip(f"ready_{seed}", idle(9.0, fps=FPS, seed=60 + seed), ("standing",)) for seed in (1, 2, 3)]
@@ -43,12 +44,13 @@ def library() -> list[Clip]:
 
 
 def _strike(name: str, kind: str, speed: float, seed: int) -> Clip:
+    """Build the clip of a strike."""
     gesture = volley(kind, fps=FPS, seed=seed, speed=speed)
     return Clip(f"volley_{name}", gesture.motion, tuple(VOLLEYS[kind].words.split()), gesture)
 
 
 def make(folder: Path = HERE / "passes" / "library") -> None:
-    """The library's files in `folder`."""
+    """Write the library's files to `folder`."""
     folder.mkdir(parents=True, exist_ok=True)
     for clip in library():
         bvh.write(folder / f"{clip.name}.bvh", clip.motion)
@@ -57,7 +59,7 @@ def make(folder: Path = HERE / "passes" / "library") -> None:
 
 
 def _words(clip: Clip) -> Timeline:
-    """As the sample's other library has them; a strike out of standing stands before and after it."""
+    """Return the labels as in the sample's other library; a strike has standing before and after it."""
     gesture = clip.gesture
     if gesture is None or not clip.name.startswith("volley"):
         return words_of(clip)

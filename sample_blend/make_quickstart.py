@@ -1,5 +1,5 @@
-"""Writes quickstart.blend beside this file: a pitch, a camera, and settings filled in for the sample, with paths
-relative to the file, so that three buttons lead to two moving players.
+"""Write quickstart.blend beside this file: a pitch, a camera, and settings for the sample, with paths relative to the
+file.
 
     .venv-4.5/bin/python sample_blend/make_quickstart.py
 
@@ -22,18 +22,18 @@ HOW_TO = """Beyond Mocap: quickstart
 In the 3D view press N and choose the tab "Beyond Mocap", then press from top to bottom:
 
   1  Build Library    reads the clips in the folder "library"
-  3  Synthesize       finds clips for both players' tracks and words, and shows what came of them
-  4  Accept           keeps it (Discard puts it away)
+  3  Synthesize       finds clips for both players' tracks and labels, and shows the result as a preview
+  4  Apply            keeps the result (Revert removes it)
 
 Press Space to play.
-The words of both players lie on their dots: spans as strips and key moments as markers in the NLA editor.
-Change them there, or put the playhead somewhere, press J in the 3D view and say it by number keys;
+The labels of both players are on their tracks: spans as strips and key moments as markers in the NLA editor.
+Change them there, or move the playhead, press J in the 3D view and choose labels with the number keys;
 then press Update in step 3.
 """
 
 
 def relative_paths(settings) -> None:
-    """Paths that go along when the folder is moved."""
+    """Make the settings' paths relative, so that they stay valid when the folder is moved."""
     def from_here(path: str) -> str:
         return "//" + pathlib.Path(path).relative_to(demo.HERE).as_posix()
 
@@ -45,7 +45,7 @@ def relative_paths(settings) -> None:
 
 
 def open_the_tab(bpy) -> None:
-    """Sidebars open, and the view through the camera, wherever the file has windows; file browsers at no one's home."""
+    """Open the sidebars and the camera view in all windows; file browsers get no personal folder."""
     spaces = [space for screen in bpy.data.screens for area in screen.areas for space in area.spaces]
     for space in spaces:
         if space.type == "VIEW_3D":
@@ -58,8 +58,8 @@ def open_the_tab(bpy) -> None:
 
 
 def like_a_pitch(shading, overlay) -> None:
-    """Colours, shadows and a sky in the solid view, which every computer draws quickly; nothing before the players."""
-    shading.type, shading.light = "SOLID", "STUDIO"  # the light first: it says which studio lights there are
+    """Set colours, shadows and a sky in the solid view, which every computer draws quickly."""
+    shading.type, shading.light = "SOLID", "STUDIO"  # the light first: it decides which studio lights exist
     shading.color_type, shading.studio_light = "MATERIAL", "paint.sl"
     shading.show_shadows, shading.shadow_intensity, shading.show_object_outline = True, 0.4, False
     shading.background_type, shading.background_color = "VIEWPORT", (0.35, 0.50, 0.72)
@@ -68,12 +68,12 @@ def like_a_pitch(shading, overlay) -> None:
 
 
 def main() -> int:
-    """Make the file."""
+    """Write the file."""
     _, switch_off = demo.load_extension()
     import bpy
 
     if bpy.app.version >= (5, 0, 0):
-        print("this has to be run with Blender 4.5, so that 4.5 can open what it writes", file=sys.stderr)
+        print("run this with Blender 4.5, so that 4.5 can open the file it writes", file=sys.stderr)
         return 2
     demo.prepare(bpy)
     scene = bpy.context.scene
@@ -82,7 +82,7 @@ def main() -> int:
     relative_paths(scene.beyond_mocap)
     bpy.data.texts.new("Read me").write(HOW_TO)
     open_the_tab(bpy)
-    with tempfile.TemporaryDirectory() as folder:  # Blender writes down where it saved a file: let that be nowhere
+    with tempfile.TemporaryDirectory() as folder:  # Blender stores the path in the file: save to a temporary one
         written = pathlib.Path(folder, OUT.name)
         bpy.ops.wm.save_as_mainfile(filepath=str(written), compress=True, relative_remap=False)
         shutil.move(written, OUT)

@@ -1,9 +1,10 @@
-"""Makes the sample: a library of clips (`library/*.bvh` with `.txt` words) and a passage of a match (`match/*`).
+"""Generate the sample: a library of clips (`library/*.bvh` with labels in `.txt`) and a passage of a match (`match/*`).
 
     python sample_blend/make_sample.py [FOLDER]
 
 Everything is computed from `beyond_mocap.synthetic.gait` and `gestures`; the same code gives the same bytes. Needs the
-core only."""
+core only.
+"""
 
 from __future__ import annotations
 
@@ -31,13 +32,20 @@ from beyond_mocap.synthetic.gestures import Gesture, dribble, strike  # noqa: E4
 from beyond_mocap.synthetic.moves import celebration, getting_up, header, throw_in  # noqa: E402
 
 FPS = 30.0
-# speeds (m/s) at which one gait's word ends and the next begins, as in Faustino's data
+# speeds (m/s) at which one gait's label ends and the next begins, as in Faustino's data
 _GAITS = (("standing", 0.4), ("walking", 2.0), ("jogging", 4.0), ("running", 5.5), ("sprinting", np.inf))
 
 
 @dataclass(frozen=True)
 class Clip:
-    """A clip of the library before it is written: words of a whole clip or (None) by speed, and its key moment."""
+    """A clip of the library before it is written.
+
+    Attributes:
+        name: file name without ending.
+        motion: the motion.
+        words: labels of the whole clip, None: by speed.
+        gesture: its key moment.
+    """
 
     name: str
     motion: Motion
@@ -46,11 +54,12 @@ class Clip:
 
 
 def clips() -> list[Clip]:
-    """All clips of the sample's library, in the order of their names' kinds."""
+    """Build all clips of the sample's library, in the order of their kinds."""
     return [*_standing(), *_straight(), *_curves(), *_other_ways(), *_changes(), *_moves()]
 
 
 def _standing() -> list[Clip]:
+    """Build clips of standing and turning on the spot."""
     turn = np.concatenate([np.zeros(45), np.full(60, 0.9), np.zeros(60), np.full(75, 0.7), np.zeros(45)])
     out = [Clip("standing_1", gait(0.0, 8.0, FPS, seed=1), None), Clip("standing_2", gait(0.0, 6.0, FPS, seed=2), None)]
     for side, sign in (("left", 1.0), ("right", -1.0)):
@@ -60,6 +69,7 @@ def _standing() -> list[Clip]:
 
 
 def _straight() -> list[Clip]:
+    """Build clips of steady locomotion."""
     table = (("walking", (0.8, 1.2, 1.6), 6.4), ("jogging", (2.4, 2.9, 3.5), 6.0), ("running", (4.2, 4.9), 6.0),
              ("sprinting", (6.0, 7.2, 8.6), 6.0))
     return [
@@ -70,6 +80,7 @@ def _straight() -> list[Clip]:
 
 
 def _curves() -> list[Clip]:
+    """Build clips of locomotion in curves."""
     out = []
     for word, speed, rate, seconds in (("walking", 1.3, 0.75, 7.0), ("jogging", 2.8, 0.7, 6.0),
                                        ("running", 4.6, 0.5, 6.0)):
@@ -86,6 +97,7 @@ def _curves() -> list[Clip]:
 
 
 def _other_ways() -> list[Clip]:
+    """Build clips of locomotion backward and sideways."""
     out = []
     for word, way, angle, speed in (("walking", "back", np.pi, 1.1), ("jogging", "back", np.pi, 2.3),
                                     ("walking", "left", np.pi / 2, 0.9), ("walking", "right", -np.pi / 2, 0.9)):
@@ -95,6 +107,7 @@ def _other_ways() -> list[Clip]:
 
 
 def _changes() -> list[Clip]:
+    """Build clips that change speed."""
     table = {
         "start_stop_walking": ((0, 0), (0.8, 0), (2.0, 1.3), (4.0, 1.4), (5.4, 0), (6.4, 0), (7.4, 0.9), (8.6, 0),
                                (9.4, 0)),
@@ -110,6 +123,7 @@ def _changes() -> list[Clip]:
 
 
 def _moves() -> list[Clip]:
+    """Build clips of dribbling, kicks and other moves."""
     weave = 0.8 * np.sin(2 * np.pi * _times(7.0) / 3.5)
     out = [
         Clip("dribble_jogging", dribble(2.7, 7.0, fps=FPS, seed=50, turn_rate=weave), ("dribble", "jogging", "front")),
@@ -132,7 +146,7 @@ def _moves() -> list[Clip]:
 
 
 def words_of(clip: Clip) -> Timeline:
-    """What the clip is annotated with."""
+    """Return the annotation of a clip."""
     end = clip.motion.duration
     if clip.gesture is None:
         return Timeline(tuple(_by_speed(clip.motion)) if clip.words is None else (Span(0.0, end, clip.words),), ())
@@ -149,8 +163,7 @@ def words_of(clip: Clip) -> Timeline:
 
 
 def _by_speed(motion: Motion) -> list[Span]:
-    """Stretches of one gait each by the speed of the root smoothed over a second; short ones go with what was
-    before."""
+    """Label stretches of one gait by the speed of the root, smoothed over a second; short ones join the one before."""
     width = int(motion.fps)
     window = np.hanning(width + 2)[1:-1]
     padded = np.pad(motion.root_positions[:, :2], ((width // 2, width - 1 - width // 2), (0, 0)), mode="reflect",
@@ -173,32 +186,34 @@ def _by_speed(motion: Motion) -> list[Span]:
 
 
 def _times(seconds: float) -> np.ndarray:
+    """Return the times (T,) s of a clip."""
     return np.arange(int(round(seconds * FPS)) + 1) / FPS
 
 
 def _profile(rows) -> np.ndarray:
-    """Speeds (T,) through rows (seconds, m/s), corners rounded over half a second."""
+    """Build speeds (T,) through rows (seconds, m/s), corners rounded over half a second."""
     seconds, values = np.array(rows, dtype=float).T
     return _eased(np.interp(_times(seconds[-1]), seconds, values))
 
 
 def _eased(values: np.ndarray) -> np.ndarray:
+    """Smooth values over 0.6 s."""
     return hann_smooth(values, int(0.3 * FPS))
 
 
 def _breeze(seconds: float, seed: int) -> np.ndarray:
-    """A few hundredths of unsteadiness in a steady speed (T,)."""
+    """Build a slight unsteadiness of a steady speed (T,), some hundredths of m/s."""
     times = _times(seconds)
     return 0.06 * np.sin(2 * np.pi * times / 3.7 + seed) + 0.04 * np.sin(2 * np.pi * times / 2.3 + 2 * seed)
 
 
-# -- the passage
+# -- the passage of a match
 # ----------------------------------------------------------------------------------------------------------
 
-MATCH_RATE = 10.0
+MATCH_RATE = 10.0  # frames per second
 MATCH_SECONDS = 40.0
-BALL_RADIUS = 0.11
-# seconds, x, y: where the players really are (their tracks add the noise of a tracking system)
+BALL_RADIUS = 0.11  # m
+# s, x m, y m: true positions of the players (their tracks add the noise of a tracking system)
 PATHS = {
     "player1": ((0, -21, 7.6), (1.5, -21, 7.6), (3, -19.6, 7.7), (4.5, -16.2, 7.6), (6, -12.4, 6.6), (7.4, -9.2, 4.6),
                 (8.5, -6.9, 2.9), (9.5, -4.9, 2.2), (10.5, -1.0, 2.4), (11.5, 4.7, 3.7), (12.5, 11.9, 5.5),
@@ -215,7 +230,7 @@ PATHS = {
                 (32, 44.5, 15.0), (33.5, 43.5, 15.9), (35, 43.0, 16.3), (36, 43.0, 16.3), (37.2, 42.4, 15.6),
                 (39, 40.4, 14.0), (40, 39.4, 13.2)),
 }
-# who touches the ball when, and how: seconds, player, words
+# touches: seconds, player, labels
 TOUCHES = ((8.5, "player1", "kick right running low inside"), (10.2, "player2", "receive right foot low inside"),
            (16.5, "player2", "kick right running low inside"), (17.9, "player1", "receive right foot low inside"),
            (24.8, "player1", "kick right running low top"))
@@ -229,14 +244,18 @@ STRETCHES = {
 
 
 def true_paths() -> tuple[np.ndarray, dict[str, np.ndarray], np.ndarray]:
-    """Times (N,) seconds at 100 Hz, players' positions (N, 2) by name and the ball's (N, 3), metres, without noise."""
+    """Compute the true paths, without noise.
+
+    Returns:
+        Times (N,) s at 100 Hz, players' positions (N, 2) m by name, and the ball's (N, 3) m.
+    """
     times = np.arange(int(MATCH_SECONDS * 100) + 1) / 100.0
     players = {name: _rounded(rows, times) for name, rows in PATHS.items()}
     return times, players, _ball(times, players)
 
 
 def _rounded(rows, times: np.ndarray) -> np.ndarray:
-    """A path (N, 2) through waypoints, its corners in space and speed rounded by a Hann window of 1.2 s, twice."""
+    """Build a path (N, 2) through waypoints, rounded in space and speed by a Hann window of 1.2 s, twice."""
     table = np.array(rows, dtype=float)
     path = interpolate(times, table[:, 0], table[:, 1:3])
     for _ in range(2):
@@ -245,7 +264,7 @@ def _rounded(rows, times: np.ndarray) -> np.ndarray:
 
 
 def _ball(times: np.ndarray, players: dict[str, np.ndarray]) -> np.ndarray:
-    """The ball (N, 3): rolled ahead from touch to touch while somebody dribbles, rolling or flying between players."""
+    """Compute the ball (N, 3): rolled ahead from touch to touch in a dribble, rolling or flying between players."""
     ball = np.full((len(times), 3), np.nan)
     for begin, end, name in DRIBBLES:
         inside = (times >= begin - 1e-9) & (times <= end + 1e-9)
@@ -261,6 +280,7 @@ def _ball(times: np.ndarray, players: dict[str, np.ndarray]) -> np.ndarray:
 
 
 def _shot(ball: np.ndarray, times: np.ndarray) -> np.ndarray:
+    """Add the shot at goal to the ball (N, 3)."""
     kick, (net, target) = TOUCHES[-1][0], NET
     flying = (times > kick) & (times <= net)
     start = ball[np.argmin(np.abs(times - kick))]
@@ -276,7 +296,7 @@ def _shot(ball: np.ndarray, times: np.ndarray) -> np.ndarray:
 
 
 def _dribbled(times: np.ndarray, path: np.ndarray, begin: float, end: float) -> np.ndarray:
-    """The ball (N, 3) of a dribbler: half a metre ahead at each touch (and at `begin` and `end`), further between."""
+    """Compute the ball (N, 3) of a dribble: half a metre ahead at each touch, further between."""
     velocity = np.gradient(path, times, axis=0)
     speed = np.linalg.norm(velocity, axis=1)
     way = velocity / np.maximum(speed, 0.05)[:, None]
@@ -298,8 +318,17 @@ def _dribbled(times: np.ndarray, path: np.ndarray, begin: float, end: float) -> 
 
 
 def tracked(times: np.ndarray, positions: np.ndarray, seed: int, slow: float = 0.08, fast: float = 0.01) -> np.ndarray:
-    """Positions (M, K) as a tracking system would have them: `slow` metres RMS that drift over seconds, `fast` from
-    frame to frame (optical systems: 8 to 9 cm against truth, about 1 cm between frames)."""
+    """Add the noise of a tracking system.
+
+    Optical systems have 8 to 9 cm against truth, and about 1 cm between frames.
+
+    Args:
+        times: (M,) s.
+        positions: (M, K) m.
+        seed: of the noise.
+        slow: m RMS that drift over seconds.
+        fast: m RMS from frame to frame.
+    """
     random = np.random.default_rng(seed)
     drift = random.normal(size=(len(times) + 80, positions.shape[1]))
     window = np.hanning(43)[1:-1]
@@ -310,7 +339,7 @@ def tracked(times: np.ndarray, positions: np.ndarray, seed: int, slow: float = 0
 
 
 def write_match(folder: Path) -> None:
-    """`player1.csv`, `player2.csv` (track and ball at 10 Hz) and their `.txt` timelines."""
+    """Write `player1.csv`, `player2.csv` (track and ball at 10 Hz) and their `.txt` timelines."""
     times, players, ball = true_paths()
     every = slice(None, None, int(100 / MATCH_RATE))
     seen_ball = ball[every].copy()
@@ -330,14 +359,14 @@ def write_match(folder: Path) -> None:
 
 
 def write_library(folder: Path) -> None:
-    """Each clip as `NAME.bvh` with its words in `NAME.txt`."""
+    """Write each clip as `NAME.bvh` with its labels in `NAME.txt`."""
     for clip in clips():
         bvh.write(folder / f"{clip.name}.bvh", clip.motion)
         (folder / f"{clip.name}.txt").write_text(format_timeline(words_of(clip)), encoding="utf-8", newline="\n")
 
 
 def make(folder: Path = HERE) -> None:
-    """The whole sample below `folder`."""
+    """Write the whole sample below `folder`."""
     for part, write in (("library", write_library), ("match", write_match)):
         (folder / part).mkdir(parents=True, exist_ok=True)
         write(folder / part)

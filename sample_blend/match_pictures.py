@@ -1,8 +1,8 @@
-"""Renders the pictures of docs/match/match-panel.md: the small match, from the stand and through a player's eyes.
+"""Render the pictures of docs/match/match-panel.md: the small match, from the stand and through a player's eyes.
 
     .venv/bin/python sample_blend/match_pictures.py [FOLDER]
 
-Run it with Blender as a Python module; it takes some two minutes.
+Run it with Blender as a Python module; it takes about two minutes.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ import demo
 
 OUT = demo.HERE.parent / "docs" / "pictures"
 SPAN = (6.0, 12.0)  # seconds: a run with the ball, a cross, a header
-STAND, EYES = 9.7, 9.35  # seconds that are shown
-WHO = "home_10"  # whose eyes
+STAND, EYES = 9.7, 9.35  # seconds of the two pictures
+WHO = "home_10"  # the player of the second picture
 
 
 def shown(bpy, folder: str) -> None:
-    """The match in an empty file."""
+    """Synthesize the match in an empty file."""
     bpy.ops.wm.read_homefile(use_empty=True)
     scene = bpy.context.scene
     scene.render.fps = 30
@@ -32,7 +32,7 @@ def shown(bpy, folder: str) -> None:
 
 
 def render(bpy, second: float, path: pathlib.Path) -> None:
-    """The picture of a second of the match's clock through the scene's camera."""
+    """Render a second of the match's clock through the scene's camera."""
     scene, match = bpy.context.scene, bpy.context.scene.beyond_mocap_match
     scene.frame_set(round(match.shown_first + (second - match.shown_start) * 30.0))
     scene.render.engine, scene.cycles.samples, scene.cycles.use_denoising = "CYCLES", 64, False
@@ -42,7 +42,7 @@ def render(bpy, second: float, path: pathlib.Path) -> None:
 
 
 def main() -> int:
-    """Make both."""
+    """Render both pictures."""
     folder = pathlib.Path(sys.argv[1]) if len(sys.argv) > 1 else OUT
     _, switch_off = demo.load_extension()
     import bpy

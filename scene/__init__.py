@@ -1,6 +1,6 @@
-"""Blender's own data: what the core's motions, tracks and clips become in a file. No buttons here.
+"""The Blender side: turns the core's motions, tracks and clips into data of a .blend file. It contains no buttons.
 
-A room for each feature, with what it does in its own docstring; docs/architecture.md has an overview. All stand on
+There is one package for each feature, described in its own docstring; docs/architecture.md has an overview. All use
 `core`: channels, clock, background work, settings, registration, and the one live watcher.
 """
 
@@ -11,8 +11,7 @@ from .match import child
 
 
 def register():
-    """Register the data classes, attach them to Blender's own data, and begin to watch; where that fails, undo it and
-    pass the error on."""
+    """Register the data classes, attach them to Blender's own data, and start watching; undo it all if a step fails."""
     registration.register_package(__name__)
     try:
         start_watching()
@@ -22,7 +21,7 @@ def register():
 
 
 def unregister():
-    """End what runs, undo what was registered, and forget what was kept in memory."""
+    """Stop what runs, undo the registration, and clear what is stored in memory."""
     stop_watching()
     child.end_all()
     registration.unregister_package(__name__)

@@ -1,5 +1,7 @@
-"""A motion filmed by itself, as raters of a study see it: one grey body on a plain floor, the same light, a camera
-that keeps at the same distance (Faustino §5.1.1). His study lacked shadows and, where there is one, the ball."""
+"""Film a motion for a rating study: one grey body on a plain floor, constant light, a camera at a constant distance.
+
+Faustino's study (§5.1.1) lacked shadows and the ball.
+"""
 
 from __future__ import annotations
 
@@ -20,17 +22,24 @@ from .core.set_aside import scene_aside
 from .rigs import armature
 from .stage import ball, body
 
-SHIRT = (0.30, 0.32, 0.35)  # linear RGB, no team's
+SHIRT = (0.30, 0.32, 0.35)  # linear RGB, a neutral grey
 CAMERA_FROM = (-1.1, -5.2, 0.75)  # metres from the middle of the body
-HIGH = 0.95  # metres of that middle above the floor
-GLIDE = 1.0  # seconds of the running mean by which the camera follows
-_AROUND, _TILE = 24.0, 1.0  # metres of floor beyond the way, and of a tile: a foot that slides is seen against them
+HIGH = 0.95  # metres, height of that middle above the floor
+GLIDE = 1.0  # seconds of the running mean for the camera's path
+_AROUND, _TILE = 24.0, 1.0  # metres of floor around the path, and of a tile; tiles make foot slide visible
 
 
 @dataclass(frozen=True)
 class Look:
-    """How clips are filmed. engine: Blender's name. size: pixels (width, height). fps: frames a second. samples: of a
-    pixel. movie: whether an MP4 is written, else a folder of numbered PNGs."""
+    """How clips are rendered.
+
+    Attributes:
+        engine: Blender's name.
+        size: pixels (width, height).
+        fps: frames per second.
+        samples: per pixel.
+        movie: whether to write an MP4, else a folder of numbered PNGs.
+    """
 
     engine: str
     size: tuple[int, int]
@@ -40,8 +49,14 @@ class Look:
 
 
 def film(path: Path, motion: Motion, ball_path: BallPath | None, look: Look) -> None:
-    """Render a motion to `path`: a movie, or a folder of pictures, written whole or not at all. Nothing stays in the
-    file. ball_path: its ball, whose first sample is at the motion's first frame."""
+    """Render a motion to a movie or a folder of pictures, completely or not at all; the blend file stays unchanged.
+
+    Args:
+        path: the movie or folder.
+        motion: the motion.
+        ball_path: its ball, whose first sample is at the motion's first frame, or None.
+        look: how to render.
+    """
     with scene_aside("Study") as scene:
         _settings(scene, look)
         scene.frame_start, scene.frame_end = 1, 1 + int(motion.duration * look.fps + 1e-4)
@@ -57,8 +72,16 @@ def film(path: Path, motion: Motion, ball_path: BallPath | None, look: Look) -> 
 
 
 def engine_here(wanted: str) -> str:
-    """Blender's name of an engine in this version: EEVEE has had two. AUTO is Cycles where there is no window, for
-    EEVEE is very slow where there is no graphics card. Where the Cycles add-on is off, EEVEE takes its place."""
+    """Find Blender's name of an engine in this version (EEVEE has two names).
+
+    AUTO is Cycles if there is no window, because EEVEE is very slow without a graphics card. If the Cycles add-on is
+    disabled, EEVEE replaces it.
+
+    Args:
+        requested: "AUTO", "CYCLES", "EEVEE" or "WORKBENCH".
+    Returns:
+        Blender's name.
+    """
     if wanted == "AUTO":
         wanted = "CYCLES" if bpy.app.background else "EEVEE"
     if wanted == "CYCLES" and not hasattr(bpy.types.Scene, "cycles"):
@@ -70,6 +93,7 @@ def engine_here(wanted: str) -> str:
 
 
 def _settings(scene: bpy.types.Scene, look: Look) -> None:
+    """Set the render settings of the scene."""
     render = scene.render
     render.engine, render.fps, render.fps_base = look.engine, look.fps, 1.0
     render.resolution_x, render.resolution_y, render.resolution_percentage = *look.size, 100
@@ -86,7 +110,7 @@ def _settings(scene: bpy.types.Scene, look: Look) -> None:
     settings.file_format = "FFMPEG" if look.movie else "PNG"
     if look.movie:
         render.ffmpeg.format, render.ffmpeg.codec, render.ffmpeg.constant_rate_factor = "MPEG4", "H264", "HIGH"
-    render.use_stamp, render.use_file_extension = False, not look.movie  # stamps would tell files and times
+    render.use_stamp, render.use_file_extension = False, not look.movie  # stamps would reveal files and times
 
 
 def _player(scene: bpy.types.Scene, motion: Motion) -> None:
@@ -97,7 +121,7 @@ def _player(scene: bpy.types.Scene, motion: Motion) -> None:
 
 
 def _floor(scene: bpy.types.Scene, motion: Motion) -> None:
-    """Tiles of two greys under the whole way."""
+    """Create a floor of tiles in two greys below the whole path."""
     low = np.floor(motion.root_positions[:, :2].min(axis=0) - _AROUND)
     high = np.ceil(motion.root_positions[:, :2].max(axis=0) + _AROUND)
     across, along = (np.arange(a, b + _TILE, _TILE) for a, b in zip(low, high))
@@ -114,14 +138,14 @@ def _floor(scene: bpy.types.Scene, motion: Motion) -> None:
 
 
 def _light(scene: bpy.types.Scene) -> None:
-    """A sun that casts shadows, and a pale sky."""
+    """Create a sun that casts shadows, and a pale sky."""
     data = bpy.data.lights.new("Sun", "SUN")
     data.energy, data.angle = 3.0, 0.03
     sun = bpy.data.objects.new("Sun", data)
     sun.rotation_euler = (0.75, 0.25, 0.5)
     scene.collection.objects.link(sun)
     world = bpy.data.worlds.new("Study")
-    if world.node_tree is None:  # Blender before 5.0 makes it on request
+    if world.node_tree is None:  # Blender before 5.0 creates it on request
         world.use_nodes = True
     sky = next(node for node in world.node_tree.nodes if node.type == "BACKGROUND")
     sky.inputs["Color"].default_value, sky.inputs["Strength"].default_value = (0.72, 0.76, 0.80, 1.0), 0.8
@@ -129,7 +153,7 @@ def _light(scene: bpy.types.Scene) -> None:
 
 
 def _camera(scene: bpy.types.Scene, motion: Motion) -> None:
-    """A camera that looks the same way all the time and glides along with the body."""
+    """Create a camera with a constant direction that follows the body smoothly."""
     data = bpy.data.cameras.new("Camera")
     data.lens, data.clip_end = 40.0, 500.0
     camera = bpy.data.objects.new("Camera", data)
@@ -146,8 +170,16 @@ def _camera(scene: bpy.types.Scene, motion: Motion) -> None:
 
 
 def followed(places: np.ndarray, fps: float) -> np.ndarray:
-    """Places (T, 2) m that glide along with a body's: their running mean over GLIDE seconds, ends point-reflected, so
-    that it neither lags nor starts with a jolt."""
+    """Smooth a path for the camera: the running mean over GLIDE seconds.
+
+    The ends are point-reflected, so that it neither lags nor starts with a jolt.
+
+    Args:
+        positions: (T, 2) m.
+        fps: frames per second.
+    Returns:
+        (T, 2) m.
+    """
     half = min(int(0.5 * GLIDE * fps), len(places) - 1)
     if half < 1:
         return places

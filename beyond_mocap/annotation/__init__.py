@@ -1,19 +1,20 @@
 """Labels with a time: vocabulary, timeline, text form, gaits by speed.
 
-- `labels`      what each label means, from one table (`vocabulary.csv`); `ball_contact` what that says of a ball met
-- `vocabulary`  the decision tree of words (Faustino, Appendix A), nearest words, left and right
-- `timeline`    stretches and key moments, validation, filling with automatic locomotion
-- `text`        the text form of timelines (§4.2.2)
-- `clips`       what the library's clips are annotated with
-- `gaits`       which gait a speed asks for (§3.1.1), and which way a body faces while it goes
-- `decision`    the vocabulary as a tree of choices on number keys, with what the library has of them
-- `annotating`  annotating by keys: what each does, without any window
+- `labels`        what each label means, from one table (`vocabulary.csv`)
+- `ball_contact`  what labels say about the ball: which body part meets it, and when
+- `vocabulary`    the decision tree of labels (Faustino, Appendix A), nearest labels, left and right
+- `timeline`      spans and key moments, validation, automatic locomotion where nothing is annotated
+- `text`          the text form of timelines (Faustino §4.2.2)
+- `clips`         the annotations of library clips
+- `gaits`         the gait for a speed (Faustino §3.1.1), and the heading of a body while it moves
+- `decision`      the vocabulary as a tree of choices on number keys, with what the library has for each
+- `key_commands`  annotating by keys: what each key does, without any window
 
     timeline = read_timeline("player.txt", fps=30)
-    validate(timeline, known_words=library_words, start=track.times[0], end=track.times[-1], where="player.txt")
+    check_timeline(timeline, known_labels=library_labels, start=track.times[0], end=track.times[-1], where="player.txt")
     speeds = [0.1, 1.3, 2.9]
-    gaits = automatic_gaits(sampled.speed, sampled.fps, speeds, gait_thresholds(speeds))
-    filled = fill(timeline, sampled.times, [(LOCOMOTION[g],) for g in gaits])
+    gaits = choose_gaits(sampled.speed, sampled.fps, speeds, compute_gait_thresholds(speeds))
+    filled = fill_timeline(timeline, sampled.times, [(LOCOMOTION[g],) for g in gaits])
 """
 
 from .clips import ClipAnnotation, clip_annotations, read_annotation_csv, read_clip_annotations

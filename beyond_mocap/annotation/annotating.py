@@ -1,11 +1,11 @@
 """Annotating by keys while the match plays: what each key does, without any window (Faustino §6.2).
 
-`press` takes the state, a key and the playhead, and returns the next state with what is to be done. A key moment is at
-the time at which the first key of its words was pressed, wherever the playhead has gone meanwhile.
+`handle_key` takes the state, a key and the playhead, and returns the next state and the commands to run. A key moment
+is at the time at which the first key of its labels was pressed, wherever the playhead is afterwards.
 
-    state = State()
+    state = AnnotationState()
     for key in ("2", "2", "3", "5", "ENTER"):       # kick right low top
-        state, commands = press(state, key, Now(9.7))
+        state, commands = handle_key(state, key, Playhead(9.7))
     commands                                        # (AddMoment(9.7, ("kick", "right", "low", "top")),)
 """
 
@@ -19,30 +19,35 @@ from .vocabulary import swap_sides
 DIGITS = tuple("123456789")
 
 KEYS = {
-    "1 to 9": "Choose the word; the first one opens the menu and holds the time",
+    "1 to 9": "Choose a label; the first one opens the menu and stores the time",
     "0": "Skip a level of the tree",
-    "NEXT_PAGE": "More words",
-    "PREVIOUS_PAGE": "Back to the words before",
-    "ENTER": "Done: these words",
-    "BACK": "Take the last word back",
-    "ESC": "Close the menu; then give up the in point; then leave",
-    "IN": "A stretch begins here",
-    "OUT": "The stretch ends here; its words follow",
-    "MIRROR": "Exchange left and right: of the words chosen so far, else of what is at the playhead",
-    "REMOVE": "Give up the words chosen so far, else remove what is at the playhead",
-    "EARLIER": "A frame earlier: the moment at the playhead with it, else the playhead alone",
-    "LATER": "A frame later, likewise",
-    "PREVIOUS": "To the moment before",
-    "NEXT": "To the moment after",
-    "PREVIOUS_PLAYER": "The player above in the list",
-    "NEXT_PLAYER": "The player below in the list",
+    "NEXT_PAGE": "Show more labels",
+    "PREVIOUS_PAGE": "Show the previous labels",
+    "ENTER": "Add the chosen labels",
+    "BACK": "Remove the last label",
+    "ESC": "Close the menu; then clear the in point; then stop annotating",
+    "IN": "Start a span here",
+    "OUT": "End the span here and choose its labels",
+    "MIRROR": "Exchange left and right of the chosen labels, or of the annotation at the playhead",
+    "REMOVE": "Clear the chosen labels, or remove the annotation at the playhead",
+    "EARLIER": "Move the moment at the playhead one frame earlier, or only the playhead",
+    "LATER": "Move the moment at the playhead one frame later, or only the playhead",
+    "PREVIOUS": "Go to the previous moment",
+    "NEXT": "Go to the next moment",
+    "PREVIOUS_PLAYER": "Select the player above in the list",
+    "NEXT_PLAYER": "Select the player below in the list",
 }
-"""Every key by the name that `press` knows, and what it does."""
+"""Every key by its name for `handle_key`, and what it does."""
 
 
 @dataclass(frozen=True)
 class AddMoment:
-    """A key moment at `time` seconds."""
+    """Add a key moment.
+
+    Attributes:
+        time: seconds on the track's clock.
+        words: its labels.
+    """
 
     time: float
     words: tuple[str, ...]
@@ -50,7 +55,12 @@ class AddMoment:
 
 @dataclass(frozen=True)
 class AddSpan:
-    """A stretch from `start` to `end` seconds."""
+    """Add a span.
+
+    Attributes:
+        start, end: seconds on the track's clock.
+        words: its labels.
+    """
 
     start: float
     end: float
@@ -59,14 +69,23 @@ class AddSpan:
 
 @dataclass(frozen=True)
 class AtPlayhead:
-    """Something for the moment or stretch at the playhead: "mirror", "remove", "earlier" or "later"."""
+    """Change the moment or span at the playhead.
+
+    Attributes:
+        what: "mirror", "remove", "earlier" or "later".
+    """
 
     what: str
 
 
 @dataclass(frozen=True)
 class Go:
-    """To the neighbouring "moment" or "player": `step` -1 or 1."""
+    """Go to a neighbour.
+
+    Attributes:
+        to: "moment" or "player".
+        step: -1 or 1.
+    """
 
     to: str
     step: int
@@ -74,12 +93,16 @@ class Go:
 
 @dataclass(frozen=True)
 class Leave:
-    """Annotating is over."""
+    """Stop annotating."""
 
 
 @dataclass(frozen=True)
 class Tell:
-    """One line for the user."""
+    """Show a message to the user.
+
+    Attributes:
+        line: one line.
+    """
 
     line: str
 
@@ -89,8 +112,13 @@ Command = AddMoment | AddSpan | AtPlayhead | Go | Leave | Tell
 
 @dataclass(frozen=True)
 class Now:
-    """The playhead. time: seconds on the track's clock. frame: seconds that one frame lasts. before: second at which
-    the last moment or stretch before the playhead ends, None where there is none."""
+    """The playhead.
+
+    Attributes:
+        time: seconds on the track's clock.
+        frame_duration: seconds of one frame.
+        previous_end: second at which the last moment or span before the playhead ends, None without one.
+    """
 
     time: float
     frame: float = 1.0 / 30.0
@@ -99,9 +127,16 @@ class Now:
 
 @dataclass(frozen=True)
 class State:
-    """Where the user is. held: what the library has, None without one. trail: the walks down the tree so far, the last
-    one shown; empty while no menu is open. time: when the open walk began. start: the in point, None while none is
-    set. end: the out point of the stretch whose words are being chosen. page: of the menu, from 0."""
+    """The state of annotating.
+
+    Attributes:
+        available: the library's label combinations, None without a library.
+        trail: the choices so far, one per step, the last one displayed; empty while no menu is open.
+        time: when the open menu was opened, seconds on the track's clock.
+        start: the in point in seconds, None while none is set.
+        end: the out point in seconds of the span whose labels are being chosen.
+        page: page of the menu, from 0.
+    """
 
     held: Held | None = None
     trail: tuple[Walk, ...] = ()
@@ -112,22 +147,30 @@ class State:
 
     @property
     def walk(self) -> Walk:
-        """The walk whose options are on the keys; while no menu is open, the beginning of a key moment's."""
+        """The choices whose options are on the keys; without an open menu, the start of a key moment."""
         return self.trail[-1] if self.trail else Walk("moment")
 
     @property
     def shown(self) -> tuple[Option, ...]:
-        """The options of the page that is shown."""
+        """The options of the displayed page."""
         return tuple(option for option in options(self.walk, self.held) if option.page == self.page)
 
     @property
     def pages(self) -> int:
-        """Of the walk's options."""
+        """The number of pages of options."""
         return pages(self.walk, self.held)
 
 
 def press(state: State, key: str, now: Now) -> tuple[State, tuple[Command, ...]]:
-    """The state after a key (of KEYS, or a digit) at the playhead `now`, and what is to be done."""
+    """Handle one key.
+
+    Args:
+        state: the state before.
+        key: a key of `KEYS` or a digit.
+        now: the playhead.
+    Returns:
+        The state after the key, and the commands to run.
+    """
     if key in DIGITS:
         found = next((option for option in state.shown if option.digit == int(key)), None)
         return (state, ()) if found is None else pick(state, found.word, now)
@@ -141,11 +184,20 @@ def press(state: State, key: str, now: Now) -> tuple[State, tuple[Command, ...]]
 
 
 def pick(state: State, word: str, now: Now) -> tuple[State, tuple[Command, ...]]:
-    """The state after a word was chosen, by its digit or by the mouse."""
+    """Choose a label, by its digit or by the mouse.
+
+    Args:
+        state: the state before.
+        label: the label.
+        now: the playhead.
+    Returns:
+        The state after the choice, and no commands.
+    """
     return _walked(state, choose(state.walk, word), now), ()
 
 
 def _in_the_menu(state: State, key: str, now: Now) -> tuple[State, tuple[Command, ...]]:
+    """Handle a key while the menu is open; other keys add the chosen labels first."""
     if key == "ENTER":
         return _accepted(state)
     if key == "BACK":
@@ -162,6 +214,7 @@ def _in_the_menu(state: State, key: str, now: Now) -> tuple[State, tuple[Command
 
 
 def _outside(state: State, key: str, now: Now) -> tuple[State, tuple[Command, ...]]:
+    """Handle a key while no menu is open."""
     if key == "ESC":
         return (state, (Leave(),)) if state.start is None else (replace(state, start=None), ())
     if key == "IN":
@@ -178,16 +231,19 @@ def _outside(state: State, key: str, now: Now) -> tuple[State, tuple[Command, ..
 
 
 def _out(state: State, now: Now) -> tuple[State, tuple[Command, ...]]:
-    """The words of the stretch that ends here; without an in point it begins where the last thing before it ends."""
+    """End a span and open the menu for its labels.
+
+    Without an in point the span starts where the last annotation before it ends.
+    """
     start = now.before if state.start is None else state.start
     if start is None or abs(start - now.time) < 0.5 * now.frame:
-        return state, (Tell("a stretch needs an in point (I) before its out point (O)"),)
+        return state, (Tell("Set an in point (I) before the out point (O)"),)
     start, end = sorted((start, now.time))
     return replace(state, trail=(Walk("span"),), time=start, start=start, end=end, page=0), ()
 
 
 def _accepted(state: State) -> tuple[State, tuple[Command, ...]]:
-    """What was chosen, done; nothing where no word was."""
+    """Add the moment or span with the chosen labels; without labels only close the menu."""
     walk = state.walk
     if not walk.words:
         return _closed(state), ()
@@ -211,7 +267,7 @@ def _turned(state: State, step: int, now: Now) -> State:
 
 
 def _opened(state: State, now: Now) -> State:
-    """The state with a menu, opened at the playhead where none is."""
+    """Open the menu at the playhead unless it is open."""
     return state if state.trail else replace(state, trail=(state.walk,), time=now.time)
 
 

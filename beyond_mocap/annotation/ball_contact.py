@@ -1,4 +1,4 @@
-"""What labels say of a ball that is met: by which part, by both hands, in flight; and the surfaces that may meet it."""
+"""What labels say about ball contact: the body part, both hands, in flight; and the surfaces that may meet the ball."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .striking import Surface, part_surfaces, smallest_gap
 from .vocabulary import SIDES
 
 _BY_PART = {part: frozenset(list_labels(part=part)) for part in ("head", "chest", "hand", "foot")}
-"""Part -> its labels; of a motion's labels the first part with one of them counts."""
+"""Part -> its labels. The first part that has one of a motion's labels counts."""
 
 _BOTH_HANDS = frozenset(list_labels(both_hands=True))
 _IN_FLIGHT = frozenset(list_labels(in_flight=True))
@@ -23,59 +23,110 @@ _FOOT_ON_BALL = tuple(
 )  # fmt: skip
 _FOOT_OR_OTHER = frozenset(label.name for label in read_labels().values() if "foot" in label.parts and not label.part)
 _FOOT_TAKES = frozenset(list_labels(ball="takes", part="foot", is_root=True))
-_FLIGHT_SECONDS = 0.6
+_FLIGHT_SECONDS = 0.6  # from take-off to ball contact at most, in dives by hand
 
 
 def striking_part(words: Iterable[str]) -> str | None:
-    """Which part meets the ball: "foot", "head", "chest" or "hand"; None for words that touch no ball.
+    """Find the body part that meets the ball.
 
-    A receive is taken with the foot unless it says body or chest (Faustino App. A: receive foot | body)."""
+    A receive is taken with the foot unless a label says body or chest (Faustino, Appendix A: receive foot | body).
+
+    Args:
+        labels: the labels of a motion.
+    Returns:
+        "foot", "head", "chest" or "hand"; None for labels without ball contact.
+    """
     words = set(words)
     return next((part for part, named in _BY_PART.items() if named & words), None)
 
 
 def meeting_words(played: Iterable[str], asked: Iterable[str]) -> tuple[str, ...]:
-    """The words that say which part meets the ball at a key moment: those that are played, else those asked for."""
+    """Choose the labels that define the body part at a key moment.
+
+    Args:
+        played: the labels of the clip.
+        requested: the labels of the key moment.
+    Returns:
+        The clip's labels if they name a part, otherwise the requested ones.
+    """
     played = tuple(played)
     return played if striking_part(played) else tuple(asked)
 
 
 def met_within(words: Iterable[str]) -> float:
-    """Seconds after a key moment in which the ball may be met: 0, but for dives by hand, whose key is where the ball is
-    met or, in recordings without a ball, where the body takes off."""
+    """Find how long after a key moment the ball may be met.
+
+    Only dives by hand have such a window: their key moment is the ball contact or, in recordings without a ball, the
+    body's take-off.
+
+    Args:
+        labels: the labels of a motion.
+    Returns:
+        Seconds, 0 for all other labels.
+    """
     words = set(words)
     return _FLIGHT_SECONDS if _IN_FLIGHT & words and striking_part(words) == "hand" else 0.0
 
 
 def by_both_hands(words: Iterable[str]) -> bool:
-    """Whether the words ask for a ball between both hands, where both come near enough."""
+    """Return whether the labels mean a ball between both hands, where both come near enough.
+
+    Args:
+        labels: the labels of a motion.
+    """
     return bool(_BOTH_HANDS & set(words))
 
 
 def shows_foot_on_ball(words: frozenset[str]) -> bool:
-    """Whether a foot meets the ball for certain in what has these words."""
+    """Return whether a foot certainly meets the ball in a motion with these labels.
+
+    Args:
+        labels: the labels of a motion.
+    """
     return any(part <= words for part in _FOOT_ON_BALL)
 
 
 def may_use_foot(words: frozenset[str]) -> bool:
-    """Whether a foot meets the ball in what has these words, be it with other parts in turn."""
+    """Return whether a foot may meet the ball, possibly besides other parts, in a motion with these labels.
+
+    Args:
+        labels: the labels of a motion.
+    """
     return shows_foot_on_ball(words) or bool(_FOOT_OR_OTHER & words)
 
 
 def may_use_several(words: Iterable[str], part: str) -> bool:
-    """Whether the words name something that meets the ball with several parts, `part` among them."""
+    """Return whether a label names an action that meets the ball with several parts, including `part`.
+
+    Args:
+        labels: the labels of a motion.
+        part: a part of `BODY_PARTS` or "tool".
+    """
     labels = (find_label(word) for word in words)
     return any(part in label.parts and not label.part for label in labels)
 
 
 def takes_with_foot(words: Iterable[str]) -> bool:
-    """Whether the words name an action in which a foot takes the ball, unless a word beside says another part does."""
+    """Return whether a label names an action in which a foot takes the ball, unless another label names another part.
+
+    Args:
+        labels: the labels of a motion.
+    """
     return bool(_FOOT_TAKES.intersection(words))
 
 
 def surfaces(skeleton: Skeleton, words: Iterable[str]) -> tuple[Surface, ...]:
-    """The surfaces that may meet the ball by these words: one per limb, of the side that is named or of both (a dive's
-    side is where it goes: either hand serves); none for words that touch no ball or a part that the skeleton lacks."""
+    """Build the surfaces that may meet the ball in a motion with these labels.
+
+    There is one surface per limb, on the side that a label names or on both. The side of a dive is its direction, so
+    either hand counts.
+
+    Args:
+        skeleton: the skeleton, J joints.
+        labels: the labels of a motion.
+    Returns:
+        The surfaces; none for labels without ball contact, or for a part that the skeleton lacks.
+    """
     words = set(words)
     part = striking_part(words)
     named = set() if part == "hand" and _IN_FLIGHT & words else words
@@ -85,6 +136,15 @@ def surfaces(skeleton: Skeleton, words: Iterable[str]) -> tuple[Surface, ...]:
 def contact_gap(
     skeleton: Skeleton, positions: np.ndarray, rotations: np.ndarray, words: Iterable[str], ball: np.ndarray
 ) -> np.ndarray:
-    """The smallest gap (...,) m of the surfaces that may meet the ball by these words, NaN without any; see
-    `annotation.striking.smallest_gap`, which says what the arrays are."""
+    """Measure the smallest gap between the ball and the surfaces that may meet it.
+
+    Args:
+        skeleton: the skeleton, J joints.
+        positions: (..., J, 3) m, world frame.
+        rotations: (..., J, 4) quaternions, world frame.
+        labels: the labels of the motion.
+        ball: (..., 3) m, the ball's centre, world frame.
+    Returns:
+        (...,) m, negative where surfaces overlap, NaN without a surface.
+    """
     return smallest_gap(surfaces(skeleton, words), positions, rotations, ball)

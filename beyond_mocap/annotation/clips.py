@@ -1,4 +1,4 @@
-"""What the library's clips are annotated with: `NAME.txt` beside `NAME.bvh`, or rows of an `annotations.csv`."""
+"""Annotations of library clips: `NAME.txt` beside `NAME.bvh`, or rows of an `annotations.csv`."""
 
 from __future__ import annotations
 
@@ -18,8 +18,13 @@ _COLUMNS = ("file", "start_frame", "end_frame", "key_frame", "labels")
 
 @dataclass(frozen=True)
 class ClipAnnotation:
-    """Words for a stretch of one clip. start, end: 0-based frames in the clip's own rate, end inclusive. key: the frame
-    of the key moment (the foot meets the ball), None for none. words: from root to leaf plus modifiers."""
+    """Labels for a span of one clip.
+
+    Attributes:
+        start, end: 0-based frames at the clip's own rate, end included.
+        key: frame of the key moment (such as ball contact), None without one.
+        words: the labels, from root to leaf, then modifiers.
+    """
 
     start: float
     end: float
@@ -28,16 +33,32 @@ class ClipAnnotation:
 
 
 def read_clip_annotations(path: str | os.PathLike, fps: float) -> tuple[ClipAnnotation, ...]:
-    """The annotations in a text file beside a clip, in the timelines' text form, ordered by start; InputError as there.
+    """Read the annotations in a text file beside a clip, in the text form of timelines.
 
-    fps: the clip's rate; times become its nearest frames. A key line belongs to the shortest span around it that names
-    the same action, and lends it its words; a key line on its own has no extent. Spans may overlap; spans without words
-    or with `transition` say nothing about a clip and are left out."""
+    A key line belongs to the shortest span around it that names the same action, and adds its labels to that span; a
+    key
+    line without a span has no extent. Spans may overlap; spans without labels or with `transition` are skipped.
+
+    Args:
+        path: the file.
+        fps: the clip's frame rate; times become the nearest frames.
+    Returns:
+        The annotations, ordered by start.
+    Raises:
+        InputError: if the file cannot be read or a line is invalid.
+    """
     return clip_annotations(parse_timeline(read_text(path), str(path), fps), fps)
 
 
 def clip_annotations(timeline: Timeline, fps: float) -> tuple[ClipAnnotation, ...]:
-    """A clip's timeline (seconds from its first frame) as annotations in frames of the rate `fps`."""
+    """Convert a clip's timeline to annotations in frames.
+
+    Args:
+        timeline: seconds from the clip's first frame.
+        fps: the clip's frame rate.
+    Returns:
+        The annotations, ordered by start; see `read_clip_annotations`.
+    """
     spans = [span for span in timeline.spans if span.words and span.words != (TRANSITION,)]
     owners = [_owner(key, spans) for key in timeline.keys]
     out = [_annotation(span, None, fps) for span in spans if span not in owners]
@@ -48,11 +69,20 @@ def clip_annotations(timeline: Timeline, fps: float) -> tuple[ClipAnnotation, ..
 def read_annotation_csv(
     path: str | os.PathLike, but: Callable[[Mapping], bool] | None = None
 ) -> dict[str, tuple[ClipAnnotation, ...]]:
-    """file (as the column spells it) -> its annotations in the table's order.
+    """Read a table of annotations.
 
-    Columns file, start_frame, end_frame, key_frame, labels; others are ignored. A blank key_frame means none; rows
-    without labels are left out, and those (column -> text) of which `but` is true. InputError names the line of a row
-    that is not of this form."""
+    The columns are file, start_frame, end_frame, key_frame and labels; others are ignored. A blank key_frame means no
+    key
+    moment. Rows without labels are skipped.
+
+    Args:
+        path: the file.
+        skip_row: receives a row (column -> text) and returns whether to skip it too.
+    Returns:
+        file, as spelled in the table -> its annotations in the table's order.
+    Raises:
+        InputError: with the line, if a row is invalid.
+    """
     reader = csv.DictReader(io.StringIO(read_text(path), newline=""))
     found: dict[str, list[ClipAnnotation]] = {}
     try:
@@ -68,17 +98,20 @@ def read_annotation_csv(
 
 
 def _owner(key: KeyMoment, spans: list[Span]) -> Span | None:
+    """Find the shortest span around a key moment that names the same action."""
     around = [s for s in spans if s.start <= key.time <= s.end and _actions(key) & _actions(s)]
     return min(around, key=lambda span: span.end - span.start, default=None)
 
 
 def _actions(item: Span | KeyMoment) -> set[str]:
-    """The words that name what is done: App. A's discrete roots, or all words without any ("slide", user words)."""
+    """List the labels that name the action: Appendix A's discrete roots, or without any all labels ("slide", user
+    labels)."""
     words = set(item.words)
     return words & DISCRETE or words
 
 
 def _annotation(span: Span | None, key: KeyMoment | None, fps: float) -> ClipAnnotation:
+    """Build the annotation of a span, of a key moment, or of both."""
     moment = None if key is None else round(key.time * fps)
     words = dict.fromkeys((*(span.words if span else ()), *(key.words if key else ())))
     start, end = (span.start, span.end) if span else (key.time, key.time)
@@ -95,7 +128,7 @@ def _check_columns(names, path) -> None:
 def _file(row: dict, place: str) -> str:
     name = (row["file"] or "").strip()
     if not name:
-        raise InputError(place, "no file", "the clip's path, relative to this table")
+        raise InputError(place, "the file is blank", "the clip's path, relative to this table")
     return name
 
 

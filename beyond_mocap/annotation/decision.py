@@ -1,15 +1,15 @@
-"""The vocabulary as a decision tree for ten fingers: which words come next, on which number key, and what the library
-has of them (Faustino §6.2 and Appendix A).
+"""The vocabulary as a decision tree on ten keys: the next labels, their number keys, and what the library has for them.
 
-Digits never move, so that fingers learn them. First come the roots of the tree in its order. After the root 1 is left
-and 2 is right wherever one is in the tree, 8 and 9 are the paces of a key moment (standing, running) or the ways of a
-stretch (front, back), and 3 to 7 are the tree's next words; what has no room follows on further pages, with the other
-modifiers, the rest of the root's branches and the library's own words behind. A level may be skipped ("kick top").
+Digits do not move, so that users can learn them (Faustino §6.2 and Appendix A). First come the roots of the tree in its
+order. After the root, 1 is left and 2 is right wherever they occur in the tree; 8 and 9 are the paces of a key moment
+(standing, running) or the directions of a span (front, back); 3 to 7 are the tree's next labels. Further pages have the
+remaining labels, the other modifiers, the rest of the root's branches and the library's own labels. A level may be
+skipped ("kick top").
 
-    walk = Walk("moment")
-    for word in ("kick", "right", "low", "top"):
-        walk = choose(walk, word)       # digits 2, 2, 3, 5
-    walk.words                          # ("kick", "right", "low", "top")
+    choices = TreeChoices("moment")
+    for label in ("kick", "right", "low", "top"):
+        choices = choose_label(choices, label)      # digits 2, 2, 3, 5
+    choices.words                                   # ("kick", "right", "low", "top")
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from .labels import list_labels
 from .vocabulary import SIDES, TRANSITION, VOCABULARY, nearest, relatives, spoken, vocabulary_words
 
 PAGE = 9
-"""Number keys of one page."""
+"""Number keys on one page."""
 
 _TREES = {"moment": VOCABULARY["discrete"], "span": VOCABULARY["continuous"]}
 _LAST_TWO = {"moment": list_labels(group="pace"), "span": list_labels(group="way")}
@@ -33,8 +33,13 @@ _EXCLUSIVE = (frozenset(SIDES), frozenset(_LAST_TWO["moment"]), frozenset(_LAST_
 
 @dataclass(frozen=True)
 class Walk:
-    """A way down the tree. kind: "moment" or "span". steps: a word for each level gone down, None where it was skipped.
-    beside: words chosen that lead no deeper (a side, a pace, a way)."""
+    """The labels chosen so far, as a path down the tree.
+
+    Attributes:
+        kind: "moment" or "span".
+        steps: a label for each level of the tree, None where it was skipped.
+        modifiers: chosen labels that lead no deeper (a side, a pace, a direction).
+    """
 
     kind: str
     steps: tuple[str | None, ...] = ()
@@ -42,27 +47,43 @@ class Walk:
 
     @property
     def words(self) -> tuple[str, ...]:
-        """All chosen words, in the order in which one says them."""
+        """All chosen labels, in their usual order."""
         return spoken(word for word in (*self.steps, *self.beside) if word)
 
 
 @dataclass(frozen=True)
 class Held:
-    """What a library holds: the word combinations of its key moments and of its frames, with mirrored ones."""
+    """The label combinations of a library, mirrored ones included.
+
+    Attributes:
+        moments: combinations of its key moments.
+        spans: combinations of its frames.
+    """
 
     moments: tuple[frozenset[str], ...]
     spans: tuple[frozenset[str], ...]
 
     def of(self, kind: str) -> tuple[frozenset[str], ...]:
-        """The combinations for key moments or stretches."""
+        """Return the combinations for key moments or spans.
+
+        Args:
+            kind: "moment" or "span".
+        """
         return self.moments if kind == "moment" else self.spans
 
 
 @dataclass(frozen=True, kw_only=True)
 class Option:
-    """A word on a number key. page from 0, digit 1 to 9. served: whether the library has it together with the words
-    chosen before. instead: the nearest combination that it has, where it has not; empty where nothing comes near.
-    chosen: whether it is among the chosen words already."""
+    """A label on a number key.
+
+    Attributes:
+        word: the label.
+        page: from 0.
+        digit: 1 to 9.
+        is_available: whether the library has it together with the labels chosen before.
+        alternative: the nearest combination that the library has if it is not available; empty if none is near.
+        is_chosen: whether it is among the chosen labels.
+    """
 
     word: str
     page: int
@@ -73,18 +94,40 @@ class Option:
 
 
 def options(walk: Walk, held: Held | None = None) -> tuple[Option, ...]:
-    """What can be chosen next, by page and digit. held: None without a library; then nothing is missing."""
+    """List the options that can be chosen next.
+
+    Args:
+        walk: the labels chosen so far.
+        available: the library's combinations; without a library every option is available.
+    Returns:
+        The options by page and digit.
+    """
     return tuple(_option(word, place, walk, held) for place, word in enumerate(_layout(walk, held)) if word)
 
 
 def pages(walk: Walk, held: Held | None = None) -> int:
-    """On how many pages the options stand, at least 1."""
+    """Count the pages of options, at least 1.
+
+    Args:
+        walk: the labels chosen so far.
+        available: the library's combinations, or None.
+    """
     return max(1, -(-len(_layout(walk, held)) // PAGE))
 
 
 def choose(walk: Walk, word: str) -> Walk:
-    """The walk with one more word. A word of the tree's next level goes down; another stands beside, in place of its
-    opposite (left for right); one that stands there already is taken away."""
+    """Choose one more label.
+
+    A label of the tree's next level leads down. Another label becomes a modifier and replaces its opposite (left
+    replaces
+    right); a modifier that is chosen again is removed.
+
+    Args:
+        walk: the labels chosen so far.
+        label: the label.
+    Returns:
+        The new choices.
+    """
     if word in walk.beside:
         return replace(walk, beside=tuple(other for other in walk.beside if other != word))
     if word in _next_words(walk) or not walk.steps:
@@ -94,22 +137,45 @@ def choose(walk: Walk, word: str) -> Walk:
 
 
 def can_skip(walk: Walk) -> bool:
-    """Whether words stand below the level that comes next."""
+    """Return whether the tree has labels below the next level.
+
+    Args:
+        walk: the labels chosen so far.
+    """
     return any(below for place in _places(walk) for below in place.values())
 
 
 def skip(walk: Walk) -> Walk:
-    """The walk one level further down without a word of that level; itself where nothing stands below."""
+    """Go one level down the tree without a label of that level.
+
+    Args:
+        walk: the labels chosen so far.
+    Returns:
+        The new choices; the same ones if the tree has nothing below.
+    """
     return replace(walk, steps=(*walk.steps, None)) if can_skip(walk) else walk
 
 
 def served(walk: Walk, held: Held | None) -> bool:
-    """Whether the library has something with all words of the walk; True where no library is built."""
+    """Return whether the library has a motion with all chosen labels.
+
+    Args:
+        walk: the labels chosen so far.
+        available: the library's combinations; None means True.
+    """
     return held is None or _has(held, walk.kind, walk.words)
 
 
 def instead_of(words: Iterable[str], kind: str, held: Held) -> tuple[str, ...]:
-    """The library's combination nearest to `words`, empty where it has none with any of them or their kin."""
+    """Find the library's combination nearest to some labels.
+
+    Args:
+        labels: the requested labels.
+        kind: "moment" or "span".
+        available: the library's combinations.
+    Returns:
+        The combination; empty if the library has none with any of the labels or their relatives in the tree.
+    """
     asked = frozenset(words)
     near = asked.union(*(relatives(word) for word in asked))
     found = nearest(asked, [combination for combination in held.of(kind) if combination & near], 1)
@@ -117,6 +183,7 @@ def instead_of(words: Iterable[str], kind: str, held: Held) -> tuple[str, ...]:
 
 
 def _option(word: str, place: int, walk: Walk, held: Held | None) -> Option:
+    """Build the option of a label at a position of the layout."""
     page, digit = divmod(place, PAGE)
     chosen = word in walk.words
     words = choose(walk, word).words if not chosen else walk.words
@@ -131,13 +198,15 @@ def _has(held: Held, kind: str, words: tuple[str, ...]) -> bool:
 
 
 def _layout(walk: Walk, held: Held | None) -> list[str | None]:
-    """Words by place: nine to a page, None where a digit means nothing."""
+    """Place the labels on pages of nine; None where a digit has no function."""
     if walk.words == (TRANSITION,):
         return []
     own = _own_words(walk, held)
+    # First page: the roots, with those that both trees share last.
     if not walk.steps:
         ends = _IN_BOTH if walk.kind == "moment" else (TRANSITION,)
         return [*(word for word in _TREES[walk.kind] if word not in ends), *ends, *own]
+    # Later: sides on 1 and 2, tree labels on 3 to 7, the last two on 8 and 9; the rest on further pages.
     last = _LAST_TWO[walk.kind]
     below = [word for word in _next_words(walk) if word not in (*SIDES, *last)]
     room = PAGE - len(SIDES) - len(last)
@@ -147,7 +216,7 @@ def _layout(walk: Walk, held: Held | None) -> list[str | None]:
 
 
 def _elsewhere(walk: Walk) -> list[str]:
-    """All words of the root's branches: what one says across them ("receive body high") can be said too."""
+    """List all labels of the root's branches, because users also combine across branches ("receive body high")."""
     tree = _TREES[walk.kind]
     roots = tree.values() if walk.steps[0] is None else [tree.get(walk.steps[0], {})]
     gone = {word for word in walk.steps if word}
@@ -155,11 +224,12 @@ def _elsewhere(walk: Walk) -> list[str]:
 
 
 def _words_of(branch: Mapping[str, dict]) -> list[str]:
+    """Collect all labels of a branch, each once."""
     return list(dict.fromkeys(word for name, below in branch.items() for word in (name, *_words_of(below))))
 
 
 def _own_words(walk: Walk, held: Held | None) -> list[str]:
-    """The library's words that are not in the tree, of what it has with the walk's root."""
+    """List the library's labels that are not in the tree, from the combinations with the chosen root."""
     if held is None:
         return []
     root = {walk.steps[0]} - {None} if walk.steps else set()
@@ -168,12 +238,12 @@ def _own_words(walk: Walk, held: Held | None) -> list[str]:
 
 
 def _next_words(walk: Walk) -> tuple[str, ...]:
-    """The tree's words below the places that the walk has reached, in its order."""
+    """List the tree's labels below the branches that the choices reach, in the tree's order."""
     return tuple(dict.fromkeys(word for place in _places(walk) for word in place))
 
 
 def _places(walk: Walk) -> list[Mapping[str, dict]]:
-    """The branches of the tree that the walk's steps lead to; none behind a word that is not in the tree."""
+    """Find the branches of the tree that the chosen steps lead to; none after a label outside the tree."""
     places: list[Mapping[str, dict]] = [_TREES[walk.kind]]
     for step in walk.steps:
         below = (place.items() for place in places)

@@ -1,4 +1,4 @@
-"""From what happened on the pitch to words of the vocabulary: a small table that users may replace by their own."""
+"""Convert match events to labels of the vocabulary by a small table that users may replace."""
 
 from __future__ import annotations
 
@@ -19,7 +19,13 @@ from .vocabulary import SIDES, similar_words, vocabulary_words
 
 @dataclass(frozen=True)
 class EventKind:
-    """What an event says of the ball. ball: "sends", "takes" or "". touch: "certain", "possible" or "none"."""
+    """What a kind of event says about the ball.
+
+    Attributes:
+        name: the kind.
+        ball: "sends", "takes" or "".
+        touch: whether the player touches the ball: "certain", "possible" or "none".
+    """
 
     name: str
     ball: str = ""
@@ -35,15 +41,15 @@ EVENT_KINDS = (
     EventKind("touch"), EventKind("deflection"), EventKind("miscontrol"), EventKind("foul", touch="none"),
     EventKind("out", touch="none"), EventKind("other", touch="none"),
 )  # fmt: skip
-"""What events and touches are, in the words of no provider."""
+"""The kinds of events and touches, independent of providers."""
 
 KINDS = tuple(kind.name for kind in EVENT_KINDS)
 
 FILLED_IN = {"side": SIDES, "height": list_labels(group="height"), "gait": list_labels(group="pace"), "jump": ("jump",)}
-"""What may stand in braces in a row's words, and the words that it becomes."""
+"""Placeholders allowed in braces in a row's labels, and the labels that replace each."""
 
 TABLE = Path(__file__).with_name("event_words.csv")
-"""The table that comes with us."""
+"""The table supplied with the project."""
 
 _COLUMNS = ("kind", "part", "detail", "words")
 _STEP = "see docs/match/match-input.md"
@@ -51,7 +57,14 @@ _STEP = "see docs/match/match-input.md"
 
 @dataclass(frozen=True)
 class EventRow:
-    """A row of the table: kind of KINDS, part of BODY_PARTS or "" for any, detail or "", words with braces."""
+    """A row of the table.
+
+    Attributes:
+        kind: a kind of `KINDS`.
+        part: a part of `BODY_PARTS`, "" for any.
+        detail: a further property of the event, or "".
+        words: the labels, with placeholders in braces.
+    """
 
     kind: str
     part: str
@@ -61,18 +74,31 @@ class EventRow:
 
 @dataclass(frozen=True)
 class EventWords:
-    """The table in the order of the file."""
+    """The table.
+
+    Attributes:
+        rows: in the order of the file.
+    """
 
     rows: tuple[EventRow, ...]
 
     def words(
         self, kind: str, part: str = "", details: Collection[str] = (), filled_in: Mapping[str, str] | None = None
     ) -> tuple[str, ...]:
-        """The words for something that happened, () where it makes no key moment.
+        """Find the labels for an event.
 
-        kind: of KINDS. part: of BODY_PARTS, "" where unknown. details: what else is known. filled_in: what stands for
-        the names of FILLED_IN; those that are missing or "" are left out. Of the rows that fit, one that names the part
-        counts before one that does not, then one that names a detail, then the first."""
+        Among the rows that match, a row with a part precedes one without, then a row with a detail one without, then
+        the
+        first.
+
+        Args:
+            kind: a kind of `KINDS`.
+            part: a part of `BODY_PARTS`, "" if unknown.
+            details: the known details.
+            placeholders: placeholder -> label; missing and empty ones are left out.
+        Returns:
+            The labels; () if the event makes no key moment.
+        """
         fitting = [row for row in self.rows if row.kind == kind and row.part in ("", part)]
         fitting = [row for row in fitting if not row.detail or row.detail in details]
         if not fitting:
@@ -84,10 +110,18 @@ class EventWords:
 
 
 def read_event_words(path: str | os.PathLike | None = None, known_words: Iterable[str] = ()) -> EventWords:
-    """The table in a CSV file of kind,part,detail,words; None: the one that comes with us.
+    """Read the table from a CSV file with the columns kind, part, detail and words.
 
-    known_words: beyond the vocabulary. Lines that begin with # are comments. InputError, with the line, for kinds,
-    parts or words that are not known, and rows that say the same twice."""
+    Lines that begin with # are comments.
+
+    Args:
+        path: the file; None for the supplied table.
+        known_labels: labels in addition to the vocabulary.
+    Returns:
+        The table.
+    Raises:
+        InputError: with the line, for an unknown kind, part or label, or a duplicate row.
+    """
     path = TABLE if path is None else path
     known, rows, seen = vocabulary_words(known_words), [], {}
     lines = read_text(path).splitlines()
@@ -105,12 +139,12 @@ def read_event_words(path: str | os.PathLike | None = None, known_words: Iterabl
             row = _row(cells, known, place)
             if (same := seen.setdefault(row[:3], place)) != place:
                 said = ", ".join(row[:3])
-                raise InputError(place, f"{said} as in line {same.rpartition(':')[2]}", "each once", _STEP)
+                raise InputError(place, f"{said} is also in line {same.rpartition(':')[2]}", "each row once", _STEP)
             rows.append(EventRow(*row))
     except csv.Error as error:
         raise InputError(f"{path}:{reader.line_num}", str(error), "comma-separated values") from None
     if not rows:
-        raise InputError(path, "no rows", ",".join(_COLUMNS), _STEP)
+        raise InputError(path, "the table is empty", ",".join(_COLUMNS), _STEP)
     return EventWords(tuple(rows))
 
 
@@ -121,20 +155,21 @@ def _checked_header(cells: list[str], place: str) -> list[str]:
 
 
 def _row(cells: list[str], known: frozenset[str], place: str) -> tuple[str, str, str, tuple[str, ...]]:
+    """Check one row's cells; return kind, part, detail and labels."""
     if len(cells) != len(_COLUMNS):
         raise InputError(place, f"{len(cells)} cells", f"{len(_COLUMNS)}: {','.join(_COLUMNS)}", _STEP)
     kind, part, detail, said = cells
     if kind not in KINDS:
         raise InputError(place, f"kind {kind!r}", f"one of {', '.join(KINDS)}", _STEP)
     if part and part not in BODY_PARTS:
-        raise InputError(place, f"part {part!r}", f"one of {', '.join(BODY_PARTS)}, or none", _STEP)
+        raise InputError(place, f"part {part!r}", f"one of {', '.join(BODY_PARTS)}, or blank", _STEP)
     words = said.split()
     for word in words:
         if word.startswith("{"):
             if word[1:-1] not in FILLED_IN or not word.endswith("}"):
                 raise InputError(place, f"{word}", "one of " + " ".join(f"{{{name}}}" for name in FILLED_IN), _STEP)
         elif word not in known:
-            offers = ", ".join(similar_words(word, known)) or "a word of the vocabulary"
-            raise InputError(place, f"the word {word!r} is not in the vocabulary", f"one like {offers}", _STEP)
+            offers = ", ".join(similar_words(word, known)) or "a label of the vocabulary"
+            raise InputError(place, f"the label {word!r} is not in the vocabulary", f"one like {offers}", _STEP)
     checked_words((word for word in words if not word.startswith("{")), place)
     return kind, part, detail, tuple(words)

@@ -1,8 +1,9 @@
-"""Automatic locomotion: which gait a speed asks for, by the thresholds of Faustino §3.1.1, kept from flickering; and
-which way a body is turned while it goes: towards the ball when slow, along its way when fast.
+"""Automatic locomotion: the gait for a speed, and the heading of a body while it moves.
 
-Facing is not the direction of travel (../shared/metrics.md: torso and travel are 77 degrees apart in the median at 0.5
-to 1 m/s, 47 at 1 to 2, about 31 above); what turns it away is mostly the ball.
+Gaits follow the thresholds of Faustino §3.1.1, with hysteresis and a minimum duration. The body faces the ball when it
+is slow and its direction of travel when it is fast: heading is not the direction of travel (measured on reference data,
+torso and travel differ by 77 degrees in the median at 0.5 to 1 m/s, by 47 at 1 to 2 m/s and by about 31 above), and
+the difference comes mostly from the ball.
 """
 
 from __future__ import annotations
@@ -18,29 +19,39 @@ from .labels import list_gaits, list_labels
 from .vocabulary import DIRECTIONS
 
 LOCOMOTION = list_gaits()
-"""The words that speed alone decides, slow to fast; "dribble" goes with any of them when the ball is at the feet."""
+"""The labels that speed alone decides, slow to fast; "dribble" joins any of them when the ball is at the feet."""
 
 STANDING = LOCOMOTION[0]
-"""The gait that does not travel."""
+"""The gait without travel."""
 
 LOCOMOTION_WORDS = frozenset((*LOCOMOTION, *list_labels(ball="carries")))
 
 STANDING_SPEED = 0.3
-"""m/s of a smoothed track; below it a player stands. (Raw tracking noise alone looks like that; a smoothed track that
-creeps faster is a player who shuffles: a standing body would have to glide.)"""
+"""m/s of a smoothed track; below it a player stands. Raw tracking noise alone reaches this speed; at a higher smoothed
+speed the player shuffles, and a standing body would slide."""
 
-_SPEEDS = np.array([0.8, 1.5, 2.5, 4.0, 6.0])  # m/s, and radians off its way that a body is turned then at most
+_SPEEDS = np.array([0.8, 1.5, 2.5, 4.0, 6.0])  # m/s, with the largest heading offset in radians at each
 _MOST_TURNED = np.array([np.pi, 1.3, 0.6, 0.2, 0.0])
-_AT_FEET = (1.0, 2.5)  # m to the ball: nearer it is not faced, farther it is in full
-_WINDOW, _SHORTEST = 2.0, 1.5  # seconds over which the facing is smoothed, and that a direction lasts at least
+_AT_FEET = (1.0, 2.5)  # m to the ball: nearer, the body does not face it; farther, it does in full
+_WINDOW, _SHORTEST = 2.0, 1.5  # seconds: smoothing window of the heading; minimum duration of a direction
 
 
 def gait_thresholds(speeds: np.ndarray, omega: float = 4.0) -> np.ndarray:
-    """(G-1,) m/s, from each gait to the next faster one: s_A + (s_B - s_A) / omega, for speeds (G,) in ascending order.
+    """Compute the speed thresholds from each gait to the next faster one: s_A + (s_B - s_A) / omega.
 
-    Faustino §3.1.1 prints s_A + (s_A - s_B) / omega, which lies below the slower gait's own speed; the sign is turned
-    here so that omega = 4 puts the threshold a quarter of the way up, as the text explains ("to limit the usage of
-    slower locomotion mocaps on higher movement speed"). The step up from standing is never below STANDING_SPEED."""
+    Faustino prints s_A + (s_A - s_B) / omega, which lies below the slower gait's own speed. The sign is changed here so
+    that omega = 4 puts the threshold a quarter of the way up, as the text explains ("to limit the usage of slower
+    locomotion mocaps on higher movement speed"). The threshold above standing is at least STANDING_SPEED.
+
+    Args:
+        speeds: (G,) m/s, ascending, the average speed of each gait.
+        omega: at least 1.
+    Returns:
+        (G-1,) m/s.
+    Raises:
+        InputError: if speeds do not ascend or omega is below 1.
+    Source: Faustino 2024, section 3.1.1.
+    """
     speeds = np.asarray(speeds, dtype=float)
     if speeds.ndim != 1 or not np.all(np.isfinite(speeds)) or np.any(np.diff(speeds) <= 0):
         raise InputError("gait speeds", f"{speeds.tolist()}", "ascending speeds in m/s, one per gait")
@@ -53,17 +64,25 @@ def gait_thresholds(speeds: np.ndarray, omega: float = 4.0) -> np.ndarray:
 
 
 def recorded_thresholds(speeds: np.ndarray, speed: np.ndarray, gait: np.ndarray) -> np.ndarray:
-    """(G-1,) m/s, where a library's own annotations change from each gait to the next: the speed with fewest frames of
-    the slower one above it and of the faster one below it.
+    """Estimate from a library's own annotations the speeds at which one gait changes to the next.
 
-    speeds (G,) m/s, ascending, the gaits' averages; speed (N,) m/s and gait (N,) index of annotated frames. Between
-    gaits that do not overlap it is half way; the step up from standing is STANDING_SPEED, since a body that stands
-    cannot travel. Faustino's omega asks for the faster gait already a quarter of the way up, which no recording of that
-    speed is then called."""
+    Each threshold is the speed with the fewest frames of the slower gait above it and of the faster gait below it;
+    between
+    gaits that do not overlap it is half way. The threshold above standing is STANDING_SPEED, because a standing body
+    cannot travel. Faustino's omega requests the faster gait a quarter of the way up, where no recording has that label.
+
+    Args:
+        speeds: (G,) m/s, ascending, the gaits' average speeds.
+        speed: (N,) m/s of annotated frames.
+        gait: (N,) index of the frames' gaits.
+    Returns:
+        (G-1,) m/s.
+    """
     found = []
     for slow, (low, high) in enumerate(zip(speeds, speeds[1:])):
         below, above = np.sort(speed[gait == slow]), np.sort(speed[gait == slow + 1])
         tried = np.linspace(low, high, 101)
+        # Count the frames on the wrong side of each tried speed; `below` and `above` are sorted.
         wrong = len(below) - np.searchsorted(below, tried) + np.searchsorted(above, tried)
         best = float(np.mean(tried[wrong == wrong.min()]))
         found.append(STANDING_SPEED if low < STANDING_SPEED < high else best)
@@ -74,13 +93,23 @@ def automatic_gaits(
     speed: np.ndarray, fps: float, speeds: np.typing.ArrayLike, thresholds: np.ndarray, hysteresis: float = 0.2,
     minimum: float = 0.4,
 ) -> np.ndarray:
-    """(T,) index into `speeds`: the gait of every frame (Faustino §3.1.1's pseudo-code, made steady).
+    """Choose the gait of every frame from its speed, without flicker.
 
-    speed: (T,) m/s at `fps` frames per second. speeds: (G,) m/s, ascending, the average speed of each gait's clips.
-    thresholds: (G-1,) m/s (`gait_thresholds`, `recorded_thresholds`).
-    hysteresis: how far beyond a threshold the speed must go to change gait, as a share of the distance between the two
-    gaits, at most a quarter of the threshold (the paper has none: at a boundary speed its annotation flickers with the
-    noise). minimum: seconds a gait lasts at least; shorter ones go to the nearer neighbour, then the longer."""
+    Args:
+        speed: (T,) m/s.
+        fps: frames per second.
+        speeds: (G,) m/s, ascending, the average speed of each gait's clips.
+        thresholds: (G-1,) m/s, see `compute_gait_thresholds` and `estimate_gait_thresholds`.
+        hysteresis: how far speed must pass a threshold to change the gait, as a share of the distance between the two
+            gaits' speeds, at most a quarter of the threshold. The paper has none: at a boundary speed its annotation
+            flickers with the noise.
+        minimum: minimum duration of a gait in seconds; shorter runs take the gait of the more similar neighbour, then
+            of
+            the longer one.
+    Returns:
+        (T,) index into `speeds`.
+    Source: Faustino 2024, section 3.1.1, pseudo-code; hysteresis and minimum duration added.
+    """
     speed = np.asarray(speed, dtype=float)
     margins = np.minimum(hysteresis * np.diff(np.asarray(speeds, dtype=float)), thresholds / 4.0)
     steps = [_trigger(speed, threshold, margin) for threshold, margin in zip(thresholds, margins)]
@@ -89,10 +118,17 @@ def automatic_gaits(
 
 
 def wanted_offset(track: SampledTrack) -> np.ndarray:
-    """(T,) radians from the direction of travel to where the body should face, counterclockwise, in -pi .. pi.
+    """Compute the angle from the direction of travel to the heading that the body should have.
 
-    The ball's direction, as far as legs can turn aside at that speed: all the way round below 0.8 m/s, not at all at 6.
-    Zero where the ball is unknown; at their own feet players follow it along their way."""
+    The heading is the ball's direction, limited to what legs allow at that speed: any angle below 0.8 m/s, none from 6
+    m/s
+    on. It is zero where the ball is unknown, and near the player's own feet, where they follow it along their path.
+
+    Args:
+        track: the player's track with the ball, T frames.
+    Returns:
+        (T,) radians, counterclockwise, -pi to pi.
+    """
     away = track.ball[:, :2] - track.positions
     known = np.isfinite(away).all(axis=1)
     distance = np.linalg.norm(np.where(known[:, None], away, 1.0), axis=1)
@@ -106,22 +142,45 @@ def wanted_offset(track: SampledTrack) -> np.ndarray:
 
 
 def direction_words(offset: np.ndarray, fps: float) -> list[str]:
-    """The words for walking that way at each of `offset` (T,) radians (`wanted_offset`): front, back, or to a side,
-    none for less than _SHORTEST seconds. Facing to the left of one's way is walking to the right."""
+    """Choose the direction label of walking at each heading offset: front, back, left or right.
+
+    A body that faces left of its path walks to its right. No direction lasts less than _SHORTEST seconds.
+
+    Args:
+        offset: (T,) radians, see `compute_heading_offset`.
+        fps: frames per second.
+    Returns:
+        T labels.
+    """
     quarter = np.round(quaternion.wrapped(offset) / (np.pi / 2.0)).astype(int) % 4
     return [DIRECTIONS[-number] for number in without_short_runs(quarter, int(_SHORTEST * fps))]
 
 
 def _trigger(speed: np.ndarray, threshold: float, margin: float) -> np.ndarray:
-    """(T,) bool: above the threshold, where only leaving threshold +- margin changes the answer."""
+    """Compare speed to a threshold with hysteresis: only values beyond threshold +- margin change the result.
+
+    Args:
+        speed: (T,) m/s.
+        threshold, margin: m/s.
+    Returns:
+        (T,) bool, True above the threshold.
+    """
     decided = np.abs(speed - threshold) >= margin
     decided[:1] = True
+    # Index of the last frame that was beyond the margin, for every frame.
     last = np.maximum.accumulate(np.where(decided, np.arange(len(speed)), 0))
     return (speed >= threshold)[last]
 
 
 def without_short_runs(gaits: np.ndarray, frames: int) -> np.ndarray:
-    """Kinds (T,) of gait or direction with every run shorter than `frames` given to a neighbour, shortest first."""
+    """Remove short runs: each takes the value of a neighbour, the shortest first.
+
+    Args:
+        gaits: (T,) int, gaits or directions.
+        min_length: minimum length of a run.
+    Returns:
+        (T,) int.
+    """
     if not len(gaits):
         return gaits
     runs = [[stop - start, int(gaits[start])] for start, stop in equal_runs(gaits)]
@@ -135,11 +194,13 @@ def without_short_runs(gaits: np.ndarray, frames: int) -> np.ndarray:
 
 
 def _adopting_gait(runs: list[list[int]], index: int) -> int:
+    """Choose the gait of the neighbouring run that is more similar, then longer."""
     neighbours = runs[max(index - 1, 0) : index] + runs[index + 1 : index + 2]
     return min(neighbours, key=lambda run: (abs(run[1] - runs[index][1]), -run[0]))[1]
 
 
 def _joined(runs: list[list[int]]) -> list[list[int]]:
+    """Merge neighbouring runs of the same gait."""
     out: list[list[int]] = []
     for length, gait in runs:
         if out and out[-1][1] == gait:

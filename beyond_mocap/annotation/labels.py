@@ -1,9 +1,10 @@
-"""What each label means, from one table (`vocabulary.csv`): its place in the tree, and what it says of body and ball.
+"""The meaning of each label, from one table (`vocabulary.csv`): its place in the tree, and what it says of body and
+ball.
 
     find_label("kick").ball             # "sends"
     list_labels(ball="takes")           # ("receive", "catchb", "catch", "trap")
 
-A new label is a new row; whoever needs to know what a label means asks here.
+To add a label, add a row. All code that needs a label's meaning asks this module.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from .striking import BODY_PARTS
 
 TABLE = Path(__file__).with_name("vocabulary.csv")
 
+# The values that the table's columns allow; the table's head explains each.
 KINDS = ("continuous", "discrete", "modifier")
 GROUPS = ("side", "height", "surface", "pace", "way")
 ACTIONS = ("throw", "kick")
@@ -34,17 +36,23 @@ _COLUMNS = (
 
 @dataclass(frozen=True, kw_only=True)
 class Label:
-    """A row of the table; a label that has none says nothing of body and ball.
+    """A row of the table; a label without a row says nothing of body and ball.
 
-    name: as annotations write it; title: as people read it.
-    kinds: of KINDS, the trees of which it is a root.
-    group: of GROUPS, of whose labels one motion has one at most, or "".
-    parts: that may meet the ball, of BODY_PARTS or "tool"; both_hands: whether both hands do together.
-    part_with: labels of which one has to stand beside for the part to be certain.
-    ball: "sends", "takes", "carries", "never" or "". height: of the ball when it is met, or "".
-    gait: m/s from which on the gait holds where no library says its own, None of what is no gait.
-    in_flight: whether the body flies to the ball. action: what networks learn from clips with it, or "".
-    below: the tree below it, label -> labels below that."""
+    Attributes:
+        name: as annotations write it.
+        title: as interfaces show it.
+        kinds: of `KINDS`, the trees in which it is a root.
+        group: of `GROUPS`; a motion has at most one label of a group; or "".
+        parts: body parts that may meet the ball, of `BODY_PARTS` or "tool".
+        both_hands: whether both hands meet it together.
+        part_with: labels of which one must be present for the part to be certain.
+        ball: "sends", "takes", "carries", "never" or "".
+        gait: m/s from which the gait applies if a library has no own speed for it; None if it is no gait.
+        height: of the ball at contact, or "".
+        in_flight: whether the body flies to the ball.
+        action: the action that networks learn from clips with it, or "".
+        below: the tree below it, label -> labels below that.
+    """
 
     name: str
     title: str = ""
@@ -62,43 +70,61 @@ class Label:
 
     @property
     def part(self) -> str:
-        """The one part that meets the ball, "" where there is none or it may be several."""
+        """The part that meets the ball; "" if there is none or several are possible."""
         return self.parts[0] if len(self.parts) == 1 else ""
 
     @property
     def is_root(self) -> bool:
-        """Whether it names what is done: a root of the continuous or the discrete tree."""
+        """Whether it names an action: a root of the continuous or the discrete tree."""
         return bool({"continuous", "discrete"} & set(self.kinds))
 
 
 @lru_cache(maxsize=1)
 def read_labels() -> dict[str, Label]:
-    """All rows of the table by name, in its order; InputError, with the line, for one that is wrong."""
+    """Read all rows of the table.
+
+    Returns:
+        Name -> label, in the table's order.
+    Raises:
+        InputError: with the line, for an invalid row.
+    """
     lines = TABLE.read_text(encoding="utf-8").splitlines()
     first = next(number for number, line in enumerate(lines) if not line.startswith("#"))
     found: dict[str, Label] = {}
     for number, cells in enumerate(csv.DictReader(lines[first:]), first + 2):
         label = _read_label(cells, f"{TABLE}:{number}")
         if label.name in found:
-            raise InputError(f"{TABLE}:{number}", f"the label {label.name!r} again", "each label once")
+            raise InputError(f"{TABLE}:{number}", f"the label {label.name!r} is repeated", "each label once")
         found[label.name] = label
     return found
 
 
 def find_label(name: str) -> Label:
-    """The label of that name; one without any meaning where the table has none."""
+    """Find the label of a name.
+
+    Args:
+        name: the label as annotations write it.
+    Returns:
+        The label; one without any meaning if the table has none.
+    """
     return read_labels().get(name) or Label(name=name, title=name.replace("_", " "))
 
 
 @lru_cache(maxsize=64)
 def list_labels(**wanted: object) -> tuple[str, ...]:
-    """The names of all labels whose attributes (of `Label`) have these values, in the table's order."""
+    """List the labels with certain attributes.
+
+    Args:
+        required: attribute of `Label` -> required value.
+    Returns:
+        Their names in the table's order.
+    """
     same = ((label.name, all(getattr(label, key) == value for key, value in wanted.items())) for label in _rows())
     return tuple(name for name, fits in same if fits)
 
 
 def list_gaits() -> tuple[str, ...]:
-    """The names of all gaits, slow to fast."""
+    """List the names of all gaits, slow to fast."""
     gaits = [label for label in _rows() if label.gait is not None]
     return tuple(label.name for label in sorted(gaits, key=lambda label: label.gait))
 
@@ -108,12 +134,13 @@ def _rows() -> tuple[Label, ...]:
 
 
 def _read_label(cells: dict[str, str], place: str) -> Label:
+    """Check one row's cells and build its label."""
     if tuple(cells) != _COLUMNS or None in cells.values():
-        raise InputError(place, "other cells", ",".join(_COLUMNS))
+        raise InputError(place, "wrong columns", ",".join(_COLUMNS))
     said = {column: tuple(text.split()) for column, text in cells.items()}
     for column, known in _CLOSED.items():
         if not set(known).issuperset(said[column]):
-            raise InputError(place, f"{column} {cells[column]!r}", f"of {', '.join(known)}, or nothing")
+            raise InputError(place, f"{column} {cells[column]!r}", f"one of {', '.join(known)}, or blank")
     return Label(
         name=cells["label"], title=cells["title"], kinds=said["kind"], group=cells["group"],
         parts=tuple("hand" if part == "hands" else part for part in said["part"]), both_hands="hands" in said["part"],
@@ -123,7 +150,8 @@ def _read_label(cells: dict[str, str], place: str) -> Label:
 
 
 def _tree_of(text: str) -> dict[str, dict]:
-    """The nested labels of "low(inside outside) high"."""
+    """Parse the nested labels of a text such as "low(inside outside) high"."""
+    # Stack of open branches; `last` is the branch of the label read last, which "(" opens.
     places: list[dict[str, dict]] = [{}]
     last: dict[str, dict] = places[0]
     for sign in re.findall(r"[^\s()]+|[()]", text):

@@ -1,8 +1,8 @@
-"""Where a body strikes the ball: the striking parts' surfaces, and their distance from the ball's.
+"""The surfaces with which a body strikes the ball, and their distance from the ball's surface.
 
-Parts are bodies of revolution, because a skeleton has no skin: the foot a capsule from its ankle to its toe tip, the
-head a ball around the middle from its joint to its tip, the chest and the hands balls around their joints. Polish
-brings these surfaces to the ball, evaluation measures how near they came.
+A skeleton has no skin, so parts are simple bodies: the foot a capsule from its ankle to its toe tip, the head a sphere
+around the middle from its joint to its tip, the chest and the hands spheres around their joints. Motion construction
+brings these surfaces to the ball; evaluation measures their distance.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from ..motion.skeleton import Skeleton
 from ..motion.track import BALL_RADIUS
 
 BODY_PARTS = ("foot", "head", "chest", "hand")
+# Metres.
 FOOT_RADIUS, HEAD_RADIUS, CHEST_RADIUS, HAND_RADIUS = 0.05, 0.10, 0.12, 0.05
 _HERE = np.zeros(3)
 _HERE.setflags(write=False)
@@ -25,10 +26,14 @@ _HERE.setflags(write=False)
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """A striking surface: all that is within `radius` metres of the line between two points that joints carry.
+    """A striking surface: all points within `radius` of the line between two points that joints carry.
 
-    part: "foot", "head", "chest" or "hand". side: "left", "right" or "" (head, chest). start and end: a joint's index
-    and the point (3,) in metres in that joint's own frame."""
+    Attributes:
+        part: "foot", "head", "chest" or "hand".
+        side: "left", "right" or "" (head, chest).
+        radius: m.
+        start, end: a joint's index and the point (3,) in metres in that joint's own frame.
+    """
 
     part: str
     side: str
@@ -37,7 +42,14 @@ class Surface:
     end: tuple[int, np.ndarray]
 
     def line(self, positions: np.ndarray, rotations: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Both ends (..., 3) m, world, from joint positions (..., J, 3) m and world rotations (..., J, 4)."""
+        """Compute both ends of the surface's line.
+
+        Args:
+            positions: (..., J, 3) m, world frame.
+            rotations: (..., J, 4) quaternions, world frame.
+        Returns:
+            Start and end, (..., 3) m each, world frame.
+        """
         return tuple(
             positions[..., joint, :] + quaternion.rotate(rotations[..., joint, :], point)
             for joint, point in (self.start, self.end)
@@ -45,7 +57,15 @@ class Surface:
 
 
 def part_surfaces(skeleton: Skeleton, part: str, sides: Iterable[str] = ("left", "right")) -> tuple[Surface, ...]:
-    """The surfaces of a part of BODY_PARTS: of foot and hand one for each of `sides`; none where there is none."""
+    """Build the surfaces of a body part.
+
+    Args:
+        skeleton: the skeleton, J joints.
+        part: a part of `BODY_PARTS`.
+        sides: build one foot or hand for each.
+    Returns:
+        The surfaces; none if the skeleton lacks the part.
+    """
     body = identify(skeleton)
     if part == "foot":
         return tuple(_foot(skeleton, side, getattr(body, side)) for side in sides)
@@ -59,9 +79,15 @@ def part_surfaces(skeleton: Skeleton, part: str, sides: Iterable[str] = ("left",
 
 
 def faster_middle(found: Sequence[Surface], places: np.ndarray, rotations: np.ndarray) -> np.ndarray:
-    """The way (T, 3) m of the middle of that surface of `found` which comes furthest from the first frame to the last.
+    """Trace the middle of the surface that moves farthest from the first frame to the last.
 
-    places (T, J, 3) m and rotations (T, J, 4): joints, world."""
+    Args:
+        surfaces: the surfaces.
+        positions: (T, J, 3) m, world frame.
+        rotations: (T, J, 4) quaternions, world frame.
+    Returns:
+        (T, 3) m, world frame.
+    """
     middles = [np.mean(surface.line(places, rotations), axis=0) for surface in found]
     return max(middles, key=lambda way: float(np.linalg.norm(way[-1] - way[0])))
 
@@ -69,14 +95,28 @@ def faster_middle(found: Sequence[Surface], places: np.ndarray, rotations: np.nd
 def ball_gap(
     line: tuple[np.ndarray, np.ndarray], radius: float, ball: np.ndarray, ball_radius: float = BALL_RADIUS
 ) -> np.ndarray:
-    """Signed gap (...,) m between a surface and the ball's, negative where they overlap.
+    """Measure the signed gap between a surface and the ball's, negative where they overlap.
 
-    line: the surface's two ends (..., 3) m, world; radius: the surface's, m; ball (..., 3): the ball's centre, m."""
+    Args:
+        line: the surface's two ends, (..., 3) m each, world frame.
+        radius: the surface's radius, m.
+        ball: (..., 3) m, the ball's centre, world frame.
+        ball_radius: m.
+    Returns:
+        (...,) m.
+    """
     return np.linalg.norm(ball - nearest_on(line, ball), axis=-1) - radius - ball_radius
 
 
 def nearest_on(line: Sequence[np.ndarray], place: np.ndarray) -> np.ndarray:
-    """The point (..., 3) m of a line from one end (..., 3) m to the other that is nearest to `place` (..., 3) m."""
+    """Find the point of a line segment that is nearest to a position.
+
+    Args:
+        line: start and end, (..., 3) m each.
+        position: (..., 3) m, in the same frame.
+    Returns:
+        (..., 3) m.
+    """
     start, end = line
     along = end - start
     share = np.sum((place - start) * along, axis=-1) / np.maximum(np.sum(along * along, axis=-1), 1e-12)
@@ -86,15 +126,22 @@ def nearest_on(line: Sequence[np.ndarray], place: np.ndarray) -> np.ndarray:
 def smallest_gap(
     found: Sequence[Surface], positions: np.ndarray, rotations: np.ndarray, ball: np.ndarray
 ) -> np.ndarray:
-    """The smallest gap (...,) m of the surfaces `found`, NaN without any; see `ball_gap`.
+    """Measure the smallest gap between the ball and some surfaces; see `measure_ball_gap`.
 
-    positions (..., J, 3) m and rotations (..., J, 4): joints, world; ball (..., 3): its centre, m."""
+    Args:
+        surfaces: the surfaces.
+        positions: (..., J, 3) m, world frame.
+        rotations: (..., J, 4) quaternions, world frame.
+        ball: (..., 3) m, the ball's centre, world frame.
+    Returns:
+        (...,) m, NaN without a surface.
+    """
     gaps = [ball_gap(s.line(positions, rotations), s.radius, ball) for s in found]
     return np.min(gaps, axis=0) if gaps else np.full(np.shape(ball)[:-1], np.nan)
 
 
 def _foot(skeleton: Skeleton, side: str, limb: Limb) -> Surface:
-    """From the ankle to the toe joint, or to the foot's end site where the skeleton has no toe joint."""
+    """Build the foot from the ankle to the toe joint, or to the foot's end site if there is no toe joint."""
     if limb.toe is not None:
         return Surface("foot", side, FOOT_RADIUS, (limb.foot, _HERE), (limb.toe, _HERE))
     return Surface("foot", side, FOOT_RADIUS, (limb.foot, _HERE), (limb.foot, skeleton.tip(limb.foot)))

@@ -1,10 +1,10 @@
-"""The text form of timelines (Faustino §4.2.2): `START END words...` or `TIME words...`, read and written.
+"""Read and write the text form of timelines (Faustino §4.2.2): `START END labels...` or `TIME labels...`.
 
-A word behind `-` is one that must not be: `3.2 6.0 running -dribble` asks for running without the ball at the feet.
+A label after `-` is excluded: `3.2 6.0 running -dribble` requests running without the ball at the feet.
 
 `#` starts a comment. Times are seconds; a number that ends in `f`, or every number after a line `unit frames`, counts
-frames from the track's first time. Faustino leaves words out where a transition is wanted; here a line without words
-means automatic locomotion (his line 1), and the word `transition` alone says transition.
+frames from the track's first time. Faustino leaves labels out where a transition is wanted; here a line without labels
+means automatic locomotion, and the label `transition` alone means a transition.
 """
 
 from __future__ import annotations
@@ -15,20 +15,37 @@ from pathlib import Path
 from ..base.errors import InputError, told_time
 from .timeline import LONGEST_TIME, MUST_NOT, NUMBER, KeyMoment, Span, Timeline, spelled
 
-_FORM = "'START END words...' or 'TIME words...'"
+_FORM = "'START END labels...' or 'TIME labels...'"
 _LARGEST_FILE = 16 * 1024 * 1024
 
 
 def read_timeline(path: str | os.PathLike, fps: float | None = None, start: float = 0.0) -> Timeline:
-    """The timeline in a text file; arguments and errors as `parse_timeline`, and InputError where it cannot be read."""
+    """Read the timeline in a text file.
+
+    Args:
+        path: the file.
+        fps, start: see `parse_timeline`.
+    Returns:
+        The timeline.
+    Raises:
+        InputError: if the file cannot be read or a line is invalid.
+    """
     return parse_timeline(read_text(path), str(path), fps, start)
 
 
 def parse_timeline(text: str, where: str = "annotations", fps: float | None = None, start: float = 0.0) -> Timeline:
-    """The timeline that `text` spells.
+    """Parse the text form of a timeline.
 
-    where: named in errors, as `where:line`. fps: rate of times given in frames, None where frames are not allowed.
-    start: seconds of the track's first time, where frame 0 is. InputError on a line that is not of the form."""
+    Args:
+        text: the file's content.
+        where: the file's name for errors, as in `where:line`.
+        fps: frame rate of times in frames; None if frames are not allowed.
+        start: seconds of the track's first time, which is frame 0.
+    Returns:
+        The timeline, in seconds on the track's clock.
+    Raises:
+        InputError: with the line, if it is invalid.
+    """
     unit, spans, keys = "seconds", [], []
     for number, line in enumerate(text.lstrip("\ufeff").splitlines(), start=1):
         tokens = line.split("#", 1)[0].split()
@@ -48,7 +65,13 @@ def parse_timeline(text: str, where: str = "annotations", fps: float | None = No
 
 
 def format_timeline(timeline: Timeline) -> str:
-    """The text that `parse_timeline` reads back to an equal timeline: one line each in time order, seconds."""
+    """Format a timeline so that `parse_timeline` reads an equal one.
+
+    Args:
+        timeline: the timeline.
+    Returns:
+        One line per span and key moment, in seconds, by time.
+    """
     lines = [(span.start, f"{_spell(span.start)} {_spell(span.end)}", spelled(span)) for span in timeline.spans]
     lines += [(key.time, _spell(key.time), spelled(key)) for key in timeline.keys]
     lines.sort(key=lambda line: line[0])
@@ -56,10 +79,18 @@ def format_timeline(timeline: Timeline) -> str:
 
 
 def read_text(path: str | os.PathLike) -> str:
-    """A text file's content, UTF-8 with or without BOM; InputError where it is missing, binary or not UTF-8."""
+    """Read a text file, UTF-8 with or without BOM.
+
+    Args:
+        path: the file.
+    Returns:
+        Its content.
+    Raises:
+        InputError: if it is missing, too large, binary or not UTF-8.
+    """
     try:
         if Path(path).stat().st_size > _LARGEST_FILE:
-            raise InputError(path, "a file of more than 16 MiB", "a text file")
+            raise InputError(path, "the file is larger than 16 MiB", "a text file")
         data = Path(path).read_bytes()
     except OSError as error:
         raise InputError(path, error.strerror or "cannot be read", "a text file", "check the path") from None
@@ -80,12 +111,12 @@ def _unit(tokens: list[str], place: str) -> str:
 
 
 def _leading_numbers(tokens: list[str], place: str) -> list[str]:
-    """The one or two numbers that a line starts with."""
+    """List the one or two numbers at the start of a line."""
     if not NUMBER.fullmatch(tokens[0]):
         raise InputError(place, f"{tokens[0]!r} is not a time", _FORM, "put the time first")
     numbers = [token for token in tokens[:3] if NUMBER.fullmatch(token)]
     if len(numbers) == 3:
-        raise InputError(place, "three numbers", _FORM, "put the words after the times")
+        raise InputError(place, "three numbers", _FORM, "put the labels after the times")
     return numbers if NUMBER.fullmatch(tokens[1] if len(tokens) > 1 else "") else numbers[:1]
 
 
@@ -97,25 +128,25 @@ def _seconds(token: str, unit: str, fps: float | None, start: float, place: str)
     if not in_frames and unit == "seconds":
         return value
     if not fps:
-        raise InputError(place, f"the time {token} in frames, but no frame rate is known", "seconds")
+        raise InputError(place, f"the time {token} is in frames, but the frame rate is unknown", "seconds")
     return start + value / fps
 
 
 def _span(times: list[float], words: list[str], number: int, place: str) -> Span:
     if times[1] <= times[0]:
         found = f"the end {told_time(times[1])} is not after the start {told_time(times[0])}"
-        raise InputError(place, found, "START < END", "for a key moment write one time")
+        raise InputError(place, found, "START < END", "write one time for a key moment")
     return _placed(Span, place, *times, words, number)
 
 
 def _key(time: float, words: list[str], number: int, place: str) -> KeyMoment:
     if all(word.startswith(MUST_NOT) for word in words):
-        raise InputError(place, "one time and no words", _FORM, "give a second time, or say what happens")
+        raise InputError(place, "one time and no labels", _FORM, "add a second time, or labels")
     return _placed(KeyMoment, place, time, words, number)
 
 
 def _placed(kind, place: str, *values):
-    """A span or key moment of times, words and line; what its words lack is told with the line it stands on."""
+    """Build a span or key moment from times, labels and line; errors name the line."""
     *times, words, line = values
     asked = [word for word in words if not word.startswith(MUST_NOT)]
     avoid = [word.removeprefix(MUST_NOT) for word in words if word.startswith(MUST_NOT)]
@@ -126,5 +157,5 @@ def _placed(kind, place: str, *values):
 
 
 def _spell(seconds: float) -> str:
-    """The shortest decimal text that reads back to the same number."""
+    """Format seconds as the shortest decimal text that reads back to the same number."""
     return repr(seconds).removesuffix(".0")

@@ -1,4 +1,4 @@
-"""A player's timeline: stretches and key moments with words, and how automatic locomotion fills what is left open."""
+"""A player's timeline: spans and key moments with labels, and automatic locomotion where nothing is annotated."""
 
 from __future__ import annotations
 
@@ -13,28 +13,37 @@ from ..base.errors import InputError, told_time
 from .vocabulary import CONTINUOUS, DISCRETE, TRANSITION, nearest, similar_words, vocabulary_words, words_below
 
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?f?", re.IGNORECASE)
-"""What the text form reads as a time; no word may look like one."""
+"""What the text form reads as a time; no label may look like one."""
 
 EDGE_TOLERANCE = 0.1
-"""Seconds by which a time may lie outside the track: one sample of a 10 Hz feed."""
+"""Seconds by which a time may be outside the track: one sample of a 10 Hz feed."""
 
 LONGEST_TIME = 1e11
-"""Seconds from 0 that a time may lie: feeds count from kick-off, some from 1970."""
+"""Largest time in seconds: feeds count from kick-off, some from 1970."""
 
-_SAME_TIME = 1e-6
+_SAME_TIME = 1e-6  # seconds up to which two times count as equal
 
 
 MUST_NOT = "-"
-"""Before a word in the text form: what is shown must not carry it."""
+"""Prefix of a label in the text form that the motion must not have."""
 
 
 def checked_words(words: Iterable[str], where: str) -> tuple[str, ...]:
-    """In small letters, each once. InputError, which `where` stands before, for what cannot be written as a word."""
+    """Check labels and normalize them: lower case, each once.
+
+    Args:
+        labels: the labels.
+        where: their place, for errors.
+    Returns:
+        The labels in their order.
+    Raises:
+        InputError: for a text that cannot be written as a label.
+    """
     out = tuple(dict.fromkeys(str(word).lower() for word in words))
     for word in out:
         if not word or "#" in word or word.startswith(MUST_NOT) or word.split() != [word] or NUMBER.fullmatch(word):
-            expected = f"a word without blanks and '#' that is not a number and does not begin with '{MUST_NOT}'"
-            raise InputError(where, f"{word!r} as a word", expected)
+            expected = f"a label without blanks and '#' that is not a number and does not begin with '{MUST_NOT}'"
+            raise InputError(where, f"{word!r} is not a label", expected)
     return out
 
 
@@ -47,9 +56,16 @@ def _checked_time(value: float, where: str) -> float:
 
 @dataclass(frozen=True)
 class Span:
-    """A stretch: start .. end in seconds on the track's clock; no words means automatic locomotion, TRANSITION alone
-    leaves it to continuity. avoid: words that nothing shown there may carry. Words are lower case, each once. line:
-    where it was read, for messages only."""
+    """A stretch of time with labels.
+
+    Without labels it means automatic locomotion; `TRANSITION` alone leaves it to continuity.
+
+    Attributes:
+        start, end: seconds on the track's clock.
+        words: labels of the motion, lower case, each once.
+        line: line of the file it was read from, for messages only.
+        avoid: labels that no motion in it may have.
+    """
 
     start: float
     end: float
@@ -66,9 +82,15 @@ class Span:
 
 @dataclass(frozen=True)
 class KeyMoment:
-    """A moment, seconds on the track's clock, at which the clip's own key moment must be played (Faustino §4.2.2).
-    avoid: words that the clip's key moment may not carry. solved: the second in its place, where the touch of the ball
-    that it means is known better, else None."""
+    """A moment at which a clip's own key moment must be played (Faustino §4.2.2).
+
+    Attributes:
+        time: seconds on the track's clock.
+        words: labels of the clip's key moment, lower case, each once.
+        line: line of the file it was read from, for messages only.
+        avoid: labels that the clip's key moment may not have.
+        solved: second of the ball touch that it means, if known better, else None.
+    """
 
     time: float
     words: tuple[str, ...]
@@ -83,13 +105,18 @@ class KeyMoment:
 
     @property
     def in_force(self) -> float:
-        """The second at which it is played: the solved one, else the asked one."""
+        """The second at which it is played: the solved one if there is one, else the requested one."""
         return self.time if self.solved is None else self.solved
 
 
 @dataclass(frozen=True)
 class Timeline:
-    """What a player does and when: spans ordered by start, keys by time. Empty means automatic locomotion."""
+    """A player's actions and their times. An empty timeline means automatic locomotion.
+
+    Attributes:
+        spans: ordered by start, then end.
+        keys: key moments, ordered by time.
+    """
 
     spans: tuple[Span, ...] = ()
     keys: tuple[KeyMoment, ...] = ()
@@ -100,9 +127,16 @@ class Timeline:
 
 
 def words_per_frame(timeline: Timeline, times: np.ndarray) -> list[frozenset[str] | None]:
-    """Per time of `times` (T,) seconds: the words in force, None in a transition, empty where locomotion is automatic.
+    """List the labels that apply at each time.
 
-    A span holds from its start up to, not including, its end; one that ends with the last time holds there too."""
+    A span applies from its start up to, not including, its end; one that ends with the last time includes it.
+
+    Args:
+        timeline: the timeline.
+        times: (T,) seconds on the track's clock, ascending.
+    Returns:
+        For each time the labels, None in a transition, empty where locomotion is automatic.
+    """
     times = np.asarray(times, dtype=float)
     out: list[frozenset[str] | None] = [frozenset()] * len(times)
     for span in timeline.spans:
@@ -114,8 +148,16 @@ def words_per_frame(timeline: Timeline, times: np.ndarray) -> list[frozenset[str
 
 
 def avoided_per_frame(timeline: Timeline, times: np.ndarray) -> list[frozenset[str]]:
-    """Per time of `times` (T,) seconds: the words that nothing shown then may carry. Spans without words of their own
-    may lie over others; what a span asks for counts more than that another one avoids it."""
+    """List the labels that no motion may have at each time.
+
+    Spans with only avoided labels may overlap others; a label that one span requests is not avoided because of another.
+
+    Args:
+        timeline: the timeline.
+        times: (T,) seconds on the track's clock, ascending.
+    Returns:
+        For each time the avoided labels.
+    """
     times = np.asarray(times, dtype=float)
     out: list[frozenset[str]] = [frozenset()] * len(times)
     for span in timeline.spans:
@@ -127,7 +169,7 @@ def avoided_per_frame(timeline: Timeline, times: np.ndarray) -> list[frozenset[s
 
 
 def _held(span: Span, times: np.ndarray) -> slice:
-    """The frames in which a span holds: see `words_per_frame`."""
+    """Find the frames in which a span applies, see `labels_per_frame`."""
     first, last = np.searchsorted(times, [span.start - _SAME_TIME, span.end - _SAME_TIME])
     if len(times) and abs(times[-1] - span.end) <= _SAME_TIME:
         last = len(times)
@@ -135,11 +177,19 @@ def _held(span: Span, times: np.ndarray) -> slice:
 
 
 def fill(timeline: Timeline, times: np.ndarray, words: Sequence[tuple[str, ...]]) -> Timeline:
-    """The timeline with automatic locomotion put in wherever no span with words holds (Faustino §3.1.1).
+    """Fill the timeline with automatic locomotion wherever no span with labels applies.
 
-    times: (T,) seconds of the output frames. words: T word tuples, the automatic gait of each frame. Spans with words
-    and key moments stay as they are; the others are replaced by one span per stretch of equal automatic words. A
-    stretch runs from its first frame to the next stretch's; the last ends at the last frame."""
+    Spans with labels and key moments stay as they are. All others are replaced by one span per run of equal automatic
+    labels, from the run's first frame to the next run's; the last one ends at the last frame.
+
+    Args:
+        timeline: the timeline.
+        times: (T,) seconds of the output frames, ascending.
+        labels: T tuples, the automatic gait of each frame.
+    Returns:
+        The filled timeline.
+    Source: Faustino 2024, section 3.1.1.
+    """
     times = np.asarray(times, dtype=float)
     if not len(times):
         return timeline
@@ -149,7 +199,7 @@ def fill(timeline: Timeline, times: np.ndarray, words: Sequence[tuple[str, ...]]
 
 
 def _open_stretches(asked: list[Span], times: np.ndarray) -> list[tuple[float, float]]:
-    """(start, end) seconds between the first and the last time that no span of `asked` covers."""
+    """Find the (start, end) seconds between the first and the last time that no labelled span covers."""
     out, reached = [], times[0]
     for start, end in [*((span.start, span.end) for span in asked), (times[-1], times[-1])]:
         if min(start, times[-1]) > reached + _SAME_TIME:
@@ -159,7 +209,7 @@ def _open_stretches(asked: list[Span], times: np.ndarray) -> list[tuple[float, f
 
 
 def _pieces(start: float, end: float, times: np.ndarray, words: Sequence[tuple[str, ...]]) -> list[Span]:
-    """Spans of equal automatic words that together cover start .. end."""
+    """Build spans of equal automatic labels that together cover start to end."""
     first = max(int(np.searchsorted(times, start + _SAME_TIME)) - 1, 0)
     last = int(np.searchsorted(times, end - _SAME_TIME))
     edges = [i for i in range(first + 1, last) if tuple(words[i]) != tuple(words[i - 1])]
@@ -171,10 +221,16 @@ def problems(
     timeline: Timeline, known_words: Iterable[str] = (), start: float | None = None, end: float | None = None,
     where: str = "annotations",
 ) -> list[InputError]:
-    """Everything that is wrong with a timeline, in time order, as errors ready to be raised or shown.
+    """Find everything that is wrong with a timeline.
 
-    known_words: words beyond the vocabulary (the library's and the user's). start, end: the track's first and last time
-    in seconds, None where there is no track to compare with. where: the file, for messages."""
+    Args:
+        timeline: the timeline.
+        known_labels: labels in addition to the vocabulary (the library's and the user's).
+        start, end: the track's first and last time in seconds; None without a track to compare with.
+        where: the file, for messages.
+    Returns:
+        The errors, in time order, then overlaps.
+    """
     known = vocabulary_words(known_words)
     found: list[InputError] = []
     items: list[Span | KeyMoment] = [*timeline.spans, *timeline.keys]
@@ -188,7 +244,13 @@ def validate(
     timeline: Timeline, known_words: Iterable[str] = (), start: float | None = None, end: float | None = None,
     where: str = "annotations",
 ) -> None:
-    """Raises the first of `problems(...)` as an InputError; returns when there is none."""
+    """Check a timeline and raise the first of `find_problems(...)`.
+
+    Args:
+        timeline, known_labels, start, end, where: see `find_problems`.
+    Raises:
+        InputError: if there is a problem.
+    """
     found = problems(timeline, known_words, start, end, where)
     if found:
         raise found[0]
@@ -197,22 +259,30 @@ def validate(
 def missing_keys(
     timeline: Timeline, choices: Iterable[Iterable[str]], count: int = 3
 ) -> list[tuple[KeyMoment, tuple[tuple[str, ...], ...]]]:
-    """The key moments that no choice serves, each with the `count` nearest choices.
+    """Find the key moments that no clip of a library serves.
 
-    choices: the words of every clip's key moment, those of mirrored clips included. A choice serves a key moment when
-    it carries all of its words; further words do no harm."""
+    A combination serves a key moment if it has all of its labels; further labels do not matter.
+
+    Args:
+        timeline: the timeline.
+        choices: the labels of every clip's key moment, mirrored clips included.
+        count: number of nearest combinations to return.
+    Returns:
+        Each such key moment with the `count` nearest combinations.
+    """
     held = [tuple(choice) for choice in choices]
     lacking = [key for key in timeline.keys if not any(set(key.words) <= set(choice) for choice in held)]
     return [(key, nearest(key.words, held, count)) for key in lacking]
 
 
 def _word_problems(item: Span | KeyMoment, known: frozenset[str], place: str) -> list[InputError]:
+    """Find what is wrong with the labels of a span or key moment."""
     if TRANSITION in (*item.words, *item.avoid):
         return _transition_problems(item, place)
     out = [_unknown_word(word, item, known, place) for word in (*item.words, *item.avoid) if word not in known]
     out += [_both_ways(word, place) for word in item.words if word in item.avoid]
     if isinstance(item, KeyMoment) and not item.words:
-        out.append(InputError(place, "a key moment without words", "TIME words...", "say what happens there"))
+        out.append(InputError(place, "a key moment without labels", "TIME labels...", "add labels"))
     return out
 
 
@@ -224,21 +294,22 @@ def _transition_problems(item: Span | KeyMoment, place: str) -> list[InputError]
 
 
 def _both_ways(word: str, place: str) -> InputError:
-    found = f"{word!r} is asked for and avoided"
-    return InputError(place, found, f"'{word}' or '{MUST_NOT}{word}'", "take one of them away")
+    found = f"{word!r} is both requested and avoided"
+    return InputError(place, found, f"'{word}' or '{MUST_NOT}{word}'", "remove one of them")
 
 
 def _unknown_word(word: str, item: Span | KeyMoment, known: frozenset[str], place: str) -> InputError:
-    """Offers words spelled alike, and those that the tree has below the line's other words."""
+    """Build the error of an unknown label; suggest similar labels and those that the tree has below the line's others.
+    """
     others = [other for other in item.words if other in known]
     alike = similar_words(word, known)
     roots = sorted(DISCRETE if isinstance(item, KeyMoment) else CONTINUOUS)
     offers = dict.fromkeys((*alike, *(words_below(others)[:5] if others else roots * (not alike))))
     return InputError(
         place,
-        f"the word {word!r} is not in the vocabulary",
-        f"one like {', '.join(offers)}" if offers else "a word of the vocabulary",
-        "correct it, or add it to your own words",
+        f"the label {word!r} is not in the vocabulary",
+        f"one like {', '.join(offers)}" if offers else "a label of the vocabulary",
+        "correct it, or add it to your own labels",
     )
 
 
@@ -262,15 +333,15 @@ def _range(start: float | None, end: float | None) -> str:
 
 
 def _overlaps(timeline: Timeline, where: str) -> list[InputError]:
-    """Spans with words that overlap, and key moments at one time: nobody can do both."""
+    """Find labelled spans that overlap, and key moments at the same time: a player cannot do both."""
     asked = [span for span in timeline.spans if span.words]
     pairs: list[tuple] = [(a, b, "overlap") for a, b in zip(asked, asked[1:]) if b.start < a.end - _SAME_TIME]
     keys = timeline.keys
-    pairs += [(a, b, "are at one time") for a, b in zip(keys, keys[1:]) if b.time - a.time <= _SAME_TIME]
+    pairs += [(a, b, "are at the same time") for a, b in zip(keys, keys[1:]) if b.time - a.time <= _SAME_TIME]
     return [
         InputError(
             where if b.line is None else f"{where}:{b.line}", f"{_named(a)} and {_named(b)} {how}",
-            "one thing at a time", "shorten one of them, or put all words on one line",
+            "one action at a time", "shorten one of them, or put all labels on one line",
         )
         for a, b, how in pairs
     ]
@@ -282,6 +353,11 @@ def _named(item: Span | KeyMoment) -> str:
 
 
 def spelled(item: Span | KeyMoment) -> tuple[str, ...]:
-    """The words of a span or key moment as its line in the text form has them: those it asks for, then those that must
-    not be, each behind MUST_NOT."""
+    """List the labels of a span or key moment as the text form writes them.
+
+    Args:
+        item: a span or key moment.
+    Returns:
+        The requested labels, then the avoided ones, each after `AVOID_PREFIX`.
+    """
     return (*item.words, *(MUST_NOT + word for word in item.avoid))

@@ -1,13 +1,13 @@
-"""The words that people and clips share, as the decision tree of Faustino's Appendix A.
+"""The labels that users and clips share, as the decision tree of Faustino's Appendix A.
 
-A motion carries the words from a root of the tree down to a leaf ("kick low inside running"), plus modifiers ("right").
-Words of a branch may be left out when asking: any clip below serves. Words that are not in the tree are welcome too, as
-long as the library's annotations or the user's own list bring them.
+A motion has the labels from a root of the tree down to a leaf ("kick low inside running"), plus modifiers ("right").
+A request may leave out labels of a branch: any clip below it serves. Labels outside the tree are allowed if the
+library's annotations or the user's own list have them.
 
-The printed tree lost its indentation on the way into text; it is put back here so that every path reads as a movement.
-Doubtful places: "with" below running and getting_up is kept as printed (its second half is lost); "ender" below
-celebration is read as the end of a cut-off line and left out; bicycle stands below kick; letgo below turning's dribble.
-The continuous list names dribble and turning without branches, and fall, fly and jump read as three roots.
+The printed tree lost its indentation in the text extraction; it is restored here so that every path is a plausible
+movement. Doubtful places: "with" below running and getting_up is kept as printed (its second half is lost); "ender"
+below celebration is read as the end of a cut-off line and left out; bicycle is placed below kick, letgo below turning's
+dribble. The continuous list names dribble and turning without branches, and fall, fly and jump read as three roots.
 """
 
 from __future__ import annotations
@@ -18,23 +18,23 @@ from functools import lru_cache
 from .labels import KINDS, list_labels, read_labels
 
 SIDES = ("left", "right")
-"""In the order of arrays by side."""
+"""Sides in the order of arrays by side."""
 
 DIRECTIONS = ("front", "left", "back", "right")
-"""Labels of the way a body goes or acts, in quarter turns counterclockwise from where it faces."""
+"""Labels of the direction of a body's motion or action, in quarter turns counterclockwise from its heading."""
 
 
 def _tree_of(kind: str) -> dict[str, dict]:
-    """A kind's root labels with the tree below each; of a root of two kinds that is in the discrete one."""
+    """Build a kind's root labels with the tree below each; a root of two kinds has its tree in the discrete one."""
     roots = [label for label in read_labels().values() if kind in label.kinds]
     return {root.name: root.below if kind == root.kinds[-1] else {} for root in roots}
 
 
 VOCABULARY: dict[str, dict] = {kind: _tree_of(kind) for kind in KINDS}
-"""Faustino, Appendix A: kind -> root word -> nested words below it, from the table (`labels`)."""
+"""Faustino, Appendix A: kind -> root label -> nested labels below it, from the table (`labels`)."""
 
 TRANSITION = "transition"
-"""Alone in a timeline's line: this stretch is left to continuity."""
+"""Alone in a timeline's line: continuity alone decides this span."""
 
 CONTINUOUS = frozenset(VOCABULARY["continuous"])
 """Cyclic motions, annotated with a start and an end."""
@@ -46,18 +46,37 @@ _OPPOSITE_SIDE = dict(zip(SIDES, reversed(SIDES)))
 
 
 def vocabulary_words(extra: Iterable[str] = ()) -> frozenset[str]:
-    """Every word of the tree, and `extra` (the library's own words, the user's list)."""
+    """Collect every label of the tree.
+
+    Args:
+        extra: further labels (the library's own, the user's list).
+    Returns:
+        All labels.
+    """
     return frozenset(word for path in _paths(VOCABULARY) for word in path[1:]) | frozenset(extra)
 
 
 def swap_sides(words: Iterable[str]) -> tuple[str, ...]:
-    """The words of the mirrored motion (Faustino §3.1.2): left and right change places, also inside `turn_left`."""
+    """Exchange left and right, also inside labels such as `turn_left`.
+
+    Args:
+        labels: the labels of a motion.
+    Returns:
+        The labels of the mirrored motion.
+    Source: Faustino 2024, section 3.1.2.
+    """
     return tuple("_".join(_OPPOSITE_SIDE.get(part, part) for part in word.split("_")) for word in words)
 
 
 @lru_cache(maxsize=1024)
 def relatives(word: str) -> frozenset[str]:
-    """The words that stand above or below `word` somewhere in the tree, itself left out."""
+    """Find the labels above or below a label anywhere in the tree.
+
+    Args:
+        label: the label.
+    Returns:
+        Its relatives, without itself.
+    """
     found: set[str] = set()
     for path in _paths(VOCABULARY):
         if word in path[1:]:
@@ -66,9 +85,15 @@ def relatives(word: str) -> frozenset[str]:
 
 
 def words_below(words: Iterable[str]) -> tuple[str, ...]:
-    """What the tree offers next after `words`, in the tree's order: all children of the deepest places they reach.
+    """List the labels that the tree offers next: all children of the deepest positions that the labels reach.
 
-    A place is reached when every word on its path is among `words`: after ("kick", "low") come inside, top ...."""
+    The labels reach a position if they include every label on its path: after ("kick", "low") come inside, top ....
+
+    Args:
+        labels: the labels so far.
+    Returns:
+        The next labels, in the tree's order.
+    """
     asked = set(words)
     reached = [path for path in _paths(VOCABULARY) if asked.issuperset(path[1:])]
     deepest = max((len(path) for path in reached), default=0)
@@ -77,13 +102,29 @@ def words_below(words: Iterable[str]) -> tuple[str, ...]:
 
 
 def similar_words(word: str, known: Iterable[str], count: int = 3) -> tuple[str, ...]:
-    """The `count` words of `known` nearest to `word` in spelling (edit distance), at most half of its letters away."""
+    """Find the labels with the most similar spelling (edit distance), at most half of the letters different.
+
+    Args:
+        label: the label as written.
+        known: the labels to choose from.
+        count: number of labels at most.
+    Returns:
+        The labels, nearest first.
+    """
     ranked = sorted((edit_distance(word, other), other) for other in set(known))
     return tuple(other for distance, other in ranked[:count] if distance <= max(1, (len(word) + 1) // 2))
 
 
 def edit_distance(a: str, b: str) -> int:
-    """Least number of letters to insert, delete or replace that turns `a` into `b` (Levenshtein)."""
+    """Count the letters to insert, delete or replace at least to turn `a` into `b` (Levenshtein distance).
+
+    Args:
+        a, b: any texts.
+    Returns:
+        The distance.
+    """
+    # One row of the table of distances: row[j] is the distance of a[:i] to b[:j]; `diagonal` is the entry for a[:i - 1]
+    # and b[:j - 1].
     row = list(range(len(b) + 1))
     for i, letter in enumerate(a, start=1):
         diagonal, row[0] = row[0], i
@@ -93,11 +134,21 @@ def edit_distance(a: str, b: str) -> int:
 
 
 def nearest(words: Iterable[str], choices: Iterable[Iterable[str]], count: int = 3) -> tuple[tuple[str, ...], ...]:
-    """The `count` word combinations of `choices` that come closest to `words`, best first; equal sets count once.
+    """Find the label combinations nearest to the requested labels; equal sets count once.
 
-    Ordered by the asked words a choice lacks (one that names the action, like "kick", weighs more than all that only
-    colour it), then by how many words it has that stand near the missing ones in the tree (so that "header", where
-    there is none, leads to "jump"), then by words nobody asked for, then in the tree's order."""
+    They are ordered by the requested labels that a combination lacks (a label that names the action, like "kick",
+    weighs
+    more than all modifiers together), then by how many labels it has that are related to the missing ones in the tree
+    (so
+    that "header", if there is none, leads to "jump"), then by labels that were not requested, then by the tree's order.
+
+    Args:
+        labels: the requested labels.
+        choices: the combinations to choose from.
+        count: number of combinations at most.
+    Returns:
+        The combinations, best first.
+    """
     asked = frozenset(words)
     unique = {frozenset(choice): tuple(choice) for choice in map(tuple, choices)}
     ranked = sorted(unique, key=lambda choice: (*_distance(asked, choice), _in_tree_order(choice)))
@@ -105,6 +156,7 @@ def nearest(words: Iterable[str], choices: Iterable[Iterable[str]], count: int =
 
 
 def _distance(asked: frozenset[str], choice: frozenset[str]) -> tuple[int, int, int]:
+    """Compute the sort key of a combination: weighted missing labels, related labels (negative), extra labels."""
     missing = asked - choice
     actions = asked & DISCRETE or asked & CONTINUOUS
     kin = frozenset().union(*(relatives(word) for word in missing))
@@ -113,7 +165,13 @@ def _distance(asked: frozenset[str], choice: frozenset[str]) -> tuple[int, int, 
 
 
 def spoken(words: Iterable[str]) -> tuple[str, ...]:
-    """The words in the order in which one says them: the action, the side, how, the gait, which way."""
+    """Sort labels into their usual order: action, side, manner, gait, direction.
+
+    Args:
+        labels: the labels of a motion.
+    Returns:
+        The sorted labels.
+    """
     return _spoken(frozenset(words))
 
 
@@ -137,14 +195,14 @@ def _tree_order() -> dict[str, int]:
 
 
 def _paths(tree: Mapping[str, dict], above: tuple[str, ...] = ()) -> Iterator[tuple[str, ...]]:
-    """Every place of the tree as its path (kind, root, ... , word), parents first."""
+    """Iterate over every position of the tree as its path (kind, root, ..., label), parents first."""
     for word, below in tree.items():
         yield (*above, word)
         yield from _paths(below, (*above, word))
 
 
 def _at(path: tuple[str, ...]) -> Mapping[str, dict]:
-    """The branch below the place `path`."""
+    """Find the branch below the position `path`."""
     branch: Mapping[str, dict] = VOCABULARY
     for word in path:
         branch = branch[word]

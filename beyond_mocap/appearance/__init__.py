@@ -1,1 +1,1 @@
-"""What a body looks like: a mesh for any skeleton, kit, a small picture without Blender."""
+"""A body's appearance: a mesh for any humanoid skeleton, kit, and a small picture without Blender."""

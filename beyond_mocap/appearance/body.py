@@ -1,9 +1,10 @@
-"""A low-poly soccer player that fits any humanoid skeleton: kit, boots, head, hands, with skin weights.
+"""A low-poly football player that fits any humanoid skeleton: kit, boots, head and hands, with skin weights.
 
-Each part is a closed tube of rings around a bone, built in the neutral stance (`neutral`), where limbs hang and the
-body faces +X, and then carried back into the skeleton's rest pose. Knees, elbows, spine and neck bend smoothly (two
-joints share a ring); hips, shoulders and ankles are rounded ends that overlap, which stays whole at any angle and in
-any rest pose. Girths are those of a slim adult of 1.80 m, scaled with the skeleton."""
+Each part is a closed tube of rings around a bone. It is built in the neutral stance (`neutral`), where limbs hang and
+the body faces +X, and then moved to the skeleton's rest pose. Knees, elbows, spine and neck bend smoothly (two joints
+share a ring); hips, shoulders and ankles are rounded ends that overlap, which stays closed at any angle and in any rest
+pose. Girths are those of a slim adult of 1.80 m, scaled with the skeleton.
+"""
 
 from __future__ import annotations
 
@@ -24,11 +25,15 @@ SKIN, SHIRT, SHORTS, SOCKS, BOOTS, HAIR = range(6)
 
 @dataclass(frozen=True, eq=False)
 class BodyMesh:
-    """A closed mesh with weights, in the skeleton's rest pose (no joint rotated, root at the origin).
+    """A closed mesh with skin weights, in the skeleton's rest pose (no joint rotated, root at the origin).
 
-    vertices (V, 3): metres, Z up. faces: tuples of 3 or 4 vertex indices, counter-clockwise from outside. joints (V,
-    2), weights (V, 2): the two joints a vertex follows and how much, summing to 1 (the second weight may be 0).
-    material (F,): index into MATERIALS per face."""
+    Attributes:
+        vertices: (V, 3) m, Z up.
+        faces: tuples of 3 or 4 vertex indices, counterclockwise from outside.
+        joints: (V, 2) int, the two joints that a vertex follows.
+        weights: (V, 2) their weights, which sum to 1; the second may be 0.
+        material: (F,) int, index into MATERIALS per face.
+    """
 
     vertices: np.ndarray
     faces: tuple[tuple[int, ...], ...]
@@ -38,11 +43,21 @@ class BodyMesh:
 
 
 def low_poly_body(skeleton: Skeleton, height: float | None = None, example: Motion | None = None) -> BodyMesh:
-    """A player's body for `skeleton`; `height`: stature in metres that girths belong to, default by the legs' length.
+    """Build a player's body for a skeleton.
 
-    example: any recording on the skeleton; it tells how bones are twisted where the rest pose is no standing one,
-    without it feet and hands of such skeletons may sit turned (see `neutral.neutral_stance`). The face looks ahead as
-    the rest pose does, where that stands upright. Raises InputError where hips or legs cannot be found."""
+    The face looks ahead as in the rest pose if that stands upright.
+
+    Args:
+        skeleton: a humanoid skeleton, J joints.
+        height: stature in metres for the girths; None derives it from the legs' length.
+        example: any recording on the skeleton; it shows how bones are twisted if the rest pose does not stand. Without
+            it,
+            feet and hands of such skeletons may be rotated (see `neutral.neutral_stance`).
+    Returns:
+        The mesh.
+    Raises:
+        InputError: if the skeleton has no hips or legs.
+    """
     neutral = neutral_stance(skeleton, example)
     if example is not None and rests_upright(skeleton):
         neutral = _level_head(neutral, neutral_stance(skeleton))
@@ -62,8 +77,10 @@ def low_poly_body(skeleton: Skeleton, height: float | None = None, example: Moti
 
 
 def _level_head(neutral: Neutral, rest: Neutral) -> Neutral:
-    """The stance with its head as it rests, unless that would have the example's people look up: who kicks or walks
-    looks down at the ground ahead, but some suits rest with a bowed head."""
+    """Give the stance the head of the rest pose, unless the example's people would then look up.
+
+    A player who kicks or walks looks down at the ground ahead, but some suits have a bowed head in the rest pose.
+    """
     carrier = identify(neutral.skeleton).head_or_neck
     ahead = quaternion.multiply(neutral.rotations[carrier], quaternion.inverse(rest.rotations[carrier]))
     if quaternion.rotate(ahead, np.array([1.0, 0.0, 0.0]))[2] > 0.0:
@@ -74,9 +91,16 @@ def _level_head(neutral: Neutral, rest: Neutral) -> Neutral:
 
 
 def deformed(body: BodyMesh, skeleton: Skeleton, places: np.ndarray, world: np.ndarray) -> np.ndarray:
-    """Vertices (..., V, 3), metres, of the body with joints at `places` (..., J, 3), turned by `world` (..., J, 4).
+    """Deform the body by linear blend skinning, like Blender's armature modifier without volume preservation.
 
-    Linear blend skinning, as Blender's armature modifier does without volume preservation."""
+    Args:
+        body: the mesh, V vertices.
+        skeleton: its skeleton, J joints.
+        positions: (..., J, 3) m, the joints' positions, world frame.
+        rotations: (..., J, 4) quaternions, the joints' rotations, world frame.
+    Returns:
+        (..., V, 3) m, world frame.
+    """
     origin = skeleton.rest_positions
     out = np.zeros((*places.shape[:-2], len(body.vertices), 3))
     for column in range(2):
@@ -87,12 +111,12 @@ def deformed(body: BodyMesh, skeleton: Skeleton, places: np.ndarray, world: np.n
 
 
 def _to_rest(neutral: Neutral, vertices: np.ndarray, joints: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """The rest position (V, 3) of vertices (V, 3) of the neutral stance: blend skinning turned round."""
+    """Compute the rest positions (V, 3) of vertices (V, 3) given in the neutral stance: inverse blend skinning."""
     origin = neutral.skeleton.rest_positions
     turn = quaternion.to_matrix(neutral.rotations)
     shift = neutral.positions - np.einsum("jab,jb->ja", turn, origin)
     matrix = np.einsum("vc,vcab->vab", weights, turn[joints])
-    torn = np.abs(np.linalg.det(matrix)) < 0.2  # two joints that rest in opposite directions: follow the first alone
+    torn = np.abs(np.linalg.det(matrix)) < 0.2  # joints rotated in opposite directions: use the first alone
     matrix[torn] = turn[joints[torn, 0]]
     offset = np.einsum("vc,vca->va", weights, shift[joints])
     offset[torn] = shift[joints[torn, 0]]
@@ -100,7 +124,17 @@ def _to_rest(neutral: Neutral, vertices: np.ndarray, joints: np.ndarray, weights
 
 
 class _Build:
-    """Collects the parts. Tables are in metres for a stature of 1.80 m; `scale` fits them to the skeleton."""
+    """Collects the parts of the body.
+
+    Its tables are in metres for a stature of 1.80 m; `scale` adapts them to the skeleton.
+
+    Attributes:
+        neutral: the neutral stance.
+        body: the skeleton's humanoid joints.
+        scale: the skeleton's stature relative to 1.80 m.
+        vertices, joints, weights: arrays of each part, see `BodyMesh`.
+        faces, material: faces and their materials.
+    """
 
     def __init__(self, neutral: Neutral, body: Humanoid, scale: float):
         self.neutral, self.body, self.scale = neutral, body, scale
@@ -109,11 +143,19 @@ class _Build:
         self.material: list[int] = []
 
     def at(self, joint: int) -> np.ndarray:
+        """Return a joint's position (3,) m in the neutral stance."""
         return self.neutral.positions[joint]
 
     def tube(self, rings, follows, materials, sides: int = 12, across=((1.0, 0, 0), (0, 1.0, 0))) -> None:
-        """A closed tube. rings: rows (centre (3,), radius along the first axis, along the second). follows: per ring
-        (joint, joint, share of the second). materials: one per gap between rings, the end ones also for the caps."""
+        """Add a closed tube.
+
+        Args:
+            rings: rows (centre (3,), radius along the first axis, radius along the second).
+            follows: for each ring (joint, joint, share of the second).
+            materials: one for each gap between rings; the first and last also for the caps.
+            sides: vertices per ring.
+            across: the two axes of the rings.
+        """
         first, second = (np.array(axis, dtype=float) for axis in across)
         angle = 2.0 * np.pi * np.arange(sides) / sides
         circle = np.cos(angle)[:, None, None] * first, np.sin(angle)[:, None, None] * second
@@ -121,6 +163,7 @@ class _Build:
         centres = np.array([ring[0] for ring in rings])
         radii = np.array([ring[1:3] for ring in rings]) * self.scale
         points = (centres[None] + circle[0] * radii[None, :, :1] + circle[1] * radii[None, :, 1:]).transpose(1, 0, 2)
+        # Vertices ring by ring, then the middle of both caps.
         bottom, top = centres[0], centres[-1]
         self.vertices.append(np.concatenate([points.reshape(-1, 3), [bottom, top]]))
         pairs = np.array([f[:2] for f in follows])
@@ -130,6 +173,7 @@ class _Build:
         self._skin(start, len(rings), sides, materials, np.dot(np.cross(first, second), top - bottom) > 0)
 
     def _skin(self, start: int, count: int, sides: int, materials, outward: bool) -> None:
+        """Add the faces of a tube: quads between rings, triangles at both caps."""
         index = start + np.arange(count * sides).reshape(count, sides)
         low, high = start + count * sides, start + count * sides + 1
         for i in range(sides):
@@ -146,7 +190,16 @@ class _Build:
                 self.material.append(material)
 
     def ball(self, centre, radii, joint: int, material: int, other: int | None = None, sides: int = 10) -> None:
-        """A closed ellipsoid with half axes `radii` (3,) that follows `joint`, half with `other` where given."""
+        """Add a closed ellipsoid.
+
+        Args:
+            centre: (3,) m.
+            radii: (3,) half axes in metres for a stature of 1.80 m.
+            joint: the joint that it follows.
+            material: index into MATERIALS.
+            other: a second joint that it follows half, or None.
+            sides: vertices per ring.
+        """
         rings = [
             (centre + self.scale * np.array([0, 0, -radii[2] * np.cos(a)]), radii[0] * np.sin(a), radii[1] * np.sin(a))
             for a in np.radians([25, 55, 90, 125, 155])
@@ -158,7 +211,13 @@ class _Build:
     # -------------------------------------------------------------------------------------------------
 
     def spine_follow(self, height: float) -> tuple[int, int, float]:
-        """Which two joints of the spine a ring at `height` metres follows: half and half at a joint, one between."""
+        """Find which two joints of the spine a ring follows: half and half at a joint, one joint between.
+
+        Args:
+            height: m above the ground in the neutral stance.
+        Returns:
+            Lower joint, upper joint, share of the upper one.
+        """
         chain = [self.body.hips]
         for joint in self.body.spine:
             if self.at(joint)[2] > self.at(chain[-1])[2] + 0.02:
@@ -170,10 +229,11 @@ class _Build:
         return chain[low], chain[high], float(np.clip(position - low, 0.0, 1.0))
 
     def torso(self) -> None:
+        """Add shirt and shorts of the trunk."""
         body, k = self.body, self.scale
         hip = 0.5 * (self.at(body.left.upper_leg) + self.at(body.right.upper_leg))
         top, half = self._shoulders(hip)
-        # share of the way hip joints -> shoulder joints, forward shift, half depth, half width
+        # share of the distance from hip joints to shoulder joints, forward shift, half depth, half width
         shirt = (
             (0.13, 0.000, 0.112, 0.158), (0.22, 0.002, 0.112, 0.156), (0.36, 0.006, 0.107, 0.146),
             (0.52, 0.006, 0.112, 0.152), (0.68, 0.004, 0.122, 0.168), (0.82, -0.002, 0.124, 0.178),
@@ -188,7 +248,7 @@ class _Build:
         self._trunk_rings(hip, top, shorts, SHORTS, 1.0)
 
     def _shoulders(self, hip: np.ndarray) -> tuple[np.ndarray, float]:
-        """Middle of the shoulder joints and half their distance; guessed from the spine where there are no arms."""
+        """Find the middle of the shoulder joints and half their distance; estimated from the hips without arms."""
         arms = [limb.upper_arm for limb in (self.body.left, self.body.right)]
         if None in arms:
             return hip + np.array([0.0, 0.0, 0.56 * self.scale]), 0.164 * self.scale
@@ -197,6 +257,7 @@ class _Build:
         return middle, 0.5 * abs(left[1] - right[1])
 
     def _trunk_rings(self, hip, top, table, material: int, widen: float) -> None:
+        """Add a tube around the trunk; `widen` scales the upper rings to the shoulders' width."""
         rings, follows = [], []
         for share, ahead, depth, width in table:
             upper = max(share - 0.5, 0.0) / 0.5
@@ -206,6 +267,7 @@ class _Build:
         self.tube(rings, follows, [material] * (len(rings) - 1), 16)
 
     def head(self) -> None:
+        """Add neck, head and face."""
         body, k = self.body, self.scale
         hip = 0.5 * (self.at(body.left.upper_leg) + self.at(body.right.upper_leg))
         shoulder, _ = self._shoulders(hip)
@@ -223,6 +285,7 @@ class _Build:
         self._face(base, carrier)
 
     def _face(self, base: np.ndarray, joint: int) -> None:
+        """Add skull, hair, nose, ears, eyes and brows."""
         k = self.scale
         # above the base of the skull, forward, half depth, half width
         skull = (
@@ -248,9 +311,15 @@ class _Build:
     # ----------------------------------------------------------------------------------------------------------
 
     def limb_tube(self, upper: int, lower: int, end: int, table, sides: int) -> None:
-        """A tube along two bones. table: rows (place, metres forward, metres left, radii, material): places 0..1 run
-        down the upper bone, 1..2 down the lower one; rings near the middle joint are shared, the last ones follow the
-        lower bone."""
+        """Add a tube along two bones.
+
+        Args:
+            upper, lower, end: the joints at both ends of the two bones.
+            table: rows (position, metres forward, metres left, two radii, material). Positions 0 to 1 run down the
+                upper bone,
+                1 to 2 down the lower one. Rings near the middle joint follow both bones, the last ones the lower bone.
+            sides: vertices per ring.
+        """
         a, b, c = self.at(upper), self.at(lower), self.at(end)
         rings, follows = [], []
         for place, ahead, left, first, second, _ in table:
@@ -260,6 +329,7 @@ class _Build:
         self.tube(rings, follows, [row[-1] for row in table[:-1]], sides)
 
     def leg(self, limb: Limb) -> None:
+        """Add leg, knee, ankle and the leg of the shorts."""
         inner = -np.sign(self.at(limb.upper_leg)[1])
         bones = limb.upper_leg, limb.lower_leg, limb.foot
         table = (
@@ -287,12 +357,13 @@ class _Build:
         self.limb_tube(*bones, shorts, 12)
 
     def boot(self, limb: Limb, side: float) -> None:
+        """Add the boot."""
         ankle, k = self.at(limb.foot), self.scale
         ball = self.neutral.ball[0 if side > 0 else 1]
         floor = ankle[2] - self.neutral.ankle_height
         toe = limb.toe if limb.toe is not None else limb.foot
-        # metres from the ankle (or, from the ball on, from the toe joint), height of the middle, half height, half
-        # width
+        # metres from the ankle (from the ball of the foot on: from the toe joint), height of the middle, half height,
+        # half width, share of the toe joint
         table = (
             (-0.068, 0.040, 0.024, 0.018, 0), (-0.060, 0.042, 0.040, 0.030, 0), (-0.030, 0.046, 0.046, 0.036, 0),
             (0.010, 0.049, 0.049, 0.037, 0), (0.050, 0.040, 0.040, 0.039, 0), (0.090, 0.032, 0.032, 0.043, 0),
@@ -309,6 +380,7 @@ class _Build:
         self.tube(rings, follows, [BOOTS] * (len(rings) - 1), 10, ((0.0, 1.0, 0.0), (0.0, 0.0, 1.0)))
 
     def arm(self, limb: Limb) -> None:
+        """Add arm, elbow and sleeve."""
         inner = -np.sign(self.at(limb.upper_arm)[1])
         bones = limb.upper_arm, limb.lower_arm, limb.hand
         table = (
@@ -333,8 +405,9 @@ class _Build:
         self.limb_tube(*bones, sleeve, 12)
 
     def hand(self, limb: Limb, side: float) -> None:
+        """Add hand and thumb."""
         wrist, k, joint = self.at(limb.hand), self.scale, limb.hand
-        # below the wrist, towards the palm, forward, half length along the palm's width, half thickness
+        # below the wrist, towards the palm, forward, half width of the palm, half thickness
         table = (
             (-0.022, 0.0, 0.0, 0.024, 0.019), (0.010, 0.0, 0.0, 0.031, 0.018), (0.050, 0.002, 0.002, 0.042, 0.019),
             (0.092, 0.008, 0.002, 0.043, 0.018), (0.124, 0.020, 0.000, 0.038, 0.017),
@@ -357,7 +430,8 @@ class _Build:
 
 
 def _half_way(levels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Heights and positions in a chain such that a joint's height is half way between it and the one below it."""
+    """Compute heights and positions in a chain such that a joint's height is half way between it and the one below it.
+    """
     middles = 0.5 * (levels[1:] + levels[:-1])
     heights = np.concatenate([[levels[0] - 0.08], middles, [levels[-1] + 0.08]])
     return heights, np.arange(len(heights), dtype=float)

@@ -1,6 +1,7 @@
-"""A small picture of one pose: the low-poly body on transparent ground, drawn with numpy alone.
+"""A small picture of one pose: the low-poly body on a transparent background, drawn with numpy alone.
 
-Faces are filled from far to near, at twice the size, and averaged down: no graphics card, the same pixels everywhere.
+Faces are filled from far to near at twice the size and averaged down. This needs no graphics card and gives the same
+pixels on every machine.
 """
 
 from __future__ import annotations
@@ -17,20 +18,30 @@ COLOURS = {
     "boots": (0.12, 0.12, 0.13), "hair": (0.16, 0.11, 0.09),
 }
 _SUN = np.array([0.35, -0.45, 0.82])
-_ROUND, _DOWN = np.radians(-50.0), np.radians(12.0)  # from the body's front to the camera; how far it looks down
-_MARGIN = 0.06  # of the picture's side
+_ROUND, _DOWN = np.radians(-50.0), np.radians(12.0)  # angle from the body's front to the camera; downward tilt
+_MARGIN = 0.06  # share of the picture's side
 _SHADOW = (0.0, 0.0, 0.0, 0.30)
 
 
 def pose_picture(motion: Motion, frame: int, size: int = 256) -> np.ndarray:
-    """The body at one frame, seen from its right front, as large as fits: (size, size, 4) RGBA 0 to 1, the lowest row
-    first, alpha not multiplied in. InputError where the skeleton has no legs."""
+    """Render the body at one frame, seen from its front right, as large as fits.
+
+    Args:
+        motion: the motion.
+        frame: the frame.
+        size: pixels of the picture's side.
+    Returns:
+        (size, size, 4) RGBA, 0 to 1, lowest row first, straight alpha.
+    Raises:
+        InputError: if the skeleton has no legs.
+    """
     one = motion.frames(frame, frame + 1)
     one = place(one, -float(heading_from_positions(motion.skeleton, forward_kinematics(one)[0])[0]))
     places, world = forward_kinematics(one)
     body = low_poly_body(motion.skeleton, example=motion)
     skin = deformed(body, motion.skeleton, places, world)[0]
     across, up, away = _camera()
+    # The shadow: each vertex projected along the sun's direction to the height of the lowest one.
     shade = skin - (skin[:, 2:] - skin[:, 2].min()) * (_SUN / _SUN[2])
     both = np.concatenate([skin, shade])
     flat = np.stack([both @ across, both @ up], axis=1)
@@ -44,16 +55,17 @@ def pose_picture(motion: Motion, frame: int, size: int = 256) -> np.ndarray:
 
 
 def _camera() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The picture's right, its up, and the way from the body to the camera: three unit vectors (3,)."""
+    """Build the picture's right, its up, and the direction from the body to the camera: unit vectors (3,)."""
     away = np.array([np.cos(_ROUND) * np.cos(_DOWN), np.sin(_ROUND) * np.cos(_DOWN), np.sin(_DOWN)])
     across = np.array([-np.sin(_ROUND), np.cos(_ROUND), 0.0])
     return across, np.cross(away, across), away
 
 
 def _draw_faces(canvas, skin, flat, quads, material, away) -> None:
-    """The shadow of faces that look at the sun, then the faces that look at the camera, the far ones first.
+    """Draw the shadow of the faces towards the sun, then the faces towards the camera, the farthest first.
 
-    flat: (2 V, 2) pixels of the skin's V vertices, then of their shadows."""
+    flat: (2 V, 2) pixels of the V vertices, then of their shadows.
+    """
     corners = skin[quads]
     normal = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
     normal = unit_vectors(normal, least=1e-12)
@@ -69,11 +81,12 @@ def _draw_faces(canvas, skin, flat, quads, material, away) -> None:
 
 
 def _fill(canvas: np.ndarray, corners: np.ndarray, colours: np.ndarray) -> None:
-    """Convex polygons (F, 4, 2) pixels, one after the other; colours (F, 4) take the place of what was there."""
+    """Fill convex polygons (F, 4, 2) pixels one after the other with colours (F, 4), which replace the pixels below."""
     low = np.clip(np.floor(corners.min(axis=1)).astype(int), 0, len(canvas))
     high = np.clip(np.ceil(corners.max(axis=1)).astype(int) + 1, 0, len(canvas))
     onward = np.roll(corners, -1, axis=1) - corners
     area = np.sum(corners[..., 0] * onward[..., 1] - corners[..., 1] * onward[..., 0], axis=1)
+    # Orient all polygons the same way: a pixel is inside if it is on the inner side of every edge.
     onward = onward * np.where(area < 0.0, -1.0, 1.0)[:, None, None]
     ahead = onward[..., 0] * corners[..., 1] - onward[..., 1] * corners[..., 0]
     pixel = np.arange(len(canvas)) + 0.5
@@ -83,7 +96,7 @@ def _fill(canvas: np.ndarray, corners: np.ndarray, colours: np.ndarray) -> None:
 
 
 def _averaged(canvas: np.ndarray, size: int) -> np.ndarray:
-    """Four pixels to one, colours weighted by their alpha."""
+    """Average four pixels to one, colours weighted by their alpha."""
     four = canvas.reshape(size, 2, size, 2, 4)
     alpha = four[..., 3:].mean(axis=(1, 3))
     colour = (four[..., :3] * four[..., 3:]).mean(axis=(1, 3)) / np.maximum(alpha, 1e-9)

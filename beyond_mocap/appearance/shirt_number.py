@@ -1,4 +1,4 @@
-"""A flat drawing laid on a body's shirt, back or chest, so that it rides the cloth: shirt numbers."""
+"""A flat drawing on the back or chest of a body's shirt that follows the cloth, such as a shirt number."""
 
 from __future__ import annotations
 
@@ -13,13 +13,19 @@ from ..motion.retargeting.neutral import neutral_stance
 from ..motion.skeleton import Skeleton, frozen_array
 from .body import SHIRT, BodyMesh, deformed
 
-_ABOVE = 0.004  # metres of the drawing over the cloth: more than rings of few sides dip in while they bend
-_MIDDLE = {"back": 0.70, "chest": 0.74}  # share of the shirt's height, from its hem, of the drawing's middle
+_ABOVE = 0.004  # metres of the drawing above the cloth: more than coarse rings dip while they bend
+_MIDDLE = {"back": 0.70, "chest": 0.74}  # height of the drawing's middle as a share of the shirt's height from its hem
 
 
 @dataclass(frozen=True, eq=False)
 class OnShirt:
-    """Points on a shirt, in the skeleton's rest pose: vertices (N, 3) m, joints (N, 6), weights (N, 6), in sum 1."""
+    """Points on a shirt, in the skeleton's rest pose.
+
+    Attributes:
+        vertices: (N, 3) m.
+        joints: (N, 6) int, the joints that each point follows.
+        weights: (N, 6), sum 1.
+    """
 
     vertices: np.ndarray
     joints: np.ndarray
@@ -29,18 +35,28 @@ class OnShirt:
 def on_shirt(
     body: BodyMesh, skeleton: Skeleton, points: np.ndarray, side: str = "back", example: Motion | None = None
 ) -> OnShirt:
-    """Points (N, 2) of a drawing, metres to the right and up from its middle as one sees it who looks at that side,
-    "back" or "chest", of a person who stands.
+    """Place the points of a drawing on a shirt.
 
-    body: of `low_poly_body` with the same `example`. Each point takes place and weights of the triangle of cloth behind
-    it, so it stays on the shirt in every pose; points beside it are put on its edge. InputError for a body without one.
+    Each point takes position and weights of the triangle of cloth behind it, so it stays on the shirt in every pose.
+    Points outside the shirt are moved to its edge.
+
+    Args:
+        body: the mesh, built with the same `example`.
+        skeleton: its skeleton.
+        points: (N, 2) m to the right and up from the drawing's middle, as seen by a viewer in front of that side.
+        side: "back" or "chest".
+        example: any recording on the skeleton, or None.
+    Returns:
+        The points in the skeleton's rest pose.
+    Raises:
+        InputError: if the body has no shirt.
     """
     neutral = neutral_stance(skeleton, example)
     standing = deformed(body, skeleton, neutral.positions, neutral.rotations)
     outward = 1.0 if side == "chest" else -1.0
     triangles = _cloth(body, standing, outward)
     if not len(triangles):
-        raise InputError("body", "no shirt", "a body with a shirt", "make it with low_poly_body")
+        raise InputError("body", "it has no shirt", "a body with a shirt", "build it with build_body")
     low, high = np.min(standing[triangles][..., 2]), np.max(standing[triangles][..., 2])
     across = outward * np.asarray(points)[:, 0] + np.mean(standing[triangles][..., 1])
     up = np.asarray(points)[:, 1] + low + _MIDDLE[side] * (high - low)
@@ -56,20 +72,24 @@ def on_shirt(
 
 
 def _cloth(body: BodyMesh, standing: np.ndarray, outward: float) -> np.ndarray:
-    """Triangles (K, 3) of the trunk's shirt that look that way along X; `standing` (V, 3) m in the neutral stance."""
+    """Find the triangles (K, 3) of the trunk's shirt that face `outward` along X.
+
+    standing: (V, 3) m, the vertices in the neutral stance.
+    """
     faces = [face for face, material in zip(body.faces, body.material) if material == SHIRT]
     split = [(face[0], face[i], face[i + 1]) for face in faces for i in range(1, len(face) - 1)]
     triangles = np.array(split, dtype=int).reshape(-1, 3)
     edges = standing[triangles[:, 1:]] - standing[triangles[:, :1]]
     normal = np.cross(edges[:, 0], edges[:, 1])
     size = np.linalg.norm(normal, axis=1)
-    middle = np.abs(standing[triangles][..., 1]).max(axis=1) < 0.1  # near the middle plane: those are no sleeves
+    middle = np.abs(standing[triangles][..., 1]).max(axis=1) < 0.1  # near the middle plane: not a sleeve
     trunk = np.isin(body.joints[triangles[:, 0], 0], np.unique(body.joints[triangles[middle], 0]))
     return triangles[trunk & (outward * normal[:, 0] > 0.2 * size) & (size > 1e-9)]
 
 
 def _behind(flat: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """For points (N, 2) the triangle of (K, 3, 2) that holds each, or is nearest, and barycentric shares (N, 3)."""
+    """Find for points (N, 2) the triangle of (K, 3, 2) that contains each or is nearest, and barycentric weights (N,
+    3)."""
     origin, first, second = flat[:, 0], flat[:, 1] - flat[:, 0], flat[:, 2] - flat[:, 0]
     area = cross_level(first, second)
     away = points[:, None] - origin

@@ -1,1 +1,1 @@
-"""How the ball flies, bounces and rolls; its path from tracking data."""
+"""Ball physics (flight, bounce, roll), launches towards a target, and the ball's trajectory from tracking data."""

@@ -1,11 +1,12 @@
-"""The launch that arrives: a ball that leaves here is there at that time, after so many bounces (Ball handling §4 eq.
-7, 8).
+"""Solve launches that reach a target: the ball is at a place at a time, after a given number of bounces.
 
-The ball's place at the wanted time is a smooth function of its launch velocity as long as the number of bounces stays.
-A first guess comes from a ball that only linear drag slows, whose heights have a closed form; from there a damped
-Newton iteration (eq. 7: differences of three launches beside it; eq. 8: as much of the step as helps) goes on with the
-ball's own physics, for all aims at once. Where height and time leave several launches, the one that goes up and bounces
-late is taken.
+The ball's position at the requested time is a smooth function of its launch velocity while the number of bounces
+stays the same. A first guess comes from a ball with linear drag only, whose heights have a closed form. From there a
+damped Newton iteration (eq. 7: finite differences from three nearby launches; eq. 8: the part of the step that reduces
+the miss) continues with the ball's own physics, for all targets at once. Where height and time allow several launches,
+the one that goes up highest and bounces latest is used.
+
+Source: Ball handling, section 4, equations 7 and 8.
 """
 
 from __future__ import annotations
@@ -21,34 +22,41 @@ from . import batch
 from .physics import Ball, length
 
 CLOSE = 0.01
-"""m: what passes as a hit."""
+"""m: a miss up to this counts as a hit."""
 NEARLY = 1e-3
-"""m from the target beyond which a better launch is looked for."""
+"""m: with a larger miss the next kind of initial guess is tried."""
 EXACT = 1e-4
-"""m from the target at which the iteration ends."""
+"""m: the miss at which the iteration stops."""
 ROUNDS = 14
 LONGEST_STEP = 15.0
-"""m/s that one step may change a launch."""
+"""m/s: the largest change of a launch in one step."""
 HEIGHTS = 20
-"""Launch speeds upward that are looked at for a first guess."""
+"""Number of upward launch speeds that are tried for a first guess."""
 TIMES = np.geomspace(0.1, 6.0, 40)
-"""s that are looked at where the time is free."""
+"""s: flight times that are tried where the time is free."""
 FASTEST_TRIED = 200.0
-"""m/s beyond which no launch is begun with."""
+"""m/s: the highest launch speed an iteration starts from."""
 ELSE = (1.06, 0.94, 1.15, 0.85)
-"""Of the time with the slowest launch, where the ball's own physics does not allow that one: it lies at the edge of
-what can be, where a rebound just reaches the target's height."""
+"""Shares of the time with the slowest launch that are tried where the ball's own physics does not allow that time: it
+is at the limit of what is possible, where a rebound just reaches the target's height."""
 JUST_NOW = 5e-3
-"""s that the last bounce lies back at least: a ball on the ground at its target would do by its first touch of it."""
+"""s: the least time since the last bounce. Without it, a ball on the ground at its target would count its first touch
+of the ground as a bounce."""
 NUDGE = 1e-3
-"""m/s by which a launch is varied to see where that takes it."""
+"""m/s: by how much a launch is varied for finite differences."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Aimed:
-    """How balls (B) have to leave: velocity (B, 3) m/s, spin (B, 3) rad/s as given, seconds (B,) until each is there,
-    miss (B,) m that it passes its target by then, possible (B,) bool: hit, within the speeds allowed. Where not,
-    velocity is the best that was found."""
+    """Launches for B targets.
+
+    Attributes:
+        velocity: (B, 3) m/s at the launch, world frame; where not possible, the best that was found.
+        spin: (B, 3) rad/s, as given.
+        seconds: (B,) s until each ball is at its target.
+        miss: (B,) m between ball and target at that time.
+        possible: (B,) bool, the target is hit within the allowed speed.
+    """
 
     velocity: np.ndarray
     spin: np.ndarray
@@ -60,14 +68,30 @@ class Aimed:
 def aim(start: np.ndarray, target: np.ndarray, ball: Ball, seconds: np.ndarray | None = None, bounces: int = 0,
         spin: np.ndarray | None = None, fastest: float | None = None, near: np.ndarray | None = None,
         ground: float = 0.0, loft: float | None = None, about: np.ndarray | None = None) -> Aimed:
-    """Launches from `start` (B, 3) m so that after exactly `bounces` bounces the ball's centre is at `target` (B, 3) m.
+    """Solve launches after which the ball's centre is at `target` after exactly `bounces` bounces.
 
-    seconds (B,) after the launch; a number: all alike; None: the time with the slowest launch, or the one that leaves
-    nearest to `loft` rad over the horizon. spin (B, 3) rad/s, None: none. fastest m/s: launches beyond are not
-    possible. near (B, 3) m/s: a launch close to the one wanted (the last one, while a target is dragged); rows of it
-    that are not finite are not used. about (B,) s: where the time is free, it is looked for near to these. Any of
-    start, target, spin may be (3,): the same for all. Starts and targets lower than a ball can lie are set onto the
-    ground. InputError: numbers that cannot be meant."""
+    `start`, `target` and `spin` may have the shape (3,): the same for all B. Starts and targets below the height of a
+    ball on the ground are moved onto the ground.
+
+    Args:
+        start: (B, 3) m, the ball's centre at the launch, world frame.
+        target: (B, 3) m, where the centre has to be.
+        ball: the ball's physics.
+        seconds: (B,) s after the launch, or one number for all. None: the time with the slowest launch, or, with
+            `loft`, the time whose launch is closest to that angle.
+        bounces: how often the ball bounces before it is at the target.
+        spin: (B, 3) rad/s. None: no spin.
+        fastest: m/s, launches above this speed are not possible.
+        initial_velocity: (B, 3) m/s, launches close to the solution, such as the previous ones while a target is
+            dragged; rows that are not finite are ignored.
+        ground: m, height of the ground.
+        loft: rad above the horizon, used where the time is free.
+        initial_seconds: (B,) s; where the time is free, only times close to these are tried.
+    Returns:
+        The launches.
+    Raises:
+        InputError: if a position or spin is not finite, or times or bounces are invalid.
+    """
     problem = _Problem.of(start, target, ball, seconds=seconds, bounces=bounces, spin=spin, ground=ground)
     if seconds is None:
         problem = problem.at_time(_chosen_times(problem, loft, about))
@@ -89,10 +113,21 @@ def aim(start: np.ndarray, target: np.ndarray, ball: Ball, seconds: np.ndarray |
 
 def along_ground(start: np.ndarray, target: np.ndarray, ball: Ball, seconds: np.ndarray | None = None,
                  arrives: float = 2.0, fastest: float | None = None, ground: float = 0.0) -> Aimed:
-    """Level launches from `start` (B, 3) m for balls that slide and roll to where `target` (B, 3) m lies on the ground.
+    """Solve level launches for balls that slide and roll along the ground to `target`.
 
-    seconds (B,) or a number; None: so that they still have `arrives` m/s there. A start over the ground is set onto it.
-    InputError as `aim`."""
+    Args:
+        start: (B, 3) m; a start above the ground is moved onto it.
+        target: (B, 3) m; only its position on the ground counts.
+        ball: the ball's physics.
+        seconds: (B,) s or one number. None: so that the ball still has `arrival_speed` at the target.
+        arrival_speed: m/s at the target, where `seconds` is None.
+        fastest: m/s, launches above this speed are not possible.
+        ground: m, height of the ground.
+    Returns:
+        The launches, with zero spin.
+    Raises:
+        InputError: as for `solve_launches`.
+    """
     problem = _Problem.of(start, target, ball, seconds=seconds, bounces=0, spin=None, ground=ground)
     low = ground + ball.radius
     problem.start[:, 2], problem.target[:, 2] = low, low
@@ -112,23 +147,35 @@ def along_ground(start: np.ndarray, target: np.ndarray, ball: Ball, seconds: np.
 
 def out_of_reach(start: np.ndarray, target: np.ndarray, aimed: Aimed, index: int, fastest: float,
                  what: str) -> InputError:
-    """The error that says why aim `index` cannot be: how far it is, how fast the ball would have to leave, and what a
-    human gives. what: who or which pass is meant."""
+    """Build the error that explains why a launch is not possible: distance, required speed and human limit.
+
+    Args:
+        start: (3,) or (B, 3) m, the launch positions.
+        target: (3,) or (B, 3) m.
+        result: the launches that were found.
+        index: which of the B launches.
+        fastest: m/s, the highest allowed speed.
+        subject: the player or pass the message names.
+    Returns:
+        The error, to be raised by the caller.
+    """
     start, target = np.atleast_2d(start), np.atleast_2d(target)
     far = np.linalg.norm(target[min(index, len(target) - 1)] - start[min(index, len(start) - 1)])
     speed = float(length(aimed.velocity[index]))
-    found = f"the target is {far:.1f} m away, to be reached in {aimed.seconds[index]:.2f} s"
+    found = f"the target is {far:.1f} m away and has to be reached in {aimed.seconds[index]:.2f} s"
     if aimed.miss[index] > CLOSE:
-        return InputError(what, f"{found}: no launch does that with this number of bounces", "",
-                          "give it more time, another number of bounces, or a nearer target")
-    expected = f"at most {fastest:.0f} m/s, which is what a human gives it"
-    return InputError(what, f"{found}: that takes {speed:.0f} m/s", expected, "give it more time or a nearer target")
+        return InputError(what, f"{found}: no launch reaches it with this number of bounces", "",
+                          "allow more time, change the number of bounces, or move the target")
+    expected = f"at most {fastest:.0f} m/s, the fastest a person can launch the ball"
+    return InputError(what, f"{found}: that takes {speed:.0f} m/s", expected, "allow more time or move the target")
 
 
-@np.errstate(over="ignore", invalid="ignore")  # launches that are tried and lead nowhere
+@np.errstate(over="ignore", invalid="ignore")  # trial launches may diverge
 def _solved(problem: _Problem, near: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
-    """Launch velocities (B, 3) and misses (B,): from the launches nearby, then from first guesses, then from a search,
-    each only for those that still miss."""
+    """Solve launch velocities (B, 3) m/s and misses (B,) m.
+
+    Start from the given launches, then from first guesses, then from a search, each only for launches that still miss.
+    """
     count = len(problem.start)
     velocity = np.full((count, 3), np.nan) if near is None else np.broadcast_to(near, (count, 3)).astype(float)
     miss = np.full(count, np.inf)
@@ -148,7 +195,7 @@ def _solved(problem: _Problem, near: np.ndarray | None) -> tuple[np.ndarray, np.
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class _Problem:
-    """Aims (B): start, target, spin (B, 3), seconds (B,), and what they have in common."""
+    """Targets (B): start, target, spin (B, 3), seconds (B,), and the ball, bounces and ground they share."""
 
     start: np.ndarray
     target: np.ndarray
@@ -160,6 +207,7 @@ class _Problem:
 
     @classmethod
     def of(cls, start, target, ball, seconds, bounces, spin, ground) -> _Problem:
+        """Check and broadcast the arguments of `solve_launches` to (B, 3) and (B,)."""
         start, target = np.asarray(start, float), np.asarray(target, float)
         spin = np.zeros(3) if spin is None else np.asarray(spin, float)
         timed = np.ones(1) if seconds is None else np.asarray(seconds, float)
@@ -168,7 +216,7 @@ class _Problem:
         if bounces < 0 or int(bounces) != bounces:
             raise InputError("aim", f"{bounces} bounces", "a whole number, 0 or more")
         if not (np.isfinite(start).all() and np.isfinite(target).all() and np.isfinite(spin).all()):
-            raise InputError("aim", "a place or spin that is not a number")
+            raise InputError("aim", "a position or spin that is NaN or infinite")
         if not (np.isfinite(timed).all() and (timed > 0.0).all()):
             raise InputError("aim", f"{np.min(timed):g} s of flight", "a time of more than 0 s")
         for place in (start, target):
@@ -180,14 +228,22 @@ class _Problem:
         return replace(self, seconds=seconds)
 
     def only(self, which: np.ndarray) -> _Problem:
-        """Some of the aims; an index may come again."""
+        """Select some of the targets; an index may occur more than once."""
         return replace(self, start=self.start[which], target=self.target[which], spin=self.spin[which],
                        seconds=self.seconds[which])
 
     def arrived(self, velocity: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Where the balls (B, 3) m are in time, and after how many bounces (B,); more bounces than asked for are not
-        made, and one of this moment does not count. A ball that lies on the ground is not struck into it: -1
-        bounces."""
+        """Simulate the balls to their time.
+
+        More than the requested bounces are not simulated, and a bounce within REBOUND_MARGIN does not count. A ball on
+        the
+        ground cannot be struck into it: -1 bounces.
+
+        Args:
+            velocity: (B, 3) m/s, launch velocities.
+        Returns:
+            Positions (B, 3) m and bounces (B,).
+        """
         balls = batch.launched(self.start, velocity, self.spin, self.ball, self.ground)
         balls = batch.after(balls, self.ball, self.seconds, self.ground, self.bounces)
         low, rising = self.ground + self.ball.radius, balls.velocity[:, 2]
@@ -196,8 +252,11 @@ class _Problem:
         return balls.position, np.where(lies & (velocity[:, 2] < 0.0), -1, balls.bounces - just)
 
     def guessed(self) -> tuple[np.ndarray, np.ndarray]:
-        """Launch velocities (B, 3) of balls that linear drag as strong as theirs slows; exact for such balls. And (B,)
-        bool: whether there is one that is at the target's height in time."""
+        """Estimate launches for balls with a linear drag as strong as theirs on average; exact for linear drag.
+
+        Returns:
+            Velocities (B, 3) m/s, and (B,) bool: a launch exists that is at the target's height in time.
+        """
         way = self.target - self.start
         drag = self.ball.linear_drag + self.ball.drag * length(way) / self.seconds
         level = way[:, :2] / (batch.drag_shares(drag * self.seconds)[0] * self.seconds)[:, None]
@@ -205,14 +264,17 @@ class _Problem:
         return np.column_stack([level, upward]), found
 
     def _upward(self, drag: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(B,) m/s: the highest launch upward with which such a ball is at the target's height in time, and (B,) bool
-        whether there is one; else the nearest to it."""
+        """Find the highest upward speed (B,) m/s with which such a ball is at the target's height in time.
+
+        Returns:
+            Speeds (B,) m/s and (B,) bool: one exists. Where none does, the speed that comes closest.
+        """
         gravity, low = self.ball.gravity, self.ground + self.ball.radius
         first, second = batch.drag_shares(drag * self.seconds)
         direct = (self.target[:, 2] - self.start[:, 2] + gravity * self.seconds**2 * second) / (self.seconds * first)
         if not self.bounces:
             return direct, np.ones(len(direct), bool)
-        top = gravity * self.seconds * second / first + 0.5  # as high as it may go up and still be down in time
+        top = gravity * self.seconds * second / first + 0.5  # the highest launch that is down again in time
         tried = top[:, None] - (top[:, None] + 40.0) * np.linspace(0.0, 1.0, HEIGHTS) ** 2
 
         def over(upward):
@@ -222,31 +284,44 @@ class _Problem:
         return _highest_root(over, tried)
 
     def searched(self) -> np.ndarray:
-        """Launch velocities (B, 3) found with the ball's own physics: of a row of launches upward, each brought to the
-        target's distance, the one that comes nearest to its height; slower, for where the first guess leads nowhere."""
+        """Search launch velocities (B, 3) m/s with the ball's own physics.
+
+        Of a row of upward speeds, each corrected to reach the target's distance, use the one that comes closest to its
+        height. Slower than the first guess; used where that one diverges.
+        """
         count = len(self.start)
+        # Row b * UPWARD_SAMPLES + h is target b with the h-th upward speed.
         many = self.only(np.repeat(np.arange(count), HEIGHTS))
         top = self.ball.gravity * self.seconds * (0.5 + 0.1 * self.seconds) + 1.0
         upward = (top[:, None] - (top[:, None] + 40.0) * np.linspace(0.0, 1.0, HEIGHTS) ** 2).ravel()
         way = (many.target - many.start)[:, :2]
         level = way / many.seconds[:, None]
+        # Scale the level speed until the ball covers the level distance to the target.
         for _ in range(3):
             place, made = many.arrived(np.column_stack([level, upward]))
             gone = np.sum((place - many.start)[:, :2] * way, axis=1) / np.maximum(np.sum(way * way, axis=1), 1e-9)
             level = level * np.clip(1.0 / np.maximum(gone, 1e-2), 0.3, 3.0)[:, None]
             level /= np.maximum(length(np.column_stack([level, 0.0 * upward])) / FASTEST_TRIED, 1.0)[:, None]
         place, made = many.arrived(np.column_stack([level, upward]))
+        # Launches with the wrong number of bounces cannot win.
         short = np.where(made == self.bounces, length(place - many.target), np.inf).reshape(count, HEIGHTS)
         best = np.arange(count) * HEIGHTS + np.argmin(short, axis=1)
         return np.column_stack([level, upward])[best]
 
 
 def _newton(problem: _Problem, guess: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Launch velocities (B, 3) and the distances (B,) m by which they miss; infinite where the bounces are not those
-    asked.
+    """Solve launch velocities by a damped Newton iteration.
 
-    The slopes of eq. 7 are taken from launches beside the first one and kept up by what each step shows (Broyden's
-    rule); where that no longer helps they are taken anew, and an aim that still does not come nearer is given up."""
+    The Jacobian of eq. 7 comes from three nearby launches and is updated with the result of each step (Broyden's rule).
+    Where the update no longer helps it is computed again. A launch that does not improve three times in a row is given
+    up.
+
+    Args:
+        problem: the targets (B).
+        guess: (B, 3) m/s, initial launches.
+    Returns:
+        Velocities (B, 3) m/s and misses (B,) m, infinite where the number of bounces is wrong.
+    """
     velocity = guess / np.maximum(length(guess) / FASTEST_TRIED, 1.0)[:, None]
     short, miss = _short(problem, velocity)
     slope = np.empty((len(guess), 3, 3))
@@ -259,10 +334,12 @@ def _newton(problem: _Problem, guess: np.ndarray) -> tuple[np.ndarray, np.ndarra
         if len(old):
             slope[old] = _slopes(problem.only(old), velocity[old], problem.target[old] - short[old])
             stale[old] = False
+        # Each failed attempt shortens the next step: full, 0.3, 0.1 (eq. 8).
         step = _step(slope[now], short[now]) * np.array([1.0, 0.3, 0.1])[stuck[now]][:, None]
         step /= np.maximum(length(step) / LONGEST_STEP, 1.0)[:, None]
         new_short, new_miss = _short(problem.only(now), velocity[now] + step)
         slope[now] += _learnt(slope[now], step, short[now] - new_short)
+        # A launch with the wrong number of bounces has an infinite miss: judge it by its distance instead.
         lost = np.isinf(miss[now])
         better = np.where(lost, ~np.isinf(new_miss) | (length(new_short) < length(short[now])), new_miss < miss[now])
         stale[now] = ~better | (new_miss > 0.3 * miss[now])
@@ -274,14 +351,18 @@ def _newton(problem: _Problem, guess: np.ndarray) -> tuple[np.ndarray, np.ndarra
 
 
 def _short(problem: _Problem, velocity: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """What is missing to the targets (B, 3) m, and how much that is (B,), infinite where a bounce is lacking."""
+    """Measure what is missing to the targets.
+
+    Returns:
+        Vectors (B, 3) m from ball to target, and their lengths (B,) m, infinite where the number of bounces is wrong.
+    """
     place, made = problem.arrived(velocity)
     short = problem.target - place
     return short, np.where(made == problem.bounces, length(short), np.inf)
 
 
 def _slopes(problem: _Problem, velocity: np.ndarray, place: np.ndarray) -> np.ndarray:
-    """(B, 3, 3) s: how the places (B, 3) where the launches (B, 3) lead move with them."""
+    """Compute (B, 3, 3) s: how the arrival positions (B, 3) m change with the launch velocities (B, 3) m/s."""
     count = len(velocity)
     nudged = (velocity[:, None] + NUDGE * np.eye(3)).reshape(-1, 3)
     beside, _ = problem.only(np.repeat(np.arange(count), 3)).arrived(nudged)
@@ -289,30 +370,31 @@ def _slopes(problem: _Problem, velocity: np.ndarray, place: np.ndarray) -> np.nd
 
 
 def _step(slope: np.ndarray, short: np.ndarray) -> np.ndarray:
-    """(B, 3) m/s that slopes (B, 3, 3) ask for to make up for `short` (B, 3), damped a little."""
+    """Compute the steps (B, 3) m/s that remove `short` (B, 3) m by the Jacobians (B, 3, 3), slightly damped."""
     turned = np.swapaxes(slope, 1, 2)
     square = turned @ slope + 1e-9 * np.eye(3)
-    with np.errstate(invalid="ignore"):  # launches that lead nowhere have infinite slopes
+    with np.errstate(invalid="ignore"):  # diverged launches have infinite slopes
         can = np.isfinite(square).all(axis=(1, 2)) & (np.linalg.det(square) != 0.0)
     return np.linalg.solve(np.where(can[:, None, None], square, np.eye(3)), turned @ short[:, :, None])[:, :, 0]
 
 
 def _learnt(slope: np.ndarray, step: np.ndarray, moved: np.ndarray) -> np.ndarray:
-    """Broyden's correction (B, 3, 3) of slopes with which a step (B, 3) should have moved the ball as it did, by (B,
-    3)."""
+    """Compute Broyden's update (B, 3, 3) after a step (B, 3) m/s moved the arrival by `moved` (B, 3) m."""
     wrong = moved - np.einsum("bij,bj->bi", slope, step)
     return wrong[:, :, None] * step[:, None] / np.maximum(np.sum(step * step, axis=1), 1e-12)[:, None, None]
 
 
 def _chosen_times(problem: _Problem, loft: float | None, about: np.ndarray | None) -> np.ndarray:
-    """(B,) s: of TIMES (or from `about` on), and then of times beside it, the one with the slowest launch, or the
-    launch nearest to `loft` rad, as the first guesses have it."""
+    """Choose flight times (B,) s with the slowest launch, or the launch closest to `loft` rad, by the first guesses.
+
+    Looks at FREE_TIMES (or at `initial_seconds`) first, then at times near the best one.
+    """
     coarse = about if about is not None else _best_time(problem, np.tile(TIMES, (len(problem.start), 1)), loft)
     return _best_time(problem, coarse[:, None] * np.linspace(0.9, 1.1, 11), loft)
 
 
 def _best_time(problem: _Problem, times: np.ndarray, loft: float | None) -> np.ndarray:
-    """(B,) s: of each row of `times` (B, N) the best one."""
+    """Choose the best (B,) s of each row of `times` (B, N) s."""
     count, each = times.shape
     launch, found = problem.only(np.repeat(np.arange(count), each)).at_time(times.ravel()).guessed()
     worth = length(launch)
@@ -323,11 +405,14 @@ def _best_time(problem: _Problem, times: np.ndarray, loft: float | None) -> np.n
 
 
 def _height_after(height, upward, drag, seconds, bounces: int, ball: Ball) -> np.ndarray:
-    """Heights m over a ball that lies on the ground, of balls under linear drag after `bounces` bounces; NaN where they
-    have not made them by then. All arguments broadcast."""
+    """Compute heights m above a ball on the ground, after `bounces` bounces under linear drag.
+
+    NaN where the ball has not bounced that often by then. All arguments broadcast.
+    """
     height, upward, drag, left = (value.copy() for value in np.broadcast_arrays(height, upward, drag, seconds))
     for _ in range(bounces):
         fall = (upward + np.sqrt(upward**2 + 2.0 * ball.gravity * height)) / ball.gravity
+        # Newton's method for the time of landing, from the time without drag.
         for _ in range(4):
             place, rise = _fallen(height, upward, drag, fall, ball.gravity)
             fall = np.maximum(fall - place / np.minimum(rise, -1e-6), 1e-9)
@@ -338,15 +423,18 @@ def _height_after(height, upward, drag, seconds, bounces: int, ball: Ball) -> np
 
 
 def _fallen(height, upward, drag, seconds, gravity: float) -> tuple[np.ndarray, np.ndarray]:
-    """Height and speed upward after `seconds` under linear drag."""
+    """Compute height m and upward speed m/s after `seconds` under linear drag."""
     first, second = batch.drag_shares(drag * seconds)
     place = height + upward * seconds * first - gravity * seconds**2 * second
     return place, upward * np.exp(-drag * seconds) - gravity * seconds * first
 
 
 def _highest_root(value, tried: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(B,) of each row of `tried` (B, N), falling, the first place where `value` of it changes sign, found by halving;
-    where it never does, the one that comes nearest to zero. And (B,) bool: whether it does."""
+    """Find the first sign change of `value` in each row of `tried` (B, N), whose values fall, by bisection.
+
+    Returns:
+        Roots (B,), and (B,) bool: the sign changes. Where it does not, the value that comes closest to zero.
+    """
     rows, values = np.arange(len(tried)), value(tried)
     changes = values[:, 1:] * values[:, :-1] <= 0.0
     first, found = np.argmax(changes, axis=1), changes.any(axis=1)
@@ -361,7 +449,7 @@ def _highest_root(value, tried: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _ground_speeds(problem: _Problem, distance: np.ndarray) -> np.ndarray:
-    """(B,) m/s of a level launch with which the ball has gone `distance` (B,) m in time."""
+    """Solve the level launch speed (B,) m/s with which the ball rolls `distance` (B,) m in time, by bisection."""
     low, high = np.zeros(len(distance)), np.full(len(distance), 120.0)
     for _ in range(24):
         speed = 0.5 * (low + high)
@@ -372,13 +460,16 @@ def _ground_speeds(problem: _Problem, distance: np.ndarray) -> np.ndarray:
 
 
 def _ground_times(ball: Ball, distance: np.ndarray, arrives: float) -> np.ndarray:
-    """(B,) s until a ball on the ground that still has some `arrives` m/s at `distance` (B,) m is there."""
+    """Solve the times (B,) s after which a ball on the ground is `distance` (B,) m away with `arrival_speed` m/s
+    left.
+    """
     times, gone, left = _ground_table(ball)
     out = np.empty(len(distance))
     for i, far in enumerate(distance):
         there = [np.interp(far, row, times, right=np.inf) for row in gone]
         still = [np.interp(time, times, row) if np.isfinite(time) else -1.0 for time, row in zip(there, left)]
-        fast = int(np.argmax(np.array(still) >= arrives))  # the slowest launch with enough left
+        # The first row of the table that is still fast enough; interpolate between it and the row before.
+        fast = int(np.argmax(np.array(still) >= arrives))  # the slowest launch that is fast enough at the target
         share = np.clip((arrives - still[fast - 1]) / (still[fast] - still[fast - 1]), 0.0, 1.0) if fast else 1.0
         before = there[fast - 1] if fast and np.isfinite(there[fast - 1]) else there[fast]
         out[i] = before + share * (there[fast] - before)
@@ -387,7 +478,7 @@ def _ground_times(ball: Ball, distance: np.ndarray, arrives: float) -> np.ndarra
 
 @lru_cache(maxsize=16)
 def _ground_table(ball: Ball) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Times (T,) s, and metres gone and m/s left (S, T) of level launches with ever higher speed."""
+    """Build times (T,) s, and distances m and remaining speeds m/s (S, T) of level launches with rising speed."""
     times, speeds = np.linspace(0.0, 10.0, 41), np.geomspace(0.3, 60.0, 28)
     gone, left = batch.courses([0.0, 0.0, ball.radius], speeds[:, None] * [1.0, 0.0, 0.0], None, ball, times)
     return times, gone[:, :, 0], left[:, :, 0]

@@ -1,9 +1,9 @@
-"""Thousands of flights at once: the physics of `flight`, in steps that all balls take together.
+"""Simulate thousands of flights at once: the physics of `flight`, in steps that all balls take together.
 
-Each ball has its own clock. A ball without spin and without quadratic drag flies from bounce to bounce in closed form
-(one step a hop); others take Runge-Kutta steps of fourth order. Where a step ends below the ground it is taken again up
-to the bounce, which is found to some 1e-9 s; then the ball goes on from there. `fly` is the judge: tests compare the
-two.
+Each ball has its own clock. A ball without spin and quadratic drag flies from bounce to bounce in closed form (one
+step per hop); others take fourth-order Runge-Kutta steps. A step that ends below the ground is repeated up to the
+bounce, which is found to about 1e-9 s; the ball continues from there. `flight.simulate_flight` is the reference: tests
+compare the two.
 """
 
 from __future__ import annotations
@@ -16,18 +16,25 @@ from .flight import LEAST_HOP, STANDS_STILL
 from .physics import Ball, bounced, gripped, in_air, length, rolling_spin, sliding, slip, slowing
 
 STEP = 0.12
-"""s: the longest step of flights that have no closed form."""
+"""s: the longest step of a flight without a closed form."""
 SLIDE_STEP = 0.01
 """s: the longest step of a ball that slides."""
 CLOSE = 1e-6
-"""m from the ground at which one more step of Newton's method is the last."""
+"""m from the ground: closer than this, Newton's method takes its last step."""
 AIR, SLIDE, ROLL, REST = range(4)
 
 
 @dataclass(frozen=True, eq=False)
 class Balls:
-    """Many balls (B) at one moment each: position (B, 3) m, velocity (B, 3) m/s, spin (B, 3) rad/s, phase (B,) one of
-    AIR, SLIDE, ROLL, REST, bounces (B,) how often each has left the ground again."""
+    """Many balls (B), each at one moment.
+
+    Attributes:
+        position: (B, 3) m of the centres, world frame.
+        velocity: (B, 3) m/s.
+        spin: (B, 3) rad/s.
+        phase: (B,) one of AIR, SLIDE, ROLL, REST.
+        bounces: (B,) how often each ball has left the ground again.
+    """
 
     position: np.ndarray
     velocity: np.ndarray
@@ -36,14 +43,26 @@ class Balls:
     bounces: np.ndarray
 
     def only(self, which: np.ndarray) -> Balls:
-        """Those of a mask or of indices."""
+        """Select balls by a mask or by indices."""
         return Balls(*(value[which] for value in vars(self).values()))
 
 
 def launched(position: np.typing.ArrayLike, velocity: np.ndarray, spin: np.ndarray | None, ball: Ball,
              ground: float = 0.0) -> Balls:
-    """Balls (B) at their launch; the arguments (B, 3), or (3,) for all alike; spin None: none. One that lies too low is
-    set onto the ground, and meets it at once where its way leads down."""
+    """Build balls (B) at their launch.
+
+    A ball that is too low is moved onto the ground and bounces at once if it moves down. Every argument may be (3,):
+    the same for all.
+
+    Args:
+        position: (B, 3) m of the centres.
+        velocity: (B, 3) m/s.
+        spin: (B, 3) rad/s. None: no spin.
+        ball: the ball's physics.
+        ground: m, height of the ground.
+    Returns:
+        The balls, in the air or on the ground.
+    """
     spin = np.zeros(3) if spin is None else spin
     shape = np.broadcast_shapes(np.shape(position), np.shape(velocity), np.shape(spin), (1, 3))
     position, velocity, spin = (np.broadcast_to(value, shape).astype(float)
@@ -55,15 +74,25 @@ def launched(position: np.typing.ArrayLike, velocity: np.ndarray, spin: np.ndarr
     return balls
 
 
-@np.errstate(over="ignore", invalid="ignore")  # launches that are tried may be faster than numbers go
+@np.errstate(over="ignore", invalid="ignore")  # trial launches may overflow
 def after(balls: Balls, ball: Ball, seconds: float | np.ndarray, ground: float = 0.0,
           most_bounces: int | None = None) -> Balls:
-    """The balls `seconds` (B,) or one number later. most_bounces: then they fly on through the ground (what a solver
-    wants, whose targets must move smoothly with the launch)."""
+    """Simulate balls for some time.
+
+    Args:
+        balls: the balls (B); they are not changed.
+        ball: the ball's physics.
+        seconds: (B,) s, or one number for all.
+        ground: m, height of the ground.
+        most_bounces: after this many bounces balls fall through the ground, so that a solver's residuals stay smooth.
+    Returns:
+        The balls at the later time.
+    """
     balls = Balls(*(value.copy() for value in vars(balls).values()))
     left = np.broadcast_to(np.asarray(seconds, float), balls.phase.shape).copy()
     most = np.iinfo(int).max if most_bounces is None else most_bounces
     longest = np.inf if _has_closed_form(balls, ball) else STEP
+    # Every pass moves each ball by one step of its phase; `left` is what remains of its time.
     while len(going := np.flatnonzero((left > 0.0) & (balls.phase != REST))):
         for phase, step in ((AIR, _air), (SLIDE, _slide), (ROLL, _roll)):
             which = going[balls.phase[going] == phase]
@@ -75,17 +104,36 @@ def after(balls: Balls, ball: Ball, seconds: float | np.ndarray, ground: float =
 
 def states(position: np.typing.ArrayLike, velocity: np.ndarray, spin: np.ndarray | None, ball: Ball,
            seconds: np.ndarray, ground: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-    """Positions (B, 3) m and velocities (B, 3) m/s of balls, each `seconds` (B,) after its launch (one number: all
-    alike).
+    """Simulate balls to one moment each. Every argument may be (3,) or one number: the same for all.
 
-    position, velocity, spin: (B, 3), or (3,) for all alike; spin None: none."""
+    Args:
+        position: (B, 3) m at the launch.
+        velocity: (B, 3) m/s at the launch.
+        spin: (B, 3) rad/s. None: no spin.
+        ball: the ball's physics.
+        seconds: (B,) s after the launch.
+        ground: m, height of the ground.
+    Returns:
+        Positions (B, 3) m and velocities (B, 3) m/s.
+    """
     balls = after(launched(position, velocity, spin, ball, ground), ball, seconds, ground)
     return balls.position, balls.velocity
 
 
 def courses(position: np.typing.ArrayLike, velocity: np.ndarray, spin: np.ndarray | None, ball: Ball, times: np.ndarray,
             ground: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-    """Positions and velocities (B, T, 3) of balls at `times` (T,) s after their launch, ascending and not negative."""
+    """Simulate balls and sample their trajectories.
+
+    Args:
+        position: (B, 3) or (3,) m at the launch.
+        velocity: (B, 3) or (3,) m/s at the launch.
+        spin: (B, 3) or (3,) rad/s. None: no spin.
+        ball: the ball's physics.
+        times: (T,) s after the launch, ascending, not negative.
+        ground: m, height of the ground.
+    Returns:
+        Positions (B, T, 3) m and velocities (B, T, 3) m/s.
+    """
     balls = launched(position, velocity, spin, ball, ground)
     places, velocities = [], []
     for seconds in np.diff(np.asarray(times, float), prepend=0.0):
@@ -96,7 +144,7 @@ def courses(position: np.typing.ArrayLike, velocity: np.ndarray, spin: np.ndarra
 
 
 def drag_shares(drag: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(1 - e^-d) / d, and (1 - that) / d, for d >= 0; by their series where d is small."""
+    """Compute f = (1 - e^-d) / d and (1 - f) / d for d >= 0; by their series where d is small."""
     small = drag < 1e-4
     safe = np.where(small, 1.0, drag)
     first = np.where(small, 1.0 - drag / 2.0 + drag**2 / 6.0, -np.expm1(-safe) / safe)
@@ -108,7 +156,7 @@ def _has_closed_form(balls: Balls, ball: Ball) -> bool:
 
 
 def _air(balls: Balls, which: np.ndarray, steps: np.ndarray, ball: Ball, low: float, most: int) -> np.ndarray:
-    """One step of those that fly, up to the ground at most; how long it was (W,) s."""
+    """Step the balls that fly, up to the ground at most; return the durations (W,) s."""
     move = _closed if _has_closed_form(balls, ball) else _runge_kutta
     start = _rows(balls.position, which), _rows(balls.velocity, which), _rows(balls.spin, which)
     place, velocity, spin = move(*start, steps, ball)
@@ -117,6 +165,7 @@ def _air(balls: Balls, which: np.ndarray, steps: np.ndarray, ball: Ball, low: fl
         steps = steps.copy()
         before = _rows(start[0], landing), _rows(start[1], landing), _rows(start[2], landing)
         under = (place[landing], velocity[landing])
+        # Repeat the step of the balls that ended below the ground, up to the moment of landing.
         steps[landing] = _until_ground(move, before, under, steps=steps[landing], ball=ball, low=low)
         place[landing], velocity[landing], spin[landing] = move(*before, steps[landing], ball)
         place[landing, 2] = low
@@ -126,13 +175,26 @@ def _air(balls: Balls, which: np.ndarray, steps: np.ndarray, ball: Ball, low: fl
 
 
 def _rows(values: np.ndarray, which: np.ndarray) -> np.ndarray:
-    """Rows of (B, 3), laid out so that each of x, y and z is one stretch of memory: twice as fast to reckon with."""
+    """Select rows of (B, 3), stored so that x, y and z are contiguous: twice as fast to compute with."""
     return values.T[:, which].T
 
 
 def _until_ground(move, start: tuple, ends: tuple, steps: np.ndarray, ball: Ball, low: float) -> np.ndarray:
-    """(W,) s in which balls that are below the ground at their `ends`, after `steps` (W,), get down to it: Newton's
-    method, kept between a moment above the ground and one below it, from where a parabola through both would land."""
+    """Find when balls that end below the ground after `steps` (W,) s reach it.
+
+    Newton's method, kept between a moment above the ground and one below it. It starts where a parabola through both
+    would land.
+
+    Args:
+        move: the step function.
+        start: position (W, 3) m, velocity (W, 3) m/s and spin (W, 3) rad/s at the start of the step.
+        ends: position and velocity at its end.
+        steps: (W,) s, the duration of the step.
+        ball: the ball's physics.
+        low: m, height of the centre of a ball on the ground.
+    Returns:
+        (W,) s from the start of the step to the ground.
+    """
     above, below = np.zeros(len(steps)), steps.copy()
     rise, height, bend = start[1][:, 2], start[0][:, 2] - low, (start[1][:, 2] - ends[1][:, 2]) / steps
     guess = (rise + np.sqrt(np.maximum(rise**2 + 2.0 * bend * height, 0.0))) / bend
@@ -141,7 +203,7 @@ def _until_ground(move, start: tuple, ends: tuple, steps: np.ndarray, ball: Ball
         guess[far] = np.where((guess > above) & (guess < below), guess, 0.5 * (above + below))[far]
         place, velocity, _ = move(*(_rows(value, far) for value in start), guess[far], ball)
         over, down = place[:, 2] - low, velocity[:, 2] < 0.0
-        # A ball that has just bounced and rises is above the ground, whatever the last digits say.
+        # A ball that has just bounced and rises is above the ground, in spite of rounding errors.
         still = (over > 0.0) | ~down
         above[far[still]], below[far[~still]] = guess[far[still]], guess[far[~still]]
         guess[far] -= over / np.where(down, velocity[:, 2], -1e9)
@@ -152,7 +214,7 @@ def _until_ground(move, start: tuple, ends: tuple, steps: np.ndarray, ball: Ball
 
 
 def _meet_ground(balls: Balls, which: np.ndarray, ball: Ball) -> None:
-    """The bounce of those that are on the ground; too low a hop is none, and they slide or roll from there."""
+    """Apply the bounce to balls on the ground; after too low a hop they slide or roll instead."""
     if not len(which):
         return
     velocity, spin = bounced(balls.velocity[which], balls.spin[which], ball)
@@ -168,18 +230,18 @@ def _meet_ground(balls: Balls, which: np.ndarray, ball: Ball) -> None:
 
 
 def _grip(balls: Balls, which: np.ndarray, ball: Ball) -> None:
-    """From now on these roll."""
+    """Set balls rolling from now on."""
     if len(which):
         balls.velocity[which], balls.spin[which] = gripped(balls.velocity[which], balls.spin[which], ball)
         balls.phase[which] = ROLL
 
 
 def _slide(balls: Balls, which: np.ndarray, steps: np.ndarray, ball: Ball, low: float, most: int) -> np.ndarray:
-    """One step of those that slide, up to where the lowest point stands still; how long it was (W,) s."""
+    """Step the balls that slide, until the lowest point has no slip; return the durations (W,) s."""
     velocity, spin = balls.velocity[which], balls.spin[which]
     before = slip(velocity, spin, ball)
     faster, turning = sliding(velocity, spin, ball)
-    # The slip shrinks at an almost even rate: what is left of it says how long the ball slides.
+    # The slip shrinks at an almost constant rate: its size now gives the time until the ball rolls.
     shrinks = -np.einsum("bi,bi->b", slip(faster, turning, ball), before) / np.maximum(length(before), 1e-12)
     until = length(before) / np.maximum(shrinks, 1e-12)
     taken = np.minimum(np.minimum(steps, SLIDE_STEP), until)
@@ -193,12 +255,13 @@ def _slide(balls: Balls, which: np.ndarray, steps: np.ndarray, ball: Ball, low: 
 
 
 def _roll(balls: Balls, which: np.ndarray, steps: np.ndarray, ball: Ball, low: float, most: int) -> np.ndarray:
-    """One step of those that roll, until they rest at most; how long it was (W,) s."""
+    """Step the balls that roll, at most until they rest; return the durations (W,) s."""
     velocity = balls.velocity[which]
     speed = length(velocity)
     along = velocity / np.maximum(speed, 1e-12)[:, None]
     steps = np.minimum(steps, 5.0 * STEP)
     taken = np.minimum(steps, speed / np.maximum(slowing(0.5 * speed, ball), 1e-12))
+    # Fourth-order Runge-Kutta on the speed alone: the direction does not change.
     one = slowing(speed, ball)
     two = slowing(speed - 0.5 * taken * one, ball)
     three = slowing(speed - 0.5 * taken * two, ball)
@@ -215,7 +278,7 @@ def _roll(balls: Balls, which: np.ndarray, steps: np.ndarray, ball: Ball, low: f
 
 
 def _closed(position, velocity, spin, steps, ball: Ball) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Flight under gravity and linear drag alone, any `steps` (W,) s long."""
+    """Compute flight under gravity and linear drag alone, over `steps` (W,) s of any length."""
     drag = ball.linear_drag * steps
     falling = np.array([0.0, 0.0, -ball.gravity])
     first, second = drag_shares(drag)
@@ -225,7 +288,7 @@ def _closed(position, velocity, spin, steps, ball: Ball) -> tuple[np.ndarray, np
 
 
 def _runge_kutta(position, velocity, spin, steps, ball: Ball) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """One step of `steps` (W,) s of the classical fourth order; the spin decays meanwhile as it does in truth."""
+    """Integrate one step of `steps` (W,) s by the classical fourth-order method, with the exact decay of the spin."""
     h = steps[:, None]
     half, whole = (spin * np.exp(-ball.spin_decay * steps * share)[:, None] for share in (0.5, 1.0))
     one = in_air(velocity, spin, ball)

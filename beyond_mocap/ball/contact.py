@@ -1,7 +1,7 @@
-"""Where a body is when it strikes, and where the ball then lies: what links a motion to a flight.
+"""Compute where a body part is when it strikes and where the ball then is: the link between a motion and a flight.
 
-All is given in the body's own frame at each frame: the origin is the root's place on the ground, +x its heading, z the
-height. Whoever puts the body at a place with a facing turns and moves it; heights stay.
+All values are in the body's own frame at each frame: origin at the root's position on the ground, +x along its
+heading, z the height. To place the body, rotate and move them; heights stay.
 """
 
 from __future__ import annotations
@@ -22,14 +22,20 @@ from ..motion.track import BALL_RADIUS
 PARTS = (*BODY_PARTS, "tool")
 
 JOINT_RADIUS = 0.06
-"""Metres around a joint that strikes, where it is none of PARTS."""
-_SECONDS = 1.0 / 120.0  # to either side, over which a part's speed is measured
+"""m: radius of a striking joint that is not one of PARTS."""
+_SECONDS = 1.0 / 120.0  # s before and after, over which a part's velocity is measured
 
 
 @dataclass(frozen=True)
 class Tool:
-    """A straight thing in the hand, `length` m beyond the hand's joint along the line of the forearm; it strikes with
-    its last `reach` m, all within `radius` m of that line. The defaults are a tennis racquet's."""
+    """A straight tool in the hand that strikes the ball. The defaults are those of a tennis racquet.
+
+    Attributes:
+        name: what it is called in messages.
+        length: m beyond the hand's joint, along the line of the forearm.
+        radius: m, half its thickness.
+        reach: m at its end that strike the ball.
+    """
 
     name: str = "racquet"
     length: float = 0.66
@@ -44,14 +50,29 @@ class Tool:
         return f"{self.name}: {self.length:g} m long, strikes with {self.reach:g} m, {self.radius:g} m thick"
 
     def for_body(self, size: float) -> Tool:
-        """The tool for work in the size of the library, which the body is `size` times as large as: it keeps its
-        own."""
+        """Scale the tool to the library's body size, so that it keeps its own size on the body.
+
+        Args:
+            size: the body's size, as a multiple of the library's.
+        Returns:
+            The scaled tool.
+        """
         return replace(self, length=self.length / size, radius=self.radius / size, reach=self.reach / size)
 
 
 def striking_surface(skeleton: Skeleton, part: str, side: str = "", tool: Tool | None = None) -> Surface:
-    """The surface of a body that meets the ball: a part of PARTS (with the side for foot, hand and tool), or a joint by
-    its name. InputError for a side that a part needs and for what the skeleton lacks."""
+    """Find the surface of a body that meets the ball.
+
+    Args:
+        skeleton: the body's skeleton.
+        part: one of PARTS, or the name of a joint.
+        side: "left" or "right", for foot, hand and tool.
+        tool: the tool for the part "tool"; None: the default one.
+    Returns:
+        The surface.
+    Raises:
+        InputError: if a side is missing or the skeleton lacks the part.
+    """
     if part in ("foot", "hand", "tool") and side not in ("left", "right"):
         raise InputError("part", f"{part} of side {side!r}", "left or right")
     if part == "tool":
@@ -77,8 +98,14 @@ def _tool(skeleton: Skeleton, side: str, tool: Tool) -> Surface:
 
 @dataclass(frozen=True, eq=False)
 class StruckFrom:
-    """A striking surface at N frames, in the body's own frame of each: start, end (N, 3) m of its line; radius m;
-    velocity (N, 3) m/s of its middle over the ground."""
+    """A striking surface at N frames, in the body's own frame at each.
+
+    Attributes:
+        start: (N, 3) m, one end of its line.
+        end: (N, 3) m, the other end.
+        radius: m around the line.
+        velocity: (N, 3) m/s of its middle relative to the ground.
+    """
 
     start: np.ndarray
     end: np.ndarray
@@ -87,7 +114,15 @@ class StruckFrom:
 
 
 def struck_from(motion: Motion, frames: np.ndarray, surface: Surface) -> StruckFrom:
-    """The surface at fractional `frames` (N,) of a motion (its own rate)."""
+    """Sample a striking surface of a motion.
+
+    Args:
+        motion: the motion.
+        frames: (N,) fractional frames at the motion's own rate.
+        surface: the surface.
+    Returns:
+        The surface at these frames, in the body's own frame.
+    """
     frames = np.asarray(frames, dtype=float)
     step = _SECONDS * motion.fps
     (before, _, _), (lines, root, heading), (after, _, _) = (
@@ -101,19 +136,28 @@ def struck_from(motion: Motion, frames: np.ndarray, surface: Surface) -> StruckF
 
 
 def _lines(motion: Motion, frames: np.ndarray, surface: Surface) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Both ends (2, N, 3) m of the surface's line, root (N, 3) m and heading (N,) rad."""
+    """Sample the ends (2, N, 3) m of the surface's line, the root (N, 3) m and its heading (N,) rad."""
     root, local = at_frames(motion, frames)
     places, world = pose_kinematics(motion.skeleton, root, local)
     return np.array(surface.line(places, world)), root, heading_from_positions(motion.skeleton, places)
 
 
 def ball_centre(struck: StruckFrom, normal: np.ndarray, ball_radius: float = BALL_RADIUS) -> np.ndarray:
-    """(N, 3) m: the centre of a ball that touches the surface on the ray from its middle along `normal` (N, 3), in the
-    frame of `struck`; never lower than its radius above the ground."""
+    """Compute the centre of a ball that touches the surface on the ray from its middle along `normal`.
+
+    Args:
+        surface: the striking surface at N frames.
+        normal: (N, 3) direction from the surface to the ball, in the same frame.
+        ball_radius: m.
+    Returns:
+        (N, 3) m in the same frame, never lower than the ball's radius above the ground.
+    """
     along = 0.5 * (struck.end - struck.start)
     half = np.linalg.norm(along, axis=-1)
     unit = along / np.maximum(half, 1e-9)[:, None]
     normal = unit_vectors(normal)
+    # The surface is a capsule. If the ray leaves it beside the line, the centre is at `beside` from the middle;
+    # if it leaves at one of the round ends, at `beyond`.
     slope = np.abs(np.sum(normal * unit, axis=-1))
     apart = struck.radius + ball_radius
     beside = apart / np.maximum(np.sqrt(np.maximum(1.0 - slope**2, 0.0)), 1e-9)
@@ -124,6 +168,14 @@ def ball_centre(struck: StruckFrom, normal: np.ndarray, ball_radius: float = BAL
 
 
 def in_world(own: np.ndarray, place: np.ndarray, facing: np.ndarray | float) -> np.ndarray:
-    """Points (N, 3) m of a body's own frame in the world, for a body at `place` (2,) m that faces `facing` rad."""
+    """Convert points from a body's own frame to the world.
+
+    Args:
+        points: (N, 3) m in the body's own frame.
+        position: (2,) m, the body's position on the ground, world frame.
+        heading: rad, the body's heading.
+    Returns:
+        (N, 3) m, world frame.
+    """
     level = quaternion.turned_level(np.asarray(own)[..., :2], np.asarray(facing, dtype=float))
     return np.concatenate([level + place, np.asarray(own)[..., 2:]], axis=-1)

@@ -1,8 +1,10 @@
-"""One ball's whole way from a launch until it rests: flight, bounces, sliding, rolling (Ball handling §4 eq. 3 to 6),
-and where it meets a wall (Fredriksson §8.2's impact points) or the plane of its target.
+"""Simulate one ball from its launch until it rests: flight, bounces, sliding and rolling; find where it meets a wall or
+the plane of its target.
 
-The pieces between bounces are integrated by scipy's DOP853 with the bounce as an event (eq. 4), the bounce itself is an
-impulse (eq. 5). A ball that would rise less than a few millimetres again stays on the ground, so that its bounces end.
+Between bounces, scipy's DOP853 integrates the flight with the bounce as an event (eq. 4); the bounce is an impulse
+(eq. 5). A ball that would rise less than a few millimetres stays on the ground, so that the bounces end.
+
+Source: Ball handling, section 4, equations 3 to 6; impact points: Fredriksson, section 8.2.
 """
 
 from __future__ import annotations
@@ -17,20 +19,27 @@ from ..motion import quaternion
 from .physics import Ball, bounced, gripped, in_air, length, rolling_spin, sliding, slip, slowing
 
 LEAST_HOP = 0.12
-"""m/s: a ball that leaves the ground slower stays on it; it would have risen 0.7 mm."""
+"""m/s: a ball that leaves the ground more slowly stays on it; it would rise 0.7 mm."""
 STANDS_STILL = 1e-6
-"""m/s of the lowest point below which a ball rolls."""
+"""m/s: below this velocity of its lowest point a ball rolls."""
 FINE = 1.0 / 480.0
-"""s: the steps in which rotations are summed up."""
-_IMPACT_STEP = 1.0 / 480.0  # s between the places that are looked at first
+"""s: the step in which rotations are accumulated."""
+_IMPACT_STEP = 1.0 / 480.0  # s between the positions tested before the bisection
 
-_LONGEST_TO_WALL = 6.0  # s that a flight is followed
-_WALL_STEP = 0.004  # s between the places that are looked at
+_LONGEST_TO_WALL = 6.0  # s: the longest flight to a wall that is simulated
+_WALL_STEP = 0.004  # s between the tested positions
 
 
 @dataclass(frozen=True, eq=False)
 class Launch:
-    """How a ball leaves: time s, position (3,) m of its centre, velocity (3,) m/s, spin (3,) rad/s."""
+    """The state of a ball at its launch.
+
+    Attributes:
+        time: s.
+        position: (3,) m of its centre, world frame.
+        velocity: (3,) m/s.
+        spin: (3,) rad/s about the world's axes.
+    """
 
     time: float
     position: np.ndarray
@@ -40,8 +49,14 @@ class Launch:
 
 @dataclass(frozen=True, eq=False)
 class Piece:
-    """A stretch of the way: kind "air", "slide", "roll" or "rest"; first and last, s; state(times (N,)) -> (N, 9),
-    position, velocity and spin."""
+    """A part of a flight.
+
+    Attributes:
+        kind: "air", "slide", "roll" or "rest".
+        first: s, its start.
+        last: s, its end.
+        state: function of times (N,) s that gives position, velocity and spin (N, 9).
+    """
 
     kind: str
     first: float
@@ -51,10 +66,17 @@ class Piece:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Flight:
-    """The way of a ball. Before its launch it lies at the start, after `end` it stays where it is then.
+    """The trajectory of a ball. Before its launch it is at the start; after `end` it stays where it is then.
 
-    pieces in order of time. bounces (K,) s: when it met the ground and left it again. rolls_from, rests_from: s, None
-    where it never does. end: s, up to when it was followed. launch, ball: what was asked."""
+    Attributes:
+        launch: the requested launch.
+        ball: the ball's physics.
+        pieces: in order of time.
+        bounces: (K,) s, when it hit the ground and left it again.
+        rolls_from: s, None if it never rolls.
+        rests_from: s, None if it never rests.
+        end: s, up to when it was simulated.
+    """
 
     launch: Launch
     ball: Ball
@@ -65,19 +87,19 @@ class Flight:
     end: float
 
     def at(self, times: np.typing.ArrayLike) -> np.ndarray:
-        """Positions (N, 3) m of the ball's centre at `times` (N,) s."""
+        """Give the positions (N, 3) m of the ball's centre at `times` (N,) s, world frame."""
         return self.states(times)[:, :3]
 
     def velocity(self, times: np.typing.ArrayLike) -> np.ndarray:
-        """Velocities (N, 3) m/s at `times` (N,) s; at a bounce the one after it."""
+        """Give the velocities (N, 3) m/s at `times` (N,) s; at a bounce, the one after it."""
         return self.states(times)[:, 3:6]
 
     def spin(self, times: np.typing.ArrayLike) -> np.ndarray:
-        """Spins (N, 3) rad/s about the world's axes at `times` (N,) s."""
+        """Give the spins (N, 3) rad/s about the world's axes at `times` (N,) s."""
         return self.states(times)[:, 6:]
 
     def states(self, times: np.typing.ArrayLike) -> np.ndarray:
-        """Position, velocity and spin (N, 9) at `times` (N,) s."""
+        """Give position, velocity and spin (N, 9) at `times` (N,) s."""
         times = np.clip(np.asarray(times, float), self.launch.time, self.end)
         which = np.searchsorted([piece.first for piece in self.pieces], times, side="right") - 1
         out = np.empty((len(times), 9))
@@ -86,8 +108,10 @@ class Flight:
         return out
 
     def rotations(self, times: np.ndarray) -> np.ndarray:
-        """Rotations (N, 4) of the ball's body at `times` (N,) s, in any order; unturned at the launch,
-        sign-continuous."""
+        """Give the ball's rotations as quaternions (N, 4) at `times` (N,) s, in any order.
+
+        The rotation is the identity at the launch; signs are continuous.
+        """
         times = np.clip(np.asarray(times, float), self.launch.time, self.end)
         steps = np.arange(self.launch.time, self.end, FINE)
         knots = np.unique(np.concatenate([steps, [piece.first for piece in self.pieces], times]))
@@ -98,18 +122,27 @@ class Flight:
 
 
 def fly(launch: Launch, ball: Ball, seconds: float, ground: float = 0.0, landing: bool = False) -> Flight:
-    """The way of a ball for `seconds` after its launch over level ground at height `ground` m (eq. 6).
+    """Simulate a ball over level ground (eq. 6).
 
-    landing: it ends where the ball first comes down, where that is before. A ball launched lower than it can lie is set
-    onto the ground. InputError: seconds that are no time."""
+    Args:
+        launch: the launch; a ball below the height of a ball on the ground is moved onto it.
+        ball: the ball's physics.
+        seconds: s to simulate after the launch.
+        ground: m, height of the ground.
+        landing: stop where the ball first comes down, if that is earlier.
+    Returns:
+        The flight.
+    Raises:
+        InputError: if `seconds` is negative or not finite.
+    """
     if not 0.0 <= seconds < np.inf:
-        raise InputError("flight", f"{seconds} seconds", "a time of 0 s or more")
+        raise InputError("flight", f"a duration of {seconds} s", "a duration of 0 s or more")
     flight = _Integrator(launch, ball, launch.time + max(float(seconds), 1e-9), ground + ball.radius)
     return flight.whole(landing)
 
 
 class _Integrator:
-    """Piece after piece until the end; `low`: height of the centre of a ball that lies on the ground."""
+    """Integrate a flight piece by piece. `low`: m, height of the centre of a ball on the ground."""
 
     def __init__(self, launch: Launch, ball: Ball, end: float, low: float):
         self.launch, self.ball, self.end, self.low = launch, ball, end, low
@@ -123,6 +156,7 @@ class _Integrator:
         self.rests_from: float | None = None
 
     def whole(self, landing: bool) -> Flight:
+        """Integrate air, slide, roll and rest in order; with `landing`, stop at the first landing."""
         if self.position[2] <= self.low and self.velocity[2] <= LEAST_HOP:
             self._meet_ground()
         while self._flies() and self._left():
@@ -145,12 +179,12 @@ class _Integrator:
         return self.position[2] > self.low or self.velocity[2] > 0.0
 
     def _air(self) -> None:
-        """A flight up to its bounce or the end."""
+        """Integrate a flight up to its bounce or the end."""
         def change(_, state):
             faster = in_air(state[3:6], state[6:], self.ball)
             return np.concatenate([state[3:6], faster, -self.ball.spin_decay * state[6:]])
 
-        def lands(_, state):  # a ball that rises has not landed, though it may still touch the ground from before
+        def lands(_, state):  # a rising ball has not landed, even if it still touches the ground
             return state[2] - self.low + (state[5] > 0.0)
 
         self._integrate("air", change, lands)
@@ -159,7 +193,7 @@ class _Integrator:
             self._meet_ground()
 
     def _meet_ground(self) -> None:
-        """The bounce; too low a hop is none."""
+        """Apply the bounce; too low a hop is none."""
         self.velocity, self.spin = bounced(self.velocity, self.spin, self.ball)
         if self.velocity[2] > LEAST_HOP:
             self.bounces.append(self.time)
@@ -167,7 +201,7 @@ class _Integrator:
             self.velocity[2] = 0.0
 
     def _slide(self) -> None:
-        """Over the ground until the lowest point stands still."""
+        """Integrate the slide over the ground until the lowest point has no slip."""
         self.rolls_from = self.time
         over = slip(self.velocity, self.spin, self.ball)
         if self.ball.friction and length(over) > STANDS_STILL:
@@ -183,7 +217,7 @@ class _Integrator:
             self.velocity, self.spin = gripped(self.velocity, self.spin, self.ball)
 
     def _roll(self) -> None:
-        """Straight on, slower and slower; a ball without friction keeps its spin meanwhile."""
+        """Integrate the roll: straight, with falling speed; a ball without friction keeps its spin."""
         self.rolls_from = self.time
         speed = length(self.velocity)
         if speed < STANDS_STILL:
@@ -215,7 +249,7 @@ class _Integrator:
             self.velocity = np.zeros(3)
 
     def _rest(self) -> None:
-        """It lies; what spin it has left, the ground brakes."""
+        """Add the piece in which the ball rests; the ground brakes the spin it has left."""
         self.rests_from = first = self.time
         position, spin = self.position.copy(), self.spin.copy()
         size, brake = float(length(spin)), self.ball.rolling / self.ball.radius
@@ -229,7 +263,7 @@ class _Integrator:
         self._keep("rest", self.end, state)
 
     def _integrate(self, kind: str, change, event) -> None:
-        """One piece by the solver, until the event or the end; the state is then the one at its last moment."""
+        """Integrate one piece until the event or the end; the state is then the one at its last moment."""
         from scipy.integrate import solve_ivp
 
         event.terminal, event.direction = True, -1
@@ -247,8 +281,9 @@ class _Integrator:
 
 
 def _one_after_another(turns: np.ndarray) -> np.ndarray:
-    """(N, 4): each of the turns (N, 4) after all before it, in log N passes."""
+    """Accumulate the rotations (N, 4), each applied after all before it, in log N passes."""
     out, shift = turns.copy(), 1
+    # A parallel prefix product: after each pass, row i holds the product of the last 2 * shift rotations up to i.
     while shift < len(out):
         out[shift:] = quaternion.multiply(out[shift:], out[:-shift])
         shift *= 2
@@ -256,14 +291,22 @@ def _one_after_another(turns: np.ndarray) -> np.ndarray:
 
 
 def find_crossing(flight: Flight, target: np.ndarray) -> np.ndarray:
-    """(3,) m: the ball's centre where it first meets the upright plane through `target` (3,) m that is square to the
-    line from its launch, or the ground before that; NaN where it does neither by the flight's end."""
+    """Find where the ball first meets the upright plane through the target, or the ground before that.
+
+    The plane is perpendicular to the horizontal line from the launch to the target.
+
+    Args:
+        flight: the flight.
+        target: (3,) m, world frame.
+    Returns:
+        (3,) m of the ball's centre; NaN if it meets neither by the end of the flight.
+    """
     start = np.asarray(flight.launch.position, float)
     level = (np.asarray(target, float) - start) * [1.0, 1.0, 0.0]
     far = float(np.linalg.norm(level))
     level /= max(far, 1e-9)
     last = min([flight.end, *flight.bounces[:1], *([flight.rolls_from] if flight.rolls_from is not None else [])])
-    if last <= flight.launch.time:  # it leaves along the ground
+    if last <= flight.launch.time:  # launched along the ground
         last = flight.end
     times = np.append(np.arange(flight.launch.time, last, _IMPACT_STEP), last)
     gone = (flight.at(times) - start) @ level
@@ -279,13 +322,23 @@ def find_crossing(flight: Flight, target: np.ndarray) -> np.ndarray:
 
 def meet_wall(position: np.ndarray, velocity: np.ndarray, ball: Ball, foot: np.ndarray, ahead: np.ndarray,
                spin: np.ndarray | tuple[float, float, float] = (0.0, 0.0, 0.0)) -> tuple[np.ndarray, float]:
-    """Place (3,) m of the ball's centre at the wall and seconds after its launch; at its first touch of the ground
-    where that comes first, and where it is after 6 s or four times what it would take without air where neither does.
+    """Find where and when a ball meets a wall, or the ground if that comes first.
 
-    position (3,) m, velocity (3,) m/s, spin (3,) rad/s: the launch. foot (2,) m: a point of the wall on the ground,
-    ahead (2,): from where it is thrown towards it, the wall's normal."""
+    If it meets neither, the result is where it is after 6 s, or after 0.5 s plus four times its flight time without
+    air.
+
+    Args:
+        position: (3,) m, the ball's centre at the launch, world frame.
+        velocity: (3,) m/s at the launch.
+        ball: the ball's physics.
+        foot: (2,) m, a point of the wall on the ground.
+        ahead: (2,) the wall's normal, away from the thrower.
+        spin: (3,) rad/s at the launch.
+    Returns:
+        Position (3,) m of the ball's centre, and seconds after the launch.
+    """
     unhindered = np.hypot(*(foot - position[:2])) / max(np.hypot(*velocity[:2]), 1e-9)
-    free = position[2] > ball.radius or velocity[2] > LEAST_HOP  # else it bounces as it is launched
+    free = position[2] > ball.radius or velocity[2] > LEAST_HOP  # otherwise it bounces at the launch
     flight = fly(Launch(0.0, position, velocity, spin), ball, min(_LONGEST_TO_WALL, 0.5 + 4.0 * unhindered),
                  landing=free)
     touches = [time for time in (*flight.bounces[:1], flight.rolls_from) if time is not None and time > _WALL_STEP]

@@ -1,13 +1,13 @@
-"""What a ball is and what acts on it: air, bounce and ground, with the numbers of real balls.
+"""The physics of a ball: air, bounce and ground, with the parameters of real balls.
 
-In the air a ball of mass m feels gravity, a drag that grows with its speed (the paper's) or with its square (measured),
-and the Magnus lift of its spin, at right angles to its way:
+In the air a ball of mass m feels gravity, drag that grows with its speed (the paper's) or with its square (measured),
+and the Magnus lift of its spin, perpendicular to its velocity:
 
     dv/dt = -g z - linear_drag v - drag |v| v + lift_scale C_L |v| (w x v) / |w|,   C_L = 1 / (a + b |v| / (r |w|))
 
-At a bounce the ground gives back `restitution` of the speed into it; across, it stops the ball's lowest point (grip),
-as far as `friction` times the push upward can (else it slides), which couples way and spin: Cross, "Grip-slip behavior
-of a bouncing ball", Am. J. Phys. 70 (2002). Every formula takes energy out or leaves it: nothing here speeds a ball up.
+At a bounce the ground returns `restitution` of the downward speed. Horizontally it stops the ball's lowest point (grip)
+if `friction` times the upward push allows it; otherwise the ball slides. This couples velocity and spin: Cross,
+"Grip-slip behavior of a bouncing ball", Am. J. Phys. 70 (2002). No formula adds energy to the ball.
 """
 
 from __future__ import annotations
@@ -23,10 +23,19 @@ UP = np.array([0.0, 0.0, 1.0])
 class Ball:
     """One kind of ball.
 
-    radius m, mass kg, gravity m/s^2. linear_drag 1/s (share of the speed lost in a second). drag 1/m: rho C_D A / 2m.
-    lift: (scale 1/m: rho A / 2m, a, b) of the Magnus lift above; scale 0: none. restitution: share of the speed into
-    the ground that comes back. friction: Coulomb's, at a bounce and while sliding; 0: no spin is made. rolling m/s^2:
-    how fast a rolling ball slows. spin_decay 1/s. inertia: moment of inertia / (mass radius^2), 2/3 for a hollow ball.
+    Attributes:
+        name: identifier.
+        radius: m.
+        mass: kg.
+        gravity: m/s^2.
+        linear_drag: 1/s, share of the speed lost per second.
+        drag: 1/m, rho C_D A / 2m.
+        lift: (scale 1/m: rho A / 2m, a, b) of the Magnus lift above; scale 0: none.
+        restitution: share of the downward speed that a bounce returns.
+        friction: Coulomb's coefficient, at a bounce and while sliding; 0: the ground causes no spin.
+        rolling: m/s^2, deceleration of a rolling ball.
+        spin_decay: 1/s.
+        inertia: moment of inertia / (mass radius^2), 2/3 for a hollow ball.
     """
 
     name: str
@@ -44,8 +53,8 @@ class Ball:
 
 
 PAPER = Ball("paper", 0.11, 0.43, linear_drag=0.2)
-"""Ball handling §5: air resistance 0.2 (taken as -0.2 v per second), elasticity 0.7, gravity 9.8; no spin. How it rolls
-is not said there; it slows as a football does."""
+"""Ball handling, section 5: air resistance 0.2 (taken as -0.2 v per second), elasticity 0.7, gravity 9.8; no spin. The
+paper gives no rolling resistance; it is a football's."""
 FOOTBALL = Ball("football", 0.11, 0.43, 9.81, drag=0.0133, lift=(0.0531, 2.0, 0.4), restitution=0.62, friction=0.5,
                 rolling=1.0, spin_decay=0.05)
 """C_D 0.25, between the 0.2 that Goff & Carre, "Trajectory analysis of a soccer ball", Am. J. Phys. 77 (2009), find
@@ -73,9 +82,10 @@ HANDBALL = Ball("handball", 0.094, 0.45, 9.81, drag=0.0093, lift=(0.0370, 2.0, 0
 BALLS: dict[str, Ball] = {ball.name: ball for ball in (PAPER, FOOTBALL, VOLLEYBALL, TENNIS)}
 
 THROWN: dict[str, Ball] = {ball.name: ball for ball in (BASEBALL, TENNIS, HANDBALL, VOLLEYBALL, FOOTBALL)}
-"""Balls that a hand throws."""
+"""Balls that are thrown by hand."""
 FASTEST: dict[str, float] = {"foot": 38.0, "head": 23.0, "chest": 10.0, "hand": 38.0, "tool": 73.0}
-"""m/s that a human gives a ball with a part. Foot: professionals' instep kicks reach 30 to 34 m/s (Kellis & Katis,
+"""m/s: the highest speed a person gives the ball, by body part.
+Foot: professionals' instep kicks reach 30 to 34 m/s (Kellis & Katis,
 "Biomechanical characteristics of instep soccer kick", J. Sports Sci. Med. 6 (2007)), records some more. Hand: the
 fastest volleyball serves and spikes (some 137 km/h). Tool: the fastest tennis serves (263 km/h). Head and chest: the
 best runs up and dives, rounded up."""
@@ -88,7 +98,15 @@ def length(vectors: np.ndarray) -> np.ndarray:
 
 
 def in_air(velocity: np.ndarray, spin: np.ndarray, ball: Ball) -> np.ndarray:
-    """Accelerations (..., 3) m/s^2 of balls that fly with velocity (..., 3) m/s and spin (..., 3) rad/s (eq. 3)."""
+    """Compute the acceleration of balls in the air (eq. 3).
+
+    Args:
+        velocity: (..., 3) m/s.
+        spin: (..., 3) rad/s.
+        ball: the ball's physics.
+    Returns:
+        (..., 3) m/s^2.
+    """
     speed = length(velocity)
     out = velocity * -(ball.linear_drag + ball.drag * speed)[..., None]
     scale, a, b = ball.lift
@@ -105,9 +123,17 @@ def in_air(velocity: np.ndarray, spin: np.ndarray, ball: Ball) -> np.ndarray:
 
 
 def bounced(velocity: np.ndarray, spin: np.ndarray, ball: Ball) -> tuple[np.ndarray, np.ndarray]:
-    """Velocity and spin (..., 3) after meeting level ground with those given: the impulse of eq. 5.
+    """Compute velocity and spin after a bounce on level ground: the impulse of eq. 5.
 
-    The push across is at right angles to Z and turns the ball; at most it brings the lowest point to a stop."""
+    The horizontal push also changes the spin; at most it stops the ball's lowest point.
+
+    Args:
+        velocity: (..., 3) m/s before the bounce.
+        spin: (..., 3) rad/s before the bounce.
+        ball: the ball's physics.
+    Returns:
+        Velocity (..., 3) m/s and spin (..., 3) rad/s after it.
+    """
     down = np.maximum(-velocity[..., 2], 0.0)
     push = _across(velocity, spin, ball, ball.friction * (1.0 + ball.restitution) * down)
     after = velocity + push
@@ -116,14 +142,16 @@ def bounced(velocity: np.ndarray, spin: np.ndarray, ball: Ball) -> tuple[np.ndar
 
 
 def gripped(velocity: np.ndarray, spin: np.ndarray, ball: Ball) -> tuple[np.ndarray, np.ndarray]:
-    """Velocity and spin (..., 3) once the lowest point stands still: it rolls. A ball without friction stays as it
-    is."""
+    """Compute velocity and spin (..., 3) once the lowest point has no slip and the ball rolls.
+
+    A ball without friction keeps both.
+    """
     push = _across(velocity, spin, ball, np.full(velocity.shape[:-1], np.inf if ball.friction else 0.0))
     return velocity + push, spin + _turned_by(push, ball)
 
 
 def slip(velocity: np.ndarray, spin: np.ndarray, ball: Ball) -> np.ndarray:
-    """Velocity (..., 3) m/s, level, of the ball's lowest point over the ground."""
+    """Compute the horizontal velocity (..., 3) m/s of the ball's lowest point relative to the ground."""
     out = np.zeros(np.broadcast_shapes(velocity.shape, spin.shape))
     out[..., 0] = velocity[..., 0] - ball.radius * spin[..., 1]
     out[..., 1] = velocity[..., 1] + ball.radius * spin[..., 0]
@@ -132,10 +160,17 @@ def slip(velocity: np.ndarray, spin: np.ndarray, ball: Ball) -> np.ndarray:
 
 def sliding(velocity: np.ndarray, spin: np.ndarray, ball: Ball,
             ahead: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """Accelerations (..., 3) m/s^2 and rad/s^2 of balls that slide over the ground.
+    """Compute the accelerations of balls that slide over the ground.
 
-    ahead (..., 3): where the lowest point went at first; the push stays against it when the slip has turned about, so
-    that an integrator that looks past the end of the slide finds the same law there."""
+    Args:
+        velocity: (..., 3) m/s.
+        spin: (..., 3) rad/s.
+        ball: the ball's physics.
+        ahead: (..., 3) initial slip direction. Friction keeps opposing it after the slip has reversed, so that an
+            integrator that looks past the end of the slide finds the same law there.
+    Returns:
+        Acceleration (..., 3) m/s^2 and angular acceleration (..., 3) rad/s^2.
+    """
     over = slip(velocity, spin, ball)
     if ahead is not None:
         over = over * np.where(np.sum(over * ahead, axis=-1) < 0.0, -1.0, 1.0)[..., None]
@@ -145,33 +180,42 @@ def sliding(velocity: np.ndarray, spin: np.ndarray, ball: Ball,
 
 
 def rolling_spin(velocity: np.ndarray, ball: Ball) -> np.ndarray:
-    """Spin (..., 3) rad/s, level, with which a ball rolls at velocity (..., 3)."""
+    """Compute the horizontal spin (..., 3) rad/s of a ball that rolls at velocity (..., 3) m/s."""
     out = np.zeros(velocity.shape)
     out[..., 0], out[..., 1] = -velocity[..., 1] / ball.radius, velocity[..., 0] / ball.radius
     return out
 
 
 def slowing(speed: np.ndarray, ball: Ball) -> np.ndarray:
-    """m/s^2 by which a ball that rolls at `speed` (...,) m/s slows: the ground, and the air."""
+    """Compute the deceleration (...,) m/s^2, by ground and air, of a ball that rolls at `speed` (...,) m/s."""
     return ball.rolling + ball.linear_drag * speed + ball.drag * speed**2
 
 
 def energy(position: np.ndarray, velocity: np.ndarray, spin: np.ndarray, ball: Ball) -> np.ndarray:
-    """Joules (...,) of way, spin and height (of the centre over z = 0) together."""
+    """Compute the energy of balls: translation, rotation, and height of the centre above z = 0.
+
+    Args:
+        position: (..., 3) m.
+        velocity: (..., 3) m/s.
+        spin: (..., 3) rad/s.
+        ball: the ball's physics.
+    Returns:
+        (...,) J.
+    """
     way = 0.5 * np.einsum("...i,...i->...", velocity, velocity)
     turning = 0.5 * ball.inertia * ball.radius**2 * np.einsum("...i,...i->...", spin, spin)
     return ball.mass * (way + turning + ball.gravity * position[..., 2])
 
 
 def _across(velocity, spin, ball: Ball, most) -> np.ndarray:
-    """Change of velocity (..., 3), level, that stops the lowest point, or as much of it as `most` (...,) m/s allows."""
+    """Compute the horizontal velocity change (..., 3) m/s that stops the lowest point, limited to `most` (...,) m/s."""
     wanted = slip(velocity, spin, ball) * (-ball.inertia / (1.0 + ball.inertia))
     size = length(wanted)
     return wanted * np.minimum(1.0, most / np.maximum(size, 1e-12))[..., None]
 
 
 def _turned_by(push: np.ndarray, ball: Ball) -> np.ndarray:
-    """Change of spin (..., 3) by a level change of velocity (..., 3) that the ground makes at the lowest point."""
+    """Compute the spin change (..., 3) rad/s by a horizontal velocity change (..., 3) m/s at the lowest point."""
     out = np.zeros(push.shape)
     out[..., 0], out[..., 1] = push[..., 1], -push[..., 0]
     return out / (ball.inertia * ball.radius)

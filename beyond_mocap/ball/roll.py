@@ -1,4 +1,4 @@
-"""A ball that rolls from one foot to the next: fast at first, slower and slower, at rest where it need not hurry."""
+"""Simulate a ball that rolls from one foot to the next: it slows all the time and rests where it has time left."""
 
 from __future__ import annotations
 
@@ -9,15 +9,21 @@ import numpy as np
 from ..motion.track import BALL_RADIUS
 
 ROLLING = 1.0
-"""m/s^2 by which a football slows on turf (FIFA's test of pitches: 4 to 8 m from a ramp 1 m high)."""
+"""m/s^2: deceleration of a football on turf (FIFA's test of pitches: 4 to 8 m of roll from a 1 m ramp)."""
 _GRAVITY, _BOUNCE = 9.81, 0.55
-_ON_GROUND = 0.03  # metres above its radius at which a ball still counts as rolling
-_LEAST_HOP = 0.02  # metres; a lower hop is a roll
+_ON_GROUND = 0.03  # m above its radius up to which a ball counts as rolling
+_LEAST_HOP = 0.02  # m; a lower hop counts as rolling
 
 
 @dataclass(frozen=True, eq=False)
 class Speeds:
-    """leaves, arrives (..., 2) m/s on the ground; rolling (...,) s for which the ball rolls before it rests."""
+    """Velocities of rolling balls on the ground.
+
+    Attributes:
+        start_velocity: (..., 2) m/s at the start.
+        end_velocity: (..., 2) m/s at the end.
+        rolling_seconds: (...,) s before the ball rests.
+    """
 
     leaves: np.ndarray
     arrives: np.ndarray
@@ -26,16 +32,29 @@ class Speeds:
 
 @dataclass(frozen=True, eq=False)
 class Rolls:
-    """P rolls. balls (P, D, 3) m: the ball's centre at frames 1 .. D after it set out; missed (P,) m by which it is too
-    high or too low in the end, or higher on its way than at both ends."""
+    """P rolling balls.
+
+    Attributes:
+        balls: (P, D, 3) m, the ball's centre at frames 1 .. D after its start.
+        height_error: (P,) m by which it is too high or too low at the end, or higher in between than at both ends.
+    """
 
     balls: np.ndarray
     missed: np.ndarray
 
 
 def speeds_of(starts: np.ndarray, ends: np.ndarray, seconds: np.ndarray) -> Speeds:
-    """Of a ball that rolls from `starts` to `ends` (..., 3) m within `seconds` (...,): it loses ROLLING all the way, or
-    comes to rest early where it has time."""
+    """Compute the speeds of a ball that rolls from `starts` to `ends` in a given time.
+
+    It decelerates by ROLLING all the time, or comes to rest early if it has time.
+
+    Args:
+        starts: (..., 2 or 3) m.
+        ends: (..., 2 or 3) m.
+        seconds: (...,) s.
+    Returns:
+        The speeds.
+    """
     way = ends[..., :2] - starts[..., :2]
     length = np.hypot(way[..., 0], way[..., 1])
     rests = length < 0.5 * ROLLING * seconds**2
@@ -46,8 +65,18 @@ def speeds_of(starts: np.ndarray, ends: np.ndarray, seconds: np.ndarray) -> Spee
 
 
 def rolls(starts: np.ndarray, ends: np.ndarray, frames: np.ndarray, fps: float) -> Rolls:
-    """From `starts` to `ends` (P, 3) m in `frames` (P,) whole frames, on the ground; what starts high falls and hops,
-    what ends high is sent up so as to be there."""
+    """Simulate balls that roll from `starts` to `ends`.
+
+    A ball that starts high falls and hops; a ball that ends high is sent upward to arrive there.
+
+    Args:
+        starts: (P, 3) m.
+        ends: (P, 3) m.
+        frames: (P,) whole frames from start to end.
+        fps: frames per second.
+    Returns:
+        The balls' positions and height errors.
+    """
     speeds = speeds_of(starts, ends, frames / fps)
     at = np.arange(1, int(frames.max()) + 1) / fps
     gone = np.minimum(at, speeds.rolling[:, None])
@@ -60,7 +89,7 @@ def rolls(starts: np.ndarray, ends: np.ndarray, frames: np.ndarray, fps: float) 
 
 
 def _heights(starts: np.ndarray, ends: np.ndarray, seconds, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Heights (P, D) m at times `at` (D,) s, and how far (P,) m they are from `ends` (P,) m in the end."""
+    """Compute heights (P, D) m at times `at` (D,) s, and their error (P,) m against `ends` (P,) m."""
     out, missed = np.full((len(ends), len(at)), BALL_RADIUS), np.zeros(len(ends))
     for pair in np.flatnonzero(np.maximum(starts, ends) > BALL_RADIUS + _ON_GROUND):
         start, end, until = starts[pair], ends[pair], seconds[pair]
@@ -75,7 +104,7 @@ def _heights(starts: np.ndarray, ends: np.ndarray, seconds, at: np.ndarray) -> t
 
 
 def _falling(start: float, at: np.ndarray) -> np.ndarray:
-    """(D,) m: a ball let go at `start` m, falling and hopping until it rolls."""
+    """Simulate a ball dropped at `start` m that hops until it rolls; (D,) m at times `at` (D,) s."""
     above = max(start - BALL_RADIUS, 0.0)
     if above < _LEAST_HOP:
         return np.full(len(at), BALL_RADIUS)

@@ -1,9 +1,10 @@
-"""Launches towards one target: at which speeds it can be reached (`arcs`, the flatter of both of every speed), and the
-strike that sends a ball there (`shoot`).
+"""Solve launches towards one target: the speeds with which it can be reached (`solve_arcs`, the flatter of the two
+launches of each speed), and the strike that sends a ball there (`solve_shot`).
 
-From each frame in which a part can strike, the ball lies where the part touches it on the side of its launch; all
-launches are aimed at once (Ball handling §4, Fig. 6), and the frame in which the part moves fastest along its launch is
-taken.
+At each frame in which a part can strike, the ball touches the part on the side of its launch. All launches are solved
+at once, and the frame in which the part moves fastest along its launch is chosen.
+
+Source: Ball handling, section 4, figure 6.
 """
 
 from __future__ import annotations
@@ -22,17 +23,24 @@ from .contact import StruckFrom, ball_centre
 from .physics import Ball, length
 
 RISE = 0.3
-"""How much the first guess of a launch leads up, for one that leads level."""
-_TIMES = 28  # flight times tried, evenly spaced in their logarithm
+"""Upward share of the horizontal distance in the first guess of a launch."""
+_TIMES = 28  # number of flight times tried, evenly spaced in their logarithm
 _ELEVATIONS = np.radians(np.arange(0.0, 76.0, 5.0))  # above the line to the target
-_SLACK = 1.03  # on a speed, for what lies between elevations
-_LONGEST = 2.0  # times the flight of the slowest launch where there is no air: sqrt(2 far / gravity)
+_SLACK = 1.03  # factor on the speed, for elevations between those tried
+_LONGEST = 2.0  # times sqrt(2 distance / gravity), the flight time of the slowest launch without air
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Strikes:
-    """Where a part can strike, at frames (N,) of a scene, in the world: start, end (N, 3) m of its line, radius m,
-    velocity (N, 3) m/s."""
+    """Where a part can strike, at N frames of a scene, world frame.
+
+    Attributes:
+        frames: (N,) of the scene.
+        start: (N, 3) m, one end of the part's line.
+        end: (N, 3) m, the other end.
+        radius: m around the line.
+        velocity: (N, 3) m/s of its middle.
+    """
 
     frames: np.ndarray
     start: np.ndarray
@@ -42,7 +50,16 @@ class Strikes:
 
     @classmethod
     def of(cls, motion: Motion, surface: Surface, rows: np.ndarray, frames: np.ndarray) -> Strikes:
-        """Those of a motion's `rows` (N,), which are the scene's `frames` (N,)."""
+        """Sample the strikes of a motion.
+
+        Args:
+            motion: the motion, placed in the world.
+            surface: the striking surface.
+            rows: (N,) frames of the motion.
+            frames: (N,) the scene's frames they correspond to.
+        Returns:
+            The strikes.
+        """
         step = 0.5
         lines = []
         for offset in (-step, 0.0, step):
@@ -54,13 +71,20 @@ class Strikes:
                    velocity=velocity)
 
     def balls(self, towards: np.ndarray, radius: float) -> np.ndarray:
-        """(N, 3) m: the centre of a ball of `radius` m that leaves along `towards` (N, 3)."""
+        """Place balls of `radius` m that leave along `towards` (N, 3): their centres (N, 3) m."""
         return ball_centre(StruckFrom(self.start, self.end, self.radius, self.velocity), towards, radius)
 
 
 @dataclass(frozen=True, eq=False)
 class Shot:
-    """The launches from all frames (N,), and which one is taken: starts (N, 3) m, aimed, chosen."""
+    """The launches from all frames (N,), and the chosen one.
+
+    Attributes:
+        frames: (N,) of the scene.
+        starts: (N, 3) m, the ball's centre at each strike.
+        launches: the launches.
+        chosen_index: which of the N is used.
+    """
 
     frames: np.ndarray
     starts: np.ndarray
@@ -74,34 +98,48 @@ class Shot:
 
     @property
     def velocity(self) -> np.ndarray:
-        """(3,) m/s with which it leaves."""
+        """(3,) m/s at the launch."""
         return self.aimed.velocity[self.chosen]
 
     @property
     def seconds(self) -> float:
-        """s until it is at the target."""
+        """s from the strike to the target."""
         return float(self.aimed.seconds[self.chosen])
 
 
 def shoot(strikes: Strikes, target: np.ndarray, ball: Ball, seconds: np.ndarray | None = None, bounces: int = 0,
           turns: tuple[float, float] = (0.0, 0.0), ground: bool = False, fastest: float = np.inf,
           near: Aimed | None = None, what: str = "aim") -> Shot:
-    """The strike that sends a ball to `target` (3,) m.
+    """Solve the strike that sends a ball to a target.
 
-    seconds (N,) from each frame on, or one number; None: the slowest launch. turns: back spin and spin to the left,
-    turns a second. ground: it goes along the ground; else after so many bounces. near: the launches of a shot like it,
-    to begin with. InputError where no frame has one that is possible within `fastest` m/s; `what` is named there."""
+    Args:
+        strikes: where the part can strike (N frames).
+        target: (3,) m, world frame.
+        ball: the ball's physics.
+        seconds: (N,) s from each frame to the target, or one number. None: the slowest launch.
+        bounces: how often the ball bounces before the target.
+        spin_turns: back spin and spin to the left, turns per second.
+        ground: the ball goes along the ground; `bounces` is then ignored.
+        fastest: m/s, the highest launch speed.
+        previous: launches of a similar shot, as initial guess.
+        subject: what the error message names.
+    Returns:
+        The shot.
+    Raises:
+        InputError: if no frame has a possible launch, or the target is where the ball is struck.
+    """
     target = np.asarray(target, float)
     way = target - 0.5 * (strikes.start + strikes.end)
     towards = way + length(way)[:, None] * [0.0, 0.0, RISE] if near is None else near.velocity
     launch, about = (None, None) if near is None else (near.velocity, near.seconds)
     spin = spins(way, turns)
+    # The ball's position depends on the launch direction: solve twice, the second time from the first directions.
     for _ in range(1 if near is not None else 2):
         if ground:
             towards = towards * [1.0, 1.0, 0.0]
         starts = strikes.balls(towards, ball.radius)
         if length(starts - target).min() < ball.radius:
-            raise InputError(what, "the target is where the ball is struck", "a target some way off", "move the target")
+            raise InputError(what, "the target is where the ball is struck", "a target farther away", "move the target")
         aimed = along_ground(starts, target, ball, seconds, fastest=fastest) if ground else \
             aim(starts, target, ball, seconds=seconds, bounces=bounces, spin=spin, fastest=fastest, near=launch,
                 about=about)
@@ -115,22 +153,34 @@ def shoot(strikes: Strikes, target: np.ndarray, ball: Ball, seconds: np.ndarray 
 
 
 def spins(way: np.ndarray, turns: tuple[float, float]) -> np.ndarray:
-    """Spins (N, 3) rad/s of balls that leave along `way` (N, 3): back spin and spin to the left, turns a second."""
+    """Compute the spins of balls that leave along a direction.
+
+    Args:
+        direction: (N, 3), any length.
+        spin_turns: back spin and spin to the left, turns per second.
+    Returns:
+        (N, 3) rad/s, world frame.
+    """
     level = way * [1.0, 1.0, 0.0] / np.maximum(length(way * [1.0, 1.0, 0.0]), 1e-9)[:, None]
     back = np.stack([level[:, 1], -level[:, 0], np.zeros(len(way))], axis=1)
     return 2.0 * np.pi * (turns[0] * back + turns[1] * np.array([0.0, 0.0, 1.0]))
 
 
 def _chosen(strikes: Strikes, aimed: Aimed) -> int:
-    """Of the launches that are possible, the one along which the part moves fastest."""
+    """Choose, among the possible launches, the one along which the part moves fastest."""
     along = aimed.velocity / np.maximum(length(aimed.velocity), 1e-9)[:, None]
     return int(np.argmax(np.where(aimed.possible, np.sum(strikes.velocity * along, axis=1), -np.inf)))
 
 
 @dataclass(frozen=True, eq=False)
 class Arcs:
-    """Launches that reach one target, from the slowest to ever faster ones: speeds (N,) m/s, rising; velocities (N, 3)
-    m/s; seconds (N,) of flight."""
+    """Launches that reach one target, in order of rising speed.
+
+    Attributes:
+        speeds: (N,) m/s, ascending.
+        velocities: (N, 3) m/s.
+        seconds: (N,) s of flight.
+    """
 
     speeds: np.ndarray
     velocities: np.ndarray
@@ -138,16 +188,25 @@ class Arcs:
 
     @property
     def slowest(self) -> float:
-        """m/s below which the target cannot be reached."""
+        """m/s: below this speed the target cannot be reached."""
         return float(self.speeds[0])
 
     def at(self, speed: float) -> np.ndarray:
-        """(3,) m/s: the launch of that speed, as far as there is one."""
+        """Give the launch (3,) m/s with this speed, limited to the speeds that exist."""
         return interpolate(speed, self.speeds, self.velocities)
 
 
 def arcs(start: np.ndarray, target: np.ndarray, ball: Ball, spin: np.ndarray | None = None) -> Arcs:
-    """The launches from `start` (3,) m that lead straight to `target` (3,) m, without a bounce; spin (3,) rad/s."""
+    """Solve the launches that reach a target directly, without a bounce.
+
+    Args:
+        start: (3,) m, the ball's centre at the launch.
+        target: (3,) m.
+        ball: the ball's physics.
+        spin: (3,) rad/s. None: no spin.
+    Returns:
+        The launches from the slowest to the flattest.
+    """
     far = float(np.linalg.norm(np.asarray(target, float) - start))
     least = far / 60.0
     longest = max(_LONGEST * np.sqrt(2.0 * far / ball.gravity), 2.0 * least)
@@ -155,14 +214,26 @@ def arcs(start: np.ndarray, target: np.ndarray, ball: Ball, spin: np.ndarray | N
     found = aim(start, target, ball, seconds, spin=spin)
     good = np.flatnonzero(found.miss <= CLOSE)
     speeds = length(found.velocity[good])
+    # Times up to the slowest launch, longest first: the flatter of the two launches of each speed.
     flat = good[: int(np.argmin(speeds)) + 1][::-1]
     return Arcs(length(found.velocity[flat]), found.velocity[flat], seconds[flat])
 
 
 def is_out_of_reach(start: np.ndarray, target: np.ndarray, ball: Ball, speed: float,
                     spin: np.ndarray | None = None) -> bool:
-    """Whether no launch from `start` (3,) m of at most `speed` m/s comes as far as `target` (3,) m: a fan of flights,
-    far quicker than looking for the launch, and never wrong about a target that can be reached."""
+    """Say whether no launch of at most `speed` m/s reaches the target.
+
+    Simulates a fan of flights: much faster than solving the launch. It never rejects a target that can be reached.
+
+    Args:
+        start: (3,) m, the ball's centre at the launch.
+        target: (3,) m.
+        ball: the ball's physics.
+        speed: m/s.
+        spin: (3,) rad/s. None: no spin.
+    Returns:
+        True if the target is out of reach.
+    """
     way = np.asarray(target, float) - start
     level = float(np.hypot(way[0], way[1]))
     rise = np.minimum(np.arctan2(way[2], level) + _ELEVATIONS, np.radians(89.0))
@@ -177,6 +248,7 @@ def is_out_of_reach(start: np.ndarray, target: np.ndarray, ball: Ball, speed: fl
         before = balls.position
         balls = batch.after(balls, ball, batch.STEP, most_bounces=0)
         here, there = (np.array([(place - start) @ ahead, place[:, 2]]) for place in (before, balls.position))
+        # A flight that crosses the target's distance in this step, at or above the target, can be lowered to hit it.
         passes = (here[0] < level) & (there[0] >= level)
         share = (level - here[0]) / np.maximum(there[0] - here[0], 1e-9)
         if np.any(passes & (here[1] + share * (there[1] - here[1]) >= target[2] - CLOSE)):

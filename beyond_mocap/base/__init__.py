@@ -1,1 +1,1 @@
-"""Errors, small numerics and the table of settings, for every room."""
+"""Errors, small numerical functions and the settings table, shared by every feature."""

@@ -1,4 +1,4 @@
-"""Sums of squares over curves, each square about a few neighbouring frames: the least is one banded system away."""
+"""Weighted least squares over curves with short-range terms, solved as one banded linear system."""
 
 from __future__ import annotations
 
@@ -6,21 +6,25 @@ from collections.abc import Mapping
 
 import numpy as np
 
+# Order of a finite difference -> its coefficients.
 _DIFFERENCES = {1: (-1.0, 1.0), 2: (1.0, -2.0, 1.0), 3: (-1.0, 3.0, -3.0, 1.0)}
 
 
 class BandedLeastSquares:
-    """A sum of squares over curves of many frames, to which terms are added and which is then solved.
+    """A sum of squares over curves of many frames: add terms, then solve for the minimum.
 
     Terms are added to the matrix in the order of the calls and of their coefficients, which fixes the last bits.
     Curve u at frame t is the unknown t * unknowns + u.
 
     Args:
         count: frames.
-        unknowns: curves that are solved together.
-        reach: frames between the first and the last that one square is about.
-        columns: how many curves have the same matrix and only different goals; then `unknowns` is 1.
+        unknowns: number of curves that are solved together.
+        reach: frames between the first and the last frame of one squared term.
+        columns: number of curves that share one matrix and differ only in their goals; `unknowns` is then 1.
     Attributes:
+        count: frames.
+        unknowns: number of curves that are solved together.
+        reach: frames between the first and the last frame of one squared term.
         band: (unknowns (reach + 1), count unknowns), the lower diagonals of the matrix.
         right: (count unknowns,) or (count, columns), the right-hand side.
     """
@@ -34,25 +38,29 @@ class BandedLeastSquares:
         """Add sum_t weight_t (sum_i c_it x[i + unknowns t] - goal_t)^2.
 
         Args:
-            terms: the coefficients c (R,) or one number, by their unknown i at the first frame.
-            weight: (R,), of the squares at frames 0 to R - 1.
+            terms: unknown i at the first frame -> its coefficients c, (R,) or one number.
+            weight: (R,), weight of the squares at frames 0 to R - 1.
             goal: (R,), in the unknowns' unit; None for 0.
         """
         rows = {i: slice(i, i + self.unknowns * len(weight), self.unknowns) for i in terms}
+        # Normal equations: A^T W A goes to the band, A^T W goal to the right-hand side.
         for i, a in terms.items():
             if goal is not None:
                 self.right[rows[i]] += weight * a * goal
             for j, b in terms.items():
+                # Row i - j of the band is the (i - j)-th diagonal below the main one; the matrix is symmetric.
                 if i >= j:
                     self.band[i - j, rows[j]] += weight * a * b
 
     def add_difference(self, order: int, weight: np.ndarray | float, curve: int = 0) -> None:
-        """Add the weighted squares of a curve's differences from frame to frame; none where it is too short for them.
+        """Add the weighted squares of a curve's frame-to-frame differences.
+
+        Adds nothing where the curve is too short for a difference of this order.
 
         Args:
-            order: of the difference, 1 to 3.
+            order: order of the difference, 1 to 3.
             weight: (count - order,) or one number.
-            curve: which of the unknowns.
+            curve: index of the curve among the unknowns.
         """
         terms = {curve + self.unknowns * i: c for i, c in enumerate(_DIFFERENCES[order])}
         if self.count > order:
@@ -63,7 +71,7 @@ class BandedLeastSquares:
 
         Args:
             weight: (count,).
-            curve: which of the unknowns.
+            curve: index of the curve among the unknowns.
         """
         if self.count > 3:
             self.add_difference(3, np.convolve(weight, np.full(4, 0.25), "valid"), curve)
@@ -73,7 +81,7 @@ class BandedLeastSquares:
 
         Args:
             weight: (count,) or one number.
-            curve: which of the unknowns.
+            curve: index of the curve among the unknowns.
             goal: (count,), or (count, columns) where there are columns; None for 0.
         """
         self.band[0, curve :: self.unknowns] += weight
@@ -96,19 +104,29 @@ class BandedLeastSquares:
         size = len(self.right)
         self.right += np.bincount(index.ravel(), (carried * np.reshape(goal, (-1, 1))).ravel(), size)
         for a in range(index.shape[1]):
+            # Keep the pairs on or below the diagonal. Diagonal d and column c of the band are element d * size + c of
+            # the flat band, so one bincount sums repeated entries.
             lower = index[:, a, None] >= index
             rows = (index[:, a, None] - index) * size + index
             products = (carried[:, a, None] * values)[lower]
             self.band += np.bincount(rows[lower], products, self.band.size).reshape(self.band.shape)
 
     def copy(self) -> BandedLeastSquares:
-        """The same sum, to add other squares to."""
+        """Copy the sum, so that other squares can be added to the copy.
+
+        Returns:
+            An independent sum with the same terms.
+        """
         other = BandedLeastSquares(self.count, self.unknowns, self.reach)
         other.band[:], other.right = self.band, self.right.copy()
         return other
 
     def solve(self) -> np.ndarray:
-        """The curves for which the sum is least: (count, unknowns), or (count, columns)."""
+        """Solve for the curves that minimize the sum.
+
+        Returns:
+            (count, unknowns), or (count, columns).
+        """
         from scipy.linalg import solveh_banded
 
         return solveh_banded(self.band, self.right, lower=True).reshape(self.count, -1)

@@ -1,4 +1,4 @@
-"""Easing: curves from 0 to 1 with level ends, and the cubic between two slopes."""
+"""Easing curves from 0 to 1 with zero slope at both ends, and polynomials between given end conditions."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ import numpy as np
 
 
 def smoothstep(x: np.ndarray, start: float = 0.0, end: float = 1.0) -> np.ndarray:
-    """0 up to `start`, 1 from `end` on, a cubic with level ends between.
+    """Ease from 0 at `start` to 1 at `end` with a cubic whose slope is zero at both ends.
 
     Args:
         x: (...), in the unit of `start` and `end`.
-        start, end: where it begins to rise and where it is up; `end` may be below `start`.
+        start, end: where the curve leaves 0 and where it reaches 1; `end` may be below `start`.
     Returns:
         (...), 0 to 1.
     """
@@ -19,7 +19,7 @@ def smoothstep(x: np.ndarray, start: float = 0.0, end: float = 1.0) -> np.ndarra
 
 
 def quintic_step(x: float | np.ndarray) -> np.ndarray:
-    """0 below 0, 1 above 1, a quintic between whose slope and bend vanish at both ends.
+    """Ease from 0 at 0 to 1 at 1 with a quintic whose first and second derivatives vanish at both ends.
 
     Args:
         x: (...).
@@ -32,7 +32,9 @@ def quintic_step(x: float | np.ndarray) -> np.ndarray:
 
 
 def quintic_step_by_powers(x: np.ndarray) -> np.ndarray:
-    """`quintic_step` summed by powers: equal but for the last bit, which takes made before must keep.
+    """Compute `quintic_step` as a sum of powers: equal except for the last bit.
+
+    Takes that were saved with this form depend on that bit.
 
     Args:
         x: (...).
@@ -44,12 +46,12 @@ def quintic_step_by_powers(x: np.ndarray) -> np.ndarray:
 
 
 def hermite(share: np.ndarray, start, start_slope, end, end_slope) -> np.ndarray:
-    """Hermite's cubic from one value and slope to another.
+    """Interpolate with Hermite's cubic from one value and slope to another.
 
     Args:
-        share: (...), 0 to 1, how far it is from start to end.
-        start, end: (...), the values there.
-        start_slope, end_slope: (...), the slopes there, per unit of `share`.
+        share: (...), 0 to 1, position between start and end.
+        start, end: (...), the values at both ends.
+        start_slope, end_slope: (...), the slopes at both ends, per unit of `share`.
     Returns:
         (...), in the unit of the values.
     """
@@ -59,15 +61,24 @@ def hermite(share: np.ndarray, start, start_slope, end, end_slope) -> np.ndarray
         + (3 * s2 - 2 * s3) * end + (s3 - s2) * end_slope
     )  # fmt: skip
 State = tuple
-"""A second, a place (2,) m and a velocity (2,) m/s."""
+"""Time in seconds, position (2,) m and velocity (2,) m/s."""
 
 
 def quintic_between(times: np.ndarray, before: State, after: State) -> np.ndarray:
-    """(N, 2) m: the quintic from one state to the other without acceleration at either end."""
+    """Interpolate with the quintic between two states, with zero acceleration at both ends.
+
+    Args:
+        times: (N,) seconds.
+        before, after: the states (time, position, velocity) at both ends.
+    Returns:
+        (N, 2) m.
+    """
     (start, place, leaves), (end, goal, comes) = before, after
     length = max(end - start, 1e-9)
     x = ((np.asarray(times) - start) / length)[:, None]
     h = goal - place
     a, b = length * leaves, length * comes
+    # x runs from 0 to 1; slopes are per unit of x. The coefficients follow from position, slope and zero curvature at x
+    # = 1 (those at x = 0 fix the lower three powers).
     third, fourth, fifth = 10 * h - 6 * a - 4 * b, -15 * h + 8 * a + 7 * b, 6 * h - 3 * a - 3 * b
     return place + a * x + third * x**3 + fourth * x**4 + fifth * x**5

@@ -1,24 +1,38 @@
-"""The core's small family of errors: each knows the exit status that `../shared/contract.md` promises for it; and lines
-that are told without being errors.
+"""The core's errors, each with the command's exit status for it, and messages with a time.
 
-A message is one line: what was found where, what was expected, and the next step. The command line prints it to stderr,
-an operator puts it into Blender's report; nobody else formats it again.
+A message is one line: what is wrong and where, what was expected, and the next step. The command line prints it to
+stderr, an operator puts it into Blender's report; no caller formats it again.
 """
 
 from __future__ import annotations
 
 
 class BeyondMocapError(Exception):
-    """Anything the user can do something about. `exit_status` is the command's exit status."""
+    """An error that the user can do something about.
+
+    Attributes:
+        exit_status: exit status of the command.
+    """
 
     exit_status = 2
 
 
 class InputError(BeyondMocapError):
-    """A file, an option or an array is not what it has to be (exit status 2)."""
+    """A file, an option or an array is invalid (exit status 2).
+
+    Attributes:
+        where: file, file:line or option, as text.
+    """
 
     def __init__(self, where: object, found: str, expected: str = "", next_step: str = ""):
-        """`where`: file, file:line or option; `found`, `expected`, `next_step`: short phrases without a full stop."""
+        """Build the one-line message.
+
+        Args:
+            where: file, file:line or option.
+            found: what was found there.
+            expected: what was expected; "" for nothing to say.
+            next_step: what to do next; "" for nothing to say. All three are short phrases without a full stop.
+        """
         parts = [f"{where}: {found}"]
         if expected:
             parts.append(f"expected {expected}")
@@ -29,41 +43,69 @@ class InputError(BeyondMocapError):
 
 
 class NotInLibrary(BeyondMocapError):
-    """The library cannot do what is asked; `nearest` names what it has instead (exit status 3)."""
+    """The library lacks what was requested (exit status 3).
+
+    Attributes:
+        nearest: the nearest label combinations that the library has.
+    """
 
     exit_status = 3
 
     def __init__(self, message: str, nearest: tuple[str, ...] = ()):
-        """`message`: one line; `nearest`: the nearest word combinations that the library holds."""
+        """Build the one-line message.
+
+        Args:
+            message: one line.
+            nearest: the nearest label combinations that the library has.
+        """
         super().__init__(" ".join(message.split()))
         self.nearest = tuple(nearest)
 
 
 class Cancelled(BeyondMocapError):
-    """The user stopped the work (exit status 130)."""
+    """The user cancelled the work (exit status 130)."""
 
     exit_status = 130
 
 
 class TimedLine(str):
-    """A line of a report, with the seconds it is about, so that whoever shows it can go there.
+    """One line of a report with the times it refers to, so that an interface can jump there.
 
-    spans: (first, last) seconds on the track's clock, in the order of the line; () where it is about no time."""
+    Attributes:
+        spans: (first, last) seconds on the track's clock, in the order of the line; () for a line without a time.
+    """
 
     spans: tuple[tuple[float, float], ...]
 
     def __new__(cls, text: str, *spans: tuple[float, float]):
-        """`text`: the line; `spans`: see above."""
+        """Build the line.
+
+        Args:
+            text: the line.
+            spans: (first, last) seconds on the track's clock.
+        """
         line = super().__new__(cls, text)
         line.spans = tuple((float(first), float(last)) for first, last in spans)
         return line
 
 
 def told_time(seconds: float) -> str:
-    """Seconds as a line says them: to the microsecond, however many they are, and no zeros behind."""
+    """Format seconds for a message: to the microsecond, without trailing zeros.
+
+    Args:
+        seconds: any finite number.
+    Returns:
+        The shortest decimal text of the rounded number.
+    """
     return f"{round(float(seconds), 6):.15g}"
 
 
 def spans_of(line: str) -> tuple[tuple[float, float], ...]:
-    """The seconds that a line is about; () for a plain text."""
+    """Return the times that a message refers to.
+
+    Args:
+        line: a `TimedMessage` or a plain text.
+    Returns:
+        (first, last) seconds on the track's clock; () for a plain text.
+    """
     return getattr(line, "spans", ())

@@ -1,4 +1,4 @@
-"""Values over frames: their rate of change, smoothing with held ends, and unbroken runs."""
+"""Values over frames: derivatives, smoothing with constant ends, interpolation, and runs of equal values."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 
 
 def time_derivative(values: np.ndarray, fps: float) -> np.ndarray:
-    """Central differences over time, one-sided at the ends; zero for a single frame.
+    """Compute central differences over time, one-sided at the ends; zero for a single frame.
 
     Args:
         values: (T, ...), any unit.
@@ -18,7 +18,7 @@ def time_derivative(values: np.ndarray, fps: float) -> np.ndarray:
 
 
 def gaussian_smooth(values: np.ndarray, width: float) -> np.ndarray:
-    """Values averaged by a Gaussian bell, their ends held.
+    """Smooth values with a Gaussian kernel; the end values are repeated beyond the ends.
 
     Args:
         values: (T, K), any unit.
@@ -35,7 +35,7 @@ def gaussian_smooth(values: np.ndarray, width: float) -> np.ndarray:
 
 
 def hann_smooth(values: np.ndarray, reach: int) -> np.ndarray:
-    """Values averaged by a Hann window, their ends held.
+    """Smooth values with a Hann window; the end values are repeated beyond the ends.
 
     Args:
         values: (T,), any unit.
@@ -50,13 +50,13 @@ def hann_smooth(values: np.ndarray, reach: int) -> np.ndarray:
 def interpolate(
     at: float | np.ndarray, times: np.ndarray, values: np.ndarray, outside: float | None = None
 ) -> np.ndarray:
-    """Values at other times, linearly between those that are known.
+    """Interpolate values linearly at other times.
 
     Args:
-        at: (...), s or another clock.
-        times: (N,), rising, on the same clock.
+        sample_times: (...), seconds or another clock.
+        times: (N,), ascending, on the same clock.
         values: (N, K), any unit.
-        outside: what stands before the first time and after the last; None holds the values there.
+        fill_value: the value before the first time and after the last; None repeats the end values.
     Returns:
         (..., K), that unit.
     """
@@ -64,18 +64,35 @@ def interpolate(
 
 
 def runs(flags: np.ndarray) -> list[tuple[int, int]]:
-    """(first, end) of every run of True in `flags` (T,): its first index and the one after its last."""
+    """Find the runs of True.
+
+    Args:
+        flags: (T,) bool.
+    Returns:
+        (first, end) of every run: its first index and the index after its last.
+    """
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
     return list(zip(edges[::2].tolist(), edges[1::2].tolist()))
 
 
 def equal_runs(values: np.ndarray) -> list[tuple[int, int]]:
-    """(first, end) of every run of equal neighbours in `values` (T,), T at least 1, one run beginning where another
-    ends."""
+    """Find the runs of equal neighbours; each run begins where the previous one ends.
+
+    Args:
+        values: (T,), T at least 1.
+    Returns:
+        (first, end) of every run: its first index and the index after its last.
+    """
     edges = [0, *(np.flatnonzero(np.diff(values)) + 1).tolist(), len(values)]
     return list(zip(edges[:-1], edges[1:]))
 
 
 def run_numbers(flags: np.ndarray) -> np.ndarray:
-    """(T,) int: in each run of True in `flags` (T,) bool a number of its own above 0, and 0 elsewhere."""
+    """Number the runs of True.
+
+    Args:
+        flags: (T,) bool.
+    Returns:
+        (T,) int: a different number above 0 in each run of True, 0 elsewhere.
+    """
     return np.cumsum(np.diff(flags, prepend=False)) * flags

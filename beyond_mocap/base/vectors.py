@@ -1,4 +1,4 @@
-"""Vectors: length one, cross products, angles, the way along a line."""
+"""Vectors: normalization, cross products, angles, and distance along a line."""
 
 from __future__ import annotations
 
@@ -6,13 +6,14 @@ import numpy as np
 
 
 def unit_vectors(vectors: np.ndarray, otherwise: np.ndarray | float | None = None, least: float = 1e-9) -> np.ndarray:
-    """Vectors at length one.
+    """Normalize vectors to length one.
 
     Args:
         vectors: (..., K), any unit.
-        otherwise: (..., K), what stands for vectors no longer than `least`; None divides them by `least`, so that zero
+        fallback: (..., K), replaces vectors no longer than `min_length`; None divides them by `min_length`, so that
+            zero
             vectors stay zero.
-        least: length below which a vector is not stretched to length one, in its unit.
+        min_length: length up to which a vector is not normalized, in its unit.
     Returns:
         (..., K).
     """
@@ -22,12 +23,14 @@ def unit_vectors(vectors: np.ndarray, otherwise: np.ndarray | float | None = Non
 
 
 def unit_vector(vector: np.ndarray, otherwise: np.ndarray | None = None, least: float = 1e-9) -> np.ndarray:
-    """One vector at length one: as `unit_vectors`, but its length comes from a dot product, which rounds differently.
+    """Normalize one vector to length one.
+
+    Like `unit_vectors`, but its length comes from a dot product, which rounds differently.
 
     Args:
         vector: (K,), any unit.
-        otherwise: (K,), what stands for a vector no longer than `least`; None divides it by `least`.
-        least: length below which it is not stretched to length one, in its unit.
+        fallback: (K,), replaces a vector no longer than `min_length`; None divides it by `min_length`.
+        min_length: length up to which the vector is not normalized, in its unit.
     Returns:
         (K,).
     """
@@ -36,7 +39,7 @@ def unit_vector(vector: np.ndarray, otherwise: np.ndarray | None = None, least: 
 
 
 def nearest_axis(vector: np.ndarray) -> np.ndarray:
-    """The coordinate axis, with its sign, that lies nearest to a vector.
+    """Find the signed coordinate axis nearest to a vector.
 
     Args:
         vector: (3,), any unit.
@@ -48,7 +51,7 @@ def nearest_axis(vector: np.ndarray) -> np.ndarray:
 
 
 def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Cross products, several times faster than `numpy.cross` on long arrays.
+    """Compute cross products, several times faster than `numpy.cross` on long arrays.
 
     Args:
         a, b: (..., 3).
@@ -61,10 +64,10 @@ def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def cross_level(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Vertical component of the cross products of vectors on the ground: positive where b lies to the left of a.
+    """Compute the vertical component of the cross products of ground vectors: positive where b lies to the left of a.
 
     Args:
-        a, b: (..., K), K at least 2; the first two components count.
+        a, b: (..., K), K at least 2; only the first two components count.
     Returns:
         (...).
     """
@@ -72,7 +75,7 @@ def cross_level(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def skew_matrix(v: np.ndarray, xp=np) -> np.ndarray:
-    """The matrix whose product with a vector is the cross product v x vector.
+    """Build the matrix whose product with a vector is the cross product v x vector.
 
     Args:
         v: (..., 3).
@@ -86,7 +89,7 @@ def skew_matrix(v: np.ndarray, xp=np) -> np.ndarray:
 
 
 def distance_along(line: np.ndarray) -> np.ndarray:
-    """Distance along a polyline from its first point to each.
+    """Compute the distance along a polyline from its first point to each point.
 
     Args:
         line: (N, K), m.
@@ -97,8 +100,14 @@ def distance_along(line: np.ndarray) -> np.ndarray:
 
 
 def arctan2(y: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """`numpy.arctan2` in radians of arrays that go together.
+    """Compute `numpy.arctan2` independently of memory layout.
 
-    numpy works out a column of a wider array by another formula, up to two units in the last place away, whenever the
-    result happens to lie right behind that array in memory. Contiguous copies never touch what comes out."""
+    numpy computes a column of a wider array by another formula, up to two units in the last place away, whenever the
+    result happens to lie right behind that array in memory. Contiguous copies avoid that.
+
+    Args:
+        y, x: (...), same shape.
+    Returns:
+        (...), radians.
+    """
     return np.arctan2(np.asarray(y, order="C"), np.asarray(x, order="C"))

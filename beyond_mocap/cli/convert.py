@@ -1,4 +1,4 @@
-"""The verbs `mirror`, `retarget` and `stream`: one recording exchanged left for right, on other bones, or sent."""
+"""The verbs `mirror`, `retarget` and `stream`: mirror a recording, move it to another skeleton, or send it."""
 
 from __future__ import annotations
 
@@ -12,7 +12,14 @@ from .outputs import Told, Writer, check_outputs, naming, writer_of
 
 
 def add_mirror(verbs) -> argparse.ArgumentParser:
-    verb = verbs.add_parser("mirror", help="left becomes right")
+    """Add the verb `mirror`.
+
+    Args:
+        verbs: the sub-parsers to add it to.
+    Returns:
+        The parser of this verb.
+    """
+    verb = verbs.add_parser("mirror", help="exchange left and right of a motion")
     verb.add_argument("input", type=Path, metavar="IN.bvh")
     verb.add_argument("output", type=Path, metavar="OUT.bvh")
     add_options(verb, "mirror")
@@ -21,9 +28,16 @@ def add_mirror(verbs) -> argparse.ArgumentParser:
 
 
 def add_retarget(verbs) -> argparse.ArgumentParser:
-    verb = verbs.add_parser("retarget", help="the same motion on other bones")
+    """Add the verb `retarget`.
+
+    Args:
+        verbs: the sub-parsers to add it to.
+    Returns:
+        The parser of this verb.
+    """
+    verb = verbs.add_parser("retarget", help="move a motion to another skeleton")
     verb.add_argument("input", type=Path, metavar="IN.bvh")
-    verb.add_argument("--to", type=Path, required=True, metavar="SKELETON.bvh", help="a recording or a pose of it")
+    verb.add_argument("--to", type=Path, required=True, metavar="SKELETON.bvh", help="a BVH file with the new skeleton")
     verb.add_argument("--out", type=Path, required=True, metavar="OUT.bvh")
     verb.add_argument("--map", type=Path, metavar="M.json", help="a JSON object, joint of IN -> joint of SKELETON")
     add_options(verb, "retarget")
@@ -32,7 +46,13 @@ def add_retarget(verbs) -> argparse.ArgumentParser:
 
 
 def run_mirror(options, told: Told, writers: Mapping[str, Writer]) -> None:
-    """`mirror`: the same file with left and right exchanged."""
+    """Run `mirror`: write the motion with left and right exchanged.
+
+    Args:
+        options: the parsed command line.
+        reporter: progress, notes and cancellation.
+        writers: further output formats, by file suffix (Blender's).
+    """
     from ..files.bvh import bvh
     from ..motion.mirror import mirror
 
@@ -47,7 +67,15 @@ def run_mirror(options, told: Told, writers: Mapping[str, Writer]) -> None:
 
 
 def run_retarget(options, told: Told, writers: Mapping[str, Writer]) -> None:
-    """`retarget`: the motion on another skeleton, whose joint names and channels the output has; at its own rate."""
+    """Run `retarget`: write the motion on another skeleton, with that skeleton's joint names and channels.
+
+    The output has the input's frame rate.
+
+    Args:
+        options: the parsed command line.
+        reporter: progress, notes and cancellation.
+        writers: further output formats, by file suffix (Blender's).
+    """
     from ..files.bvh import bvh
     from ..library.one_skeleton import bring_one
 
@@ -59,7 +87,7 @@ def run_retarget(options, told: Told, writers: Mapping[str, Writer]) -> None:
     except InputError as error:
         if error.where != "skeleton":
             raise
-        raise InputError(f"{options.input} to {options.to}", str(error)) from None  # skeletons do not know their files
+        raise InputError(f"{options.input} to {options.to}", str(error)) from None  # skeletons do not know the file
     notes = bvh.write(options.out, motion, target.form)
     lines = [(options.input, clip.notes[0]), (options.to, target.notes[0]), *((options.out, note) for note in notes)]
     told.end(f"{path}: {note}" for path, note in lines)
@@ -67,7 +95,14 @@ def run_retarget(options, told: Told, writers: Mapping[str, Writer]) -> None:
 
 
 def add_stream(verbs):
-    verb = verbs.add_parser("stream", help="send a recording as a motion capture suit does, on this machine only")
+    """Add the verb `stream`.
+
+    Args:
+        verbs: the sub-parsers to add it to.
+    Returns:
+        The parser of this verb.
+    """
+    verb = verbs.add_parser("stream", help="send a recording like a mocap suit, on this machine only")
     verb.add_argument("clip", type=Path, metavar="CLIP.bvh")
     add_options(verb, "stream")
     add_options(verb.add_mutually_exclusive_group(), "stream.way")
@@ -77,7 +112,13 @@ def add_stream(verbs):
 
 
 def run_stream(options, told: Told, writers: Mapping[str, Writer]) -> None:
-    """`stream`: sends until the recording's end."""
+    """Run `stream`: send the recording to its end.
+
+    Args:
+        options: the parsed command line.
+        reporter: progress, notes and cancellation.
+        writers: further output formats, by file suffix (Blender's).
+    """
     from ..passes.stream.sender import Sender
 
     way = "tcp" if options.tcp else "serve" if options.serve else "udp"

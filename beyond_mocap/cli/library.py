@@ -1,4 +1,4 @@
-"""The verb `library`: print what a folder of clips and annotations holds, learn from its labels, propose others."""
+"""The verb `library`: describe a folder of clips and annotations, learn from its labels, propose labels."""
 
 from __future__ import annotations
 
@@ -13,11 +13,19 @@ from ..base.errors import InputError
 from ..base.settings.options import add_options
 from .outputs import Told, Writer, check_outputs
 
+# Header of the table of proposed labels.
 PROPOSAL_COLUMNS = ("file", "fps", "start_frame", "end_frame", "key_frame", "labels", "confidence", "source", "why")
 
 
 def add_library(verbs) -> argparse.ArgumentParser:
-    verb = verbs.add_parser("library", help="read a folder of BVH clips and annotations and print what it holds")
+    """Add the verb `library`.
+
+    Args:
+        verbs: the sub-parsers to add it to.
+    Returns:
+        The parser of this verb.
+    """
+    verb = verbs.add_parser("library", help="read a folder of BVH clips and annotations and describe it")
     verb.add_argument("library", type=Path, metavar="LIBRARY")
     add_options(verb, "library.build")
     add_options(verb, "library")
@@ -28,7 +36,13 @@ def add_library(verbs) -> argparse.ArgumentParser:
 
 
 def run_library(options, told: Told, writers: Mapping[str, Writer]) -> None:
-    """`library`: builds it and prints what it holds; or learns from its words, and proposes those that are lacking."""
+    """Run `library`: build the library and describe it, or learn from its labels and propose missing ones.
+
+    Args:
+        options: the parsed command line.
+        reporter: progress, notes and cancellation.
+        writers: further output formats, by file suffix (Blender's).
+    """
     if options.learn or options.propose or options.learned:
         return run_learning(options, told)
     check_outputs(options.report)
@@ -44,7 +58,13 @@ def run_library(options, told: Told, writers: Mapping[str, Writer]) -> None:
 
 
 def summarize(library) -> dict:
-    """What a library holds: clips, minutes, words, speeds, and the sentences that `library` prints."""
+    """Summarize a library: clips, minutes, labels, speeds, and the lines that `library` prints.
+
+    Args:
+        library: a `Library`.
+    Returns:
+        The report as plain values for JSON.
+    """
     from ..annotation import spoken
 
     own = [clip for clip in library.clips if not clip.mirrored]
@@ -54,7 +74,7 @@ def summarize(library) -> dict:
     lines = [
         f"{library.folder}: {len(own)} clips (and their mirrors), {library.minutes:.1f} minutes, "
         f"{len(library.skeleton)} joints",
-        "words: " + " ".join(words),
+        "labels: " + " ".join(words),
         "gaits: " + ", ".join(f"{g['word']} {g['speed_m_s']:.1f} m/s" for g in gaits),
         f"fastest: {library.fastest:.1f} m/s",
         "key moments: " + (", ".join(keys) if keys else "none"),
@@ -67,6 +87,16 @@ def summarize(library) -> dict:
 
 
 def open_library(options, told: Told, rebuild: bool = False, seed: int = 0):
+    """Build or load the library of the command line.
+
+    Args:
+        options: the parsed command line.
+        reporter: progress and cancellation.
+        rebuild: whether to build it again although the cache is up to date.
+        seed: seed of the clustering.
+    Returns:
+        The `Library`.
+    """
     from ..library.build import build
 
     return build(
@@ -76,16 +106,27 @@ def open_library(options, told: Told, rebuild: bool = False, seed: int = 0):
 
 
 def add_learning_options(verb) -> None:
-    """`--learn`, `--propose`, `--learned` and `--least`."""
-    verb.add_argument("--learn", type=Path, metavar="MODEL.npz", help="learn from the clips that have words")
-    verb.add_argument("--propose", type=Path, metavar="OUT.csv", help="words for the clips that have none")
-    verb.add_argument("--learned", type=Path, metavar="MODEL.npz", help="what was learned; without it rules alone")
+    """Add `--learn`, `--propose`, `--learned` and `--least`.
+
+    Args:
+        verb: the parser to add them to.
+    """
+    verb.add_argument("--learn", type=Path, metavar="MODEL.npz", help="learn from the clips that have labels")
+    verb.add_argument("--propose", type=Path, metavar="OUT.csv", help="propose labels for the clips without any")
+    verb.add_argument("--learned", type=Path, metavar="MODEL.npz", help="a learned model; without it rules alone")
     add_options(verb, "library.learn")
 
 
 def run_learning(options, told: Told) -> None:
-    """Learns, proposes, or first the one and then the other. InputError for clips that cannot be read, and for a table
-    of words that would be lost."""
+    """Learn from labels, propose labels, or both in this order.
+
+    Args:
+        options: the parsed command line.
+        reporter: progress, notes and cancellation.
+    Raises:
+        InputError: if clips cannot be read, options contradict each other, or an existing table of labels would be
+            overwritten.
+    """
     from ..library.classify import classifier
     from ..library.classify.examples import examples_of
     from ..library.classify.train import trained
@@ -93,12 +134,12 @@ def run_learning(options, told: Told) -> None:
 
     check_outputs(options.learn, options.propose, never=(options.learned,))
     if options.learn and options.learned:
-        raise InputError("--learned", "given beside --learn", "one of them", "leave it away: what is learned is used")
+        raise InputError("--learned", "set with --learn", "one of them", "remove one of them")
     if options.learned and not options.propose:
-        raise InputError("--learned", "given without --propose", "--propose OUT.csv", "say where the proposals go")
+        raise InputError("--learned", "set without --propose", "--propose OUT.csv", "add --propose OUT.csv")
     if options.propose and options.propose.name == TABLE_NAME and options.propose.exists():
-        what = "holds words already, which would be lost"
-        raise InputError(options.propose, what, "a new file", "choose another name, then put the rows together")
+        what = "already has labels, which would be lost"
+        raise InputError(options.propose, what, "a new file", "choose another name, then merge the rows")
     known = classifier.read_classifier(options.learned) if options.learned else None
     if options.learn:
         examples = examples_of(options.library, options.unit, told.progress, cache_dir=options.cache,
@@ -111,11 +152,11 @@ def run_learning(options, told: Told) -> None:
     if options.propose:
         count, clips = _write_proposals(options, known, told)
         told.end()
-        print(f"{options.propose}: {count} rows for {clips} clips without words")
+        print(f"{options.propose}: {count} rows for {clips} clips without labels")
 
 
 def _write_proposals(options, known, told: Told) -> tuple[int, int]:
-    """Writes the table; returns its number of rows and of clips that were looked at."""
+    """Write the table of proposals; return its number of rows and the number of clips without labels."""
     from ..files.whole import atomic_write
     from ..library.classify.examples import without_words
     from ..library.proposals import propose

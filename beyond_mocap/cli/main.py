@@ -1,7 +1,7 @@
 """The command line: `python -m beyond_mocap VERB ...`; Blender's command and batch script use the same parser.
 
-Exit status: 0 done; 2 the command line or an input is wrong; 3 asked for something the library cannot do; 130
-cancelled. What is wrong stands in one line on stderr. See the project's README for examples.
+Exit status: 0 done; 2 the command line or an input is wrong; 3 the library lacks what was requested; 130 cancelled.
+Errors are one line on stderr. See the project's README for examples.
 """
 
 from __future__ import annotations
@@ -28,26 +28,38 @@ from .throwing import add_throw
 
 VERBS = (add_library, add_synthesize, add_path, add_touches, add_stream, add_passes, add_reconstruct, add_release,
          add_throw, add_match, add_study, add_mirror, add_retarget, add_evaluate)  # fmt: skip
-"""What adds a verb, in the order of `--help`; each gets the sub-parsers and returns its parser."""
+"""Functions that add a verb, in the order of `--help`; each takes the sub-parsers and returns its parser."""
 Apart = Callable[[list[str], Callable[[float, str], None], Callable[[], bool]], object]
-"""Runs arguments, reports its progress, and is asked whether to stop."""
+"""Runs a command line in another process: (arguments, progress callback, cancellation callback)."""
 
 
 class OneLineParser(argparse.ArgumentParser):
-    """A parser whose errors are one line, with status 2."""
+    """A parser whose errors are one line, with exit status 2."""
 
     def __init__(self, *args, **more):
         super().__init__(*args, **more)
-        self._negative_number_matcher = re.compile(r"-\.?\d")  # as from Python 3.14 on: -10,2,1 is no option
+        self._negative_number_matcher = re.compile(r"-\.?\d")  # like Python 3.14: -10,2,1 is a value, not an option
 
     def error(self, message: str):
-        """Raises the message as an InputError."""
+        """Raise the message as an InputError.
+
+        Args:
+            message: argparse's description of the problem.
+        Raises:
+            InputError: always.
+        """
         raise InputError(self.prog, message, "", f"see '{self.prog} --help'")
 
 
 def parser(prog: str = "beyond-mocap") -> argparse.ArgumentParser:
-    """The parser of all verbs."""
-    top = OneLineParser(prog=prog, description="From tracks, a few words and motion capture to moving bodies.")
+    """Build the parser of all verbs.
+
+    Args:
+        prog: the program's name in help and errors.
+    Returns:
+        The parser; its result has the verb in `verb` and the function to run in `run`.
+    """
+    top = OneLineParser(prog=prog, description="Full-body animation from tracking data, labels and motion capture.")
     top.add_argument("--version", action="version", version=f"beyond-mocap {__version__}")
     verbs = top.add_subparsers(dest="verb", required=True, metavar="VERB", parser_class=OneLineParser)
     for add in VERBS:
@@ -59,10 +71,16 @@ def main(
     argv: list[str] | None = None, writers: Mapping[str, Writer] | None = None, prog: str = "beyond-mocap",
     apart: Apart | None = None,
 ) -> int:  # fmt: skip
-    """Runs one command and returns its exit status.
+    """Run one command and return its exit status.
 
-    writers: by suffix, further kinds of `--out` (Blender's). apart: runs a command line in a process of its own, where
-    this one cannot send work to others, as within Blender."""
+    Args:
+        argv: the arguments without the program's name; None for `sys.argv`.
+        writers: further output formats, by file suffix (Blender's).
+        prog: the program's name in help and errors.
+        run_isolated: runs a command line in a process of its own, for hosts such as Blender that cannot start workers.
+    Returns:
+        The exit status, see the module.
+    """
     told = None
     _escape(sys.stdout)
     try:
@@ -89,14 +107,16 @@ def main(
 
 
 def _escape(stream) -> None:
-    """Lets a stream write what its encoding lacks as escapes instead of raising: names on a foreign console."""
+    """Make a stream write characters that its encoding lacks as escapes instead of raising an error."""
     if getattr(stream, "errors", None) == "strict" and hasattr(stream, "reconfigure"):
         stream.reconfigure(errors="backslashreplace")
 
 
 class _interrupts:
-    """While it lasts, Ctrl-C, or a farm's request to end (SIGTERM), asks the work to stop instead of breaking it off;
-    the second one breaks it off. Outside the main thread nothing is done."""
+    """Context manager: Ctrl-C, or a render farm's SIGTERM, requests cancellation; a second one interrupts at once.
+
+    Outside the main thread it does nothing.
+    """
 
     def __init__(self, told: Told):
         self._told, self._before = told, {}
@@ -107,7 +127,7 @@ class _interrupts:
 
     def __exit__(self, *_):
         for kind, before in self._before.items():
-            # None: not set from Python, as by Blender for itself, and not to be had back from there
+            # None: the handler was not set from Python (Blender's own) and cannot be restored from here
             signal.signal(kind, signal.SIG_DFL if before is None else before)
 
     def _asked(self, *_):

@@ -1,4 +1,4 @@
-"""The verbs `match` and `touches`: all players' motion, or who touched the ball when, from a provider's tracking."""
+"""The verbs `match` and `touches`: all players' motion, or all ball touches, from a provider's tracking data."""
 
 from __future__ import annotations
 
@@ -18,32 +18,45 @@ from .outputs import Told, Writer, check_outputs, named_folder
 
 
 def add_match(verbs):
+    """Add the verb `match`.
+
+    Args:
+        verbs: the sub-parsers to add it to.
+    Returns:
+        The parser of this verb.
+    """
     from ..files.event_providers import EVENT_PROVIDERS
     from ..files.tracking.providers import PROVIDERS
 
-    verb = verbs.add_parser("match", help="everybody's motion and the ball of a tracked match, resumable")
-    verb.add_argument("--tracking", type=Path, required=True, metavar="FILE", help="a provider's tracking")
-    verb.add_argument("--meta", type=Path, metavar="FILE", help="the provider's metadata; default: looked for beside")
-    verb.add_argument("--events", type=Path, metavar="FILE", help="what happened, from a provider or as CSV")
-    verb.add_argument("--events-meta", type=Path, metavar="FILE", help="of the events; default: looked for beside them")
+    verb = verbs.add_parser("match", help="all players' motion and the ball of a tracked match, resumable")
+    verb.add_argument("--tracking", type=Path, required=True, metavar="FILE", help="a provider's tracking data")
+    verb.add_argument("--meta", type=Path, metavar="FILE", help="the provider's metadata; default: beside FILE")
+    verb.add_argument("--events", type=Path, metavar="FILE", help="event data, from a provider or as CSV")
+    verb.add_argument("--events-meta", type=Path, metavar="FILE", help="metadata of the events; default: beside them")
     verb.add_argument("--events-provider", metavar="NAME", default="",
-                      help=f"whose form the events have: {', '.join(EVENT_PROVIDERS)}; default: guessed")
+                      help=f"format of the events: {', '.join(EVENT_PROVIDERS)}; default: detected")
     verb.add_argument("--provider", metavar="NAME", default="",
-                      help=f"whose form FILE has: {', '.join(PROVIDERS)}; default: guessed")
+                      help=f"format of FILE: {', '.join(PROVIDERS)}; default: detected")
     verb.add_argument("--library", type=Path, required=True)
     verb.add_argument("--out", type=named_folder, required=True, metavar="FOLDER",
-                      help="is made; goes on where it was left")
+                      help="output folder; an unfinished run continues there")
     add_options(verb, "match.section")
     add_options(verb.add_mutually_exclusive_group(), "match.work")
     add_options(verb, "match")
-    verb.add_argument("--nearest", action="store_true", help="go on with the nearest words; the default")
+    verb.add_argument("--nearest", action="store_true", help="use the nearest labels for missing ones; the default")
     add_options(verb, "library")
     verb.set_defaults(run=run_match)
     return verb
 
 
 def run_match(options, told: Told, writers: Mapping[str, Writer]) -> None:
-    """`match`: makes what is not there yet, and tells what came of it."""
+    """Run `match`: synthesize what is not there yet and report the result.
+
+    Args:
+        options: the parsed command line.
+        reporter: progress, notes and cancellation.
+        writers: further output formats, by file suffix (Blender's).
+    """
     from ..match.make import make_match, result_of
     from ..match.order import MatchOrder
 
@@ -61,9 +74,9 @@ def run_match(options, told: Told, writers: Mapping[str, Writer]) -> None:
         made = result_of(order)
     told.end(made.notes)
     for player in made.failed:
-        told.note(f"player {player.id} was left out: {player.reason}")
+        told.note(f"player {player.id} was skipped: {player.reason}")
     if not made.done:
-        raise BeyondMocapError(f"{options.out}: no player could be made; match.json there tells why of each")
+        raise BeyondMocapError(f"{options.out}: no player could be synthesized; see match.json there for the reasons")
     if write is not None:
         for line in write(made, options.scene) or ():
             told.note(line)
@@ -72,18 +85,34 @@ def run_match(options, told: Told, writers: Mapping[str, Writer]) -> None:
 
 
 def scene_writer(scene: Path, writers: Mapping[str, Writer]) -> Writer:
-    """Who writes a whole match to a file with the suffix of `scene`; InputError where nobody does, or it cannot be."""
+    """Choose the function that writes a whole match to a file.
+
+    Args:
+        scene: the output file.
+        writers: the known functions, by file suffix.
+    Returns:
+        The function.
+    Raises:
+        InputError: if no function writes this kind of file, or the file cannot be written.
+    """
     check_outputs(scene)
     if not writers:
-        raise InputError("--scene", f"{scene.name}, without Blender", "Blender, which writes scenes",
+        raise InputError("--scene", f"{scene.name} cannot be written without Blender", "a run inside Blender",
                          "blender --command beyond_mocap match ...")  # fmt: skip
     if scene.suffix.lower() not in writers:
-        raise InputError(scene, f"the ending {scene.suffix!r}", f"one of {', '.join(sorted(writers))}")
+        raise InputError(scene, f"file type {scene.suffix!r}", f"one of {', '.join(sorted(writers))}")
     return writers[scene.suffix.lower()]
 
 
 def without(arguments: Sequence[str], option: str) -> list[str]:
-    """A command line without a long option of one value, however it is written: shortened too, as argparse takes it."""
+    """Remove a long option with one value from a command line, also where it is abbreviated as argparse allows.
+
+    Args:
+        arguments: the command line.
+        option: the long option, such as `--scene`.
+    Returns:
+        The other arguments.
+    """
     kept, rest = [], iter(arguments)
     for one in rest:
         name, equals, _ = one.partition("=")
@@ -95,28 +124,41 @@ def without(arguments: Sequence[str], option: str) -> list[str]:
 
 
 def _cores() -> range | set[int]:
-    """The cores that this process may use."""
+    """List the cores that this process may use."""
     return os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else range(os.cpu_count() or 1)
 
 
 def add_touches(verbs):
+    """Add the verb `touches`.
+
+    Args:
+        verbs: the sub-parsers to add it to.
+    Returns:
+        The parser of this verb.
+    """
     from ..files.tracking.providers import PROVIDERS
 
-    verb = verbs.add_parser("touches", help="who touched the ball and when, from tracking")
-    verb.add_argument("input", type=Path, metavar="FILE", help="a provider's tracking, or one player's track as CSV")
-    verb.add_argument("--meta", type=Path, metavar="FILE", help="the provider's metadata; default: looked for beside")
+    verb = verbs.add_parser("touches", help="who touches the ball and when, from tracking data")
+    verb.add_argument("input", type=Path, metavar="FILE", help="a provider's tracking data, or a player's track as CSV")
+    verb.add_argument("--meta", type=Path, metavar="FILE", help="the provider's metadata; default: beside FILE")
     verb.add_argument("--provider", metavar="NAME",
-                      help=f"whose form FILE has: {', '.join(PROVIDERS)}; default: guessed from its content")
+                      help=f"format of FILE: {', '.join(PROVIDERS)}; default: detected from its content")
     add_options(verb, "touches")
     verb.add_argument("--out", type=Path, required=True, metavar="TOUCHES.csv")
-    verb.add_argument("--ball", type=Path, metavar="BALL.csv", help="the solved path at the times of the samples")
+    verb.add_argument("--ball", type=Path, metavar="BALL.csv", help="the solved trajectory at the samples' times")
     verb.add_argument("--report", type=Path, metavar="R.json")
     verb.set_defaults(run=run_touches)
     return verb
 
 
 def run_touches(options, told: Told, writers: Mapping[str, Writer]) -> None:
-    """`touches`: solves the ball and writes what was asked for."""
+    """Run `touches`: solve the ball's trajectory and write the requested files.
+
+    Args:
+        options: the parsed command line.
+        reporter: progress, notes and cancellation.
+        writers: further output formats, by file suffix (Blender's).
+    """
     from ..ball.tracked.solve import solve_ball
     from ..files.tables import write_ball, write_report, write_touches
     from ..motion.track.ball_path import BallPath
@@ -140,7 +182,7 @@ def run_touches(options, told: Told, writers: Mapping[str, Writer]) -> None:
 
 
 def _read_tracking(options):
-    """The match, or the track where the file is the contract's own table."""
+    """Read the match, or the track where the file is the project's own table."""
     from ..files.tracking.tracking import read_match, read_track_csv
 
     if options.input.is_file() and not options.provider:
@@ -148,13 +190,13 @@ def _read_tracking(options):
             if b"time_s" in file.readline(4096):
                 if options.meta:
                     found = f"{options.meta} beside a player's track"
-                    raise InputError("--meta", found, "none: a track has no metadata")
-                return replace(read_track_csv(options.input), name=options.input.stem)  # who touches, in the table
+                    raise InputError("--meta", found, "no metadata for a track")
+                return replace(read_track_csv(options.input), name=options.input.stem)  # the player's name in the table
     return read_match(options.input, options.meta, options.provider)
 
 
 def _report_touches(solved) -> dict:
-    """The figures of a `SolvedBall`, for JSON."""
+    """Build the report of a `SolvedBall`, for JSON."""
     off = solved.residuals[solved.measured & np.isfinite(solved.residuals)]
     spread = [touch.uncertainty for touch in solved.touches]
     return {
@@ -172,6 +214,7 @@ def _report_touches(solved) -> dict:
 
 
 def _percentiles(values: np.ndarray) -> dict | None:
+    """Compute median, 95th percentile and maximum; None without values."""
     if not len(values):
         return None
     return {"median": np.median(values), "p95": np.percentile(values, 95), "max": values.max()}

@@ -1,4 +1,4 @@
-"""What all verbs share: the progress that the user sees, where results may be written, and common options."""
+"""Shared by all verbs: progress, notes and cancellation, output files, and common options."""
 
 from __future__ import annotations
 
@@ -14,14 +14,19 @@ from pathlib import Path
 from ..base.errors import Cancelled, InputError
 
 Writer = Callable[[object, Path], Sequence[str] | None]
-"""Writes a take, or what the verb `match` has made, to a file; lines for the user, if any."""
+"""Writes a take, or the result of the verb `match`, to a file; returns lines for the user, if any."""
 
 
 class Told:
-    """What the user sees of the progress, and whether Ctrl-C was pressed."""
+    """Shows progress and notes on the command line, and knows whether the user pressed Ctrl-C."""
 
     def __init__(self, as_json: bool, stream=None):
-        """as_json: JSON lines; otherwise a bar where `stream` (default stderr) is a terminal."""
+        """Choose the form of the output.
+
+        Args:
+            as_json: write JSON lines; otherwise a bar if the stream is a terminal.
+            stream: a text stream; None for stderr.
+        """
         self._stream = stream or sys.stderr
         self._json = as_json
         self._bar = not as_json and self._stream.isatty()
@@ -29,7 +34,12 @@ class Told:
         self._last = ""
 
     def progress(self, fraction: float, text: str) -> None:
-        """Shows how far the work is."""
+        """Show the progress.
+
+        Args:
+            fraction: 0 to 1.
+            text: what is being done.
+        """
         if self._json:
             print(json.dumps({"progress": round(fraction, 4), "text": text}), file=self._stream, flush=True)
         elif self._bar:
@@ -40,11 +50,19 @@ class Told:
                 self._last = line
 
     def note(self, text: str) -> None:
-        """Tells something that the user should know, on the stream of the progress."""
+        """Show a message to the user, on the stream of the progress.
+
+        Args:
+            text: one line.
+        """
         print(json.dumps({"note": text}) if self._json else f"note: {text}", file=self._stream, flush=True)
 
     def end(self, notes: Iterable[str] = ()) -> None:
-        """Clears the bar and writes the notes."""
+        """Clear the bar and show notes.
+
+        Args:
+            notes: one line each.
+        """
         if self._last:
             print("\r" + " " * 80 + "\r", end="", file=self._stream, flush=True)
             self._last = ""
@@ -52,23 +70,28 @@ class Told:
             self.note(text)
 
     def cancel(self) -> None:
-        """Asks the work to stop."""
+        """Request cancellation."""
         self._stop.set()
 
     def cancelled(self) -> bool:
-        """Whether the user wants out."""
+        """Return whether the user requested cancellation."""
         return self._stop.is_set()
 
     def check(self) -> None:
-        """Raises Cancelled where the user wants out."""
+        """Raise Cancelled if the user requested cancellation."""
         if self.cancelled():
             raise Cancelled("cancelled")
 
 
 @contextmanager
 def naming(path):
-    """What is wrong with what a file holds is reported with the file: skeletons, motions and scenes do not know theirs.
-    path: or words for several files."""
+    """Add the file's name to errors about its content: skeletons, motions and scenes do not know their file.
+
+    Args:
+        path: the file, or words for several files.
+    Raises:
+        InputError: the error of the block, with `path` in front.
+    """
     try:
         yield
     except InputError as error:
@@ -77,62 +100,102 @@ def naming(path):
         raise InputError(path, str(error)) from None
 
 
-def writer_of(out: Path, writers: Mapping[str, Writer], others: str = "inside Blender .blend, .fbx, .glb and .usdc can "
-              "be written too") -> Writer:
-    """Who writes a file with the suffix of `out`; `writers`: by suffix, beside BVH; others: what to do next where there
-    are none, "" for no more than another ending."""
+def writer_of(out: Path, writers: Mapping[str, Writer], others: str = "run inside Blender to write .blend, .fbx, .glb "
+              "or .usdc") -> Writer:
+    """Choose the function that writes an output file.
+
+    Args:
+        out: the output file.
+        writers: functions by file suffix, in addition to BVH.
+        hint: next step of the error if `writers` is empty; "" for "choose another file type".
+    Returns:
+        The function.
+    Raises:
+        InputError: if no function writes this kind of file.
+    """
     known = {".bvh": write_bvh, **writers}
     if out.suffix.lower() not in known:
         raise InputError(
-            out, f"no file ending in {out.suffix} can be written here" if out.suffix else "no file ending",
+            out, f"file type {out.suffix} cannot be written here" if out.suffix else "no file type",
             f"one of {', '.join(sorted(known))}",
-            "choose another ending" if writers or not others else others,
+            "choose another file type" if writers or not others else others,
         )
     return known[out.suffix.lower()]
 
 
 def write_bvh(take, out: Path) -> None:
-    """The take's motion as BVH."""
+    """Write a take's motion as BVH.
+
+    Args:
+        take: a `Take`.
+        out: the file.
+    """
     from ..files.bvh import bvh
 
     bvh.write(out, take.motion)
 
 
 def check_outputs(*paths: Path | None, never: tuple[Path | None, ...] = ()) -> None:
-    """Before work begins: every output's folder can be written to, and no output is another one or one of `never`."""
+    """Check before the work that every output can be written and that no two paths are the same file.
+
+    Args:
+        paths: the output files; None is skipped.
+        reserved: files that must not be overwritten, such as the inputs; None is skipped.
+    Raises:
+        InputError: for the first path that fails.
+    """
     taken = {path.resolve() for path in never if path is not None}
     for path in filter(None, paths):
         folder = path.absolute().parent
         if path.is_dir():
-            raise InputError(path, "is a folder", "a file name", "add a file name")
+            raise InputError(path, "is a folder", "a file", "add a file name")
         if path.exists() and not path.is_file():
-            raise InputError(path, "a device or a pipe", "a file name", "choose another place")
+            raise InputError(path, "is a device or a pipe", "a regular file", "choose another file")
         if not folder.is_dir():
-            raise InputError(path, "its folder does not exist", "an existing folder", "make the folder first")
+            raise InputError(path, "its folder does not exist", "an existing folder", "create the folder first")
         if not os.access(folder, os.W_OK | os.X_OK):
-            raise InputError(path, "its folder cannot be written to", "a folder of yours", "choose another folder")
+            raise InputError(path, "its folder is not writable", "a writable folder", "choose another folder")
         if path.resolve() in taken:
-            what = "named for an output and for something else"
-            raise InputError(path, what, "a file for each", "rename one of them")
+            what = "is both an output and another file of the command"
+            raise InputError(path, what, "different files", "rename one of them")
         taken.add(path.resolve())
 
 
 def named_folder(text: str) -> Path:
-    """A folder that has a name: an empty one would be the folder at hand."""
+    """Parse an option that names a folder; an empty one would mean the current folder.
+
+    Args:
+        text: the option's text.
+    Returns:
+        The folder.
+    Raises:
+        ArgumentTypeError: if the text is empty.
+    """
     if not text.strip():
         raise argparse.ArgumentTypeError("no folder is named")
     return Path(text)
 
 
 def add_take_files(verb) -> None:
-    """Options for what belongs to a motion: provenance and ball."""
+    """Add the options for the files beside a motion: provenance and ball.
+
+    Args:
+        verb: the parser to add them to.
+    """
     verb.add_argument("--provenance", type=Path, metavar="P.csv")
     verb.add_argument("--ball", type=Path, metavar="B.csv")
 
 
 def add_own_verbs(verb, dest: str, *adders: Callable):
-    """Adds verbs below a verb, each with --json as every verb; returns the verb's parser. dest: the option that holds
-    which one was chosen; adders: each adds one to the sub-parsers and returns its parser."""
+    """Add verbs below a verb, each with --json as every verb has.
+
+    Args:
+        verb: the parser of the verb above.
+        dest: the option that holds the chosen verb.
+        adders: each adds one verb to the sub-parsers and returns its parser.
+    Returns:
+        The parser of the verb above.
+    """
     own = verb.add_subparsers(dest=dest, required=True, metavar="VERB", parser_class=type(verb))
     for add_one in adders:
         add_one(own).add_argument("--json", action="store_true", default=argparse.SUPPRESS,
@@ -141,8 +204,16 @@ def add_own_verbs(verb, dest: str, *adders: Callable):
 
 
 def build_take(motion, clip: str, method: str, **known):
-    """A motion that is one clip, played frame by frame, as a take, for writers of other forms than BVH. known: fields
-    of the take that say more than that."""
+    """Build a take from a motion that is one clip, played frame by frame, for the writers of formats other than BVH.
+
+    Args:
+        motion: the motion, F frames.
+        clip: name of the clip.
+        method: how the motion came about, as reports name it.
+        fields: fields of the take that differ from those of a plainly played clip.
+    Returns:
+        A `Take`.
+    """
     import numpy as np
 
     from ..annotation import Timeline

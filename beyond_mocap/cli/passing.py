@@ -1,4 +1,4 @@
-"""The verb `passes`: several players keep a ball going."""
+"""The verb `passes`: several players pass a ball to each other."""
 
 from __future__ import annotations
 
@@ -16,18 +16,31 @@ from .outputs import Told, Writer, named_folder, naming
 
 
 def add_passes(verbs):
-    verb = verbs.add_parser("passes", help="several players keep a ball going")
+    """Add the verb `passes`.
+
+    Args:
+        verbs: the sub-parsers to add it to.
+    Returns:
+        The parser of this verb.
+    """
+    verb = verbs.add_parser("passes", help="several players pass a ball to each other")
     verb.add_argument("scene", type=Path, metavar="SCENE.json",
-                      help="who passes to whom; docs/passes/passes.md has its form")
-    verb.add_argument("--library", type=Path, required=True, help="a folder of clips with strikes of the ball")
-    verb.add_argument("--out", type=named_folder, required=True, metavar="FOLDER", help="is made where there is none")
+                      help="who passes to whom; see docs/passes/passes.md")
+    verb.add_argument("--library", type=Path, required=True, help="a folder of clips with ball strikes")
+    verb.add_argument("--out", type=named_folder, required=True, metavar="FOLDER", help="created if missing")
     add_options(verb, "library")
     verb.set_defaults(run=run_passes)
     return verb
 
 
 def run_passes(options, told: Told, writers: Mapping[str, Writer]) -> None:
-    """`passes`: plays the scene and writes its players, its ball and what came of it."""
+    """Run `passes`: simulate the scene and write its players, ball and reports.
+
+    Args:
+        options: the parsed command line.
+        reporter: progress, notes and cancellation.
+        writers: further output formats, by file suffix (Blender's).
+    """
     from ..library.build import build
     from ..passes.passes import ball_of, passes
     from ..passes.scene_json import read_scene
@@ -53,25 +66,32 @@ def run_passes(options, told: Told, writers: Mapping[str, Writer]) -> None:
     names = {player.name for player in played.players}
     others = sorted(path.stem for path in options.out.glob("*.bvh") if path.stem not in names)
     if others:
-        told.note(f"{options.out}: of another scene, left there: {', '.join(others)}")
+        told.note(f"{options.out}: files of another scene: {', '.join(others)}")
     gaps = [row["contact_gap_m"] for row in table if row["outcome"] != "missed"]
     print(f"{options.out}: {len(played.players)} players, {len(table)} strikes in {played.plan.seconds:.1f} s, "
           f"widest gap {1000.0 * max(gaps, default=0.0):.1f} mm")  # fmt: skip
 
 
 def _check_folder(folder: Path) -> None:
-    """Before work begins: the folder is there or can be made."""
+    """Check before the work that the folder exists or can be created."""
     if folder.exists() and not folder.is_dir():
         raise InputError(folder, "is a file", "a folder", "choose another name")
     place = folder if folder.is_dir() else folder.absolute().parent
     if not place.is_dir():
-        raise InputError(folder, "the folder above it does not exist", "an existing folder", "make that folder first")
+        raise InputError(folder, "the folder above it does not exist", "an existing folder", "create that folder first")
     if not os.access(place, os.W_OK | os.X_OK):
-        raise InputError(folder, "cannot be written to", "a folder of yours", "choose another folder")
+        raise InputError(folder, "is not writable", "a writable folder", "choose another folder")
 
 
 def strikes(library, played) -> list[dict]:
-    """The strikes of a scene as rows of strikes.csv."""
+    """List the strikes of a scene as rows of strikes.csv.
+
+    Args:
+        library: the `Library` of the clips.
+        played: the simulated scene.
+    Returns:
+        Column name -> value for each strike, in the plan's order.
+    """
     out = []
     for number, one in enumerate(played.plan.strikes):
         order, clip = one.order, library.clips[one.order.clip]
@@ -90,7 +110,7 @@ def strikes(library, played) -> list[dict]:
 
 
 def _report(played, table: list[dict]) -> dict:
-    """The figures of a scene, for JSON."""
+    """Build the report of a scene, for JSON."""
     plan, kind = played.plan, played.kind
     return {
         "version": __version__, "seed": played.scene.seed, "fps": plan.fps, "frames": len(played.ball.times),
@@ -101,7 +121,7 @@ def _report(played, table: list[dict]) -> dict:
 
 
 def _of_player(player) -> dict:
-    """How well one player's motion came out."""
+    """Build the evaluation of one player's motion, for JSON."""
     from ..evaluation.report import evaluate
 
     whole = evaluate(player.take, None, None)
@@ -111,6 +131,7 @@ def _of_player(player) -> dict:
 
 
 def _write(folder: Path, played, table: list[dict], report: dict) -> None:
+    """Write all files of a scene to its folder."""
     from ..files.bvh import bvh
     from ..files.tables import write_ball, write_report
     from ..passes.scene_json import write_strikes

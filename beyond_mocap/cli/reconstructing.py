@@ -1,5 +1,8 @@
-"""The verbs `reconstruct` and `release`: optical markers of a trial, or of a folder of them, become a moving skeleton;
-when and how a ball left its hand."""
+"""The verbs `reconstruct` and `release`.
+
+`reconstruct` solves a moving skeleton from the optical markers of a trial, or of each trial in a folder. `release`
+finds when and how a ball left the hand.
+"""
 
 from __future__ import annotations
 
@@ -17,15 +20,22 @@ from ..base.errors import InputError
 from ..base.settings.options import add_options, option_values
 from .outputs import Told, Writer, build_take, check_outputs, writer_of
 
-_MOST_LINES = 12
+_MOST_LINES = 12  # notes that the command prints; the report has all
 
 
 def add_reconstruct(verbs):
-    verb = verbs.add_parser("reconstruct", help="optical markers (.c3d, .trc) become a moving skeleton")
-    verb.add_argument("trial", type=Path, metavar="TRIAL", help="a recording of markers, or a folder of them")
-    verb.add_argument("--static", type=Path, metavar="STATIC", help="the same markers on the same standing body")
-    verb.add_argument("--model", type=Path, metavar="MODEL.json", help="a model made before; then no --static")
-    verb.add_argument("--out", type=Path, required=True, metavar="OUT.bvh", help="for a folder of trials: a folder")
+    """Add the verb `reconstruct`.
+
+    Args:
+        verbs: the sub-parsers to add it to.
+    Returns:
+        The parser of this verb.
+    """
+    verb = verbs.add_parser("reconstruct", help="solve a moving skeleton from optical markers (.c3d, .trc)")
+    verb.add_argument("trial", type=Path, metavar="TRIAL", help="a marker recording, or a folder of them")
+    verb.add_argument("--static", type=Path, metavar="STATIC", help="the same markers on the same body, standing")
+    verb.add_argument("--model", type=Path, metavar="MODEL.json", help="a saved model, instead of --static")
+    verb.add_argument("--out", type=Path, required=True, metavar="OUT.bvh", help="a folder for a folder of trials")
     verb.add_argument("--report", type=Path, metavar="R.json")
     verb.add_argument("--save-model", type=Path, metavar="MODEL.json")
     add_options(verb, "markers")
@@ -34,13 +44,19 @@ def add_reconstruct(verbs):
 
 
 def run_reconstruct(options, told: Told, writers: Mapping[str, Writer]) -> None:
-    """`reconstruct`: of one trial, or of all in a folder."""
+    """Run `reconstruct` on one trial, or on all trials in a folder.
+
+    Args:
+        options: the parsed command line.
+        reporter: progress, notes and cancellation.
+        writers: further output formats, by file suffix (Blender's).
+    """
     from ..library.keep_words import plain_words
 
     if options.model and options.static:
-        raise InputError("--model", "with --static", "one of them", "leave one out")
+        raise InputError("--model", "set with --static", "one of them", "remove one of them")
     if options.words and not options.add_to:
-        raise InputError("--words", "without --add-to", "both", "add --add-to LIBRARY")
+        raise InputError("--words", "set without --add-to", "both", "add --add-to LIBRARY")
     options.words = plain_words(options.words)
     if options.trial.is_dir():
         _run_folder(options, told)
@@ -49,6 +65,7 @@ def run_reconstruct(options, told: Told, writers: Mapping[str, Writer]) -> None:
 
 
 def _run_one(options, told: Told, writers: Mapping[str, Writer]) -> None:
+    """Reconstruct one trial and write its files."""
     from ..files.tables import write_report
     from ..markers.files.model_json import write_model
     from ..markers.reconstruct import reconstruct
@@ -72,7 +89,7 @@ def _run_one(options, told: Told, writers: Mapping[str, Writer]) -> None:
         raise _with_file(error, options) from None
     made.seconds.update(load=loaded - begun, total=time.perf_counter() - begun)
     if _is_throw(options.words) and made.release is None:
-        raise InputError(options.trial, "no release was found for a throw's words", "a throw", "leave --words out")
+        raise InputError(options.trial, "no ball release found, but --words name a throw", "a throw", "remove --words")
     notes = add_to_library(made, options.trial.stem, options) if options.add_to else []
     if options.report:
         write_report(options.report, made.report())
@@ -88,36 +105,39 @@ def _run_one(options, told: Told, writers: Mapping[str, Writer]) -> None:
 
 
 def _upright_alike(options, trial, static) -> list[str]:
-    """A line where two files of one kind are read with different axes up."""
+    """Describe a difference in the up axes of two files of one kind; no line where there is none."""
     if static is None or options.up or options.trial.suffix.lower() != options.static.suffix.lower():
         return []
     mine, other = ({line.split(",")[0] for line in one.notes if " is up" in line} for one in (trial, static))
     if mine == other:
         return []
-    return [f"{options.trial} and {options.static} disagree: {', '.join(sorted(mine | other))}; --up says which"]
+    return [f"{options.trial} and {options.static} have different up axes: {', '.join(sorted(mine | other))}; set --up"]
 
 
 def _tell(told: Told, lines: list[str], report: Path | None) -> None:
-    """The first of many lines; all of them are in the report."""
+    """Show the first lines of many; the report has all of them."""
     for line in lines[:_MOST_LINES]:
         told.note(line)
     if len(lines) > _MOST_LINES:
         more = len(lines) - _MOST_LINES
-        told.note(f"{more} more lines: {f'see {report}' if report else '--report R.json writes them'}")
+        told.note(f"{more} more lines: {f'see {report}' if report else 'write them with --report R.json'}")
 
 
 def _run_folder(options, told: Told) -> None:
-    """All trials of a folder: NAME.bvh, NAME.report.json and, where a static has made one, NAME.model.json each, and
-    trials.json and report.html over all."""
+    """Reconstruct all trials of a folder.
+
+    Each gets NAME.bvh, NAME.report.json and, with a static trial, NAME.model.json; trials.json and report.html
+    summarize all.
+    """
     from ..markers.reconstruct_folder import reconstruct_folder, recordings_of
 
     for name in ("static", "report", "save_model"):
         if getattr(options, name):
-            raise InputError(f"--{name.replace('_', '-')}", "with a folder of trials", "one trial",
-                             "leave it out: statics are found, and each trial gets its own report")  # fmt: skip
+            raise InputError(f"--{name.replace('_', '-')}", "set with a folder of trials", "one trial",
+                             "remove it: static trials are detected, and each trial gets a report")  # fmt: skip
     if options.add_to and not options.add_to.is_dir():
-        raise InputError(options.add_to, "is not a folder", "a library's folder", "make the folder first")
-    recordings_of(options.trial)  # there are some
+        raise InputError(options.add_to, "is not a folder", "a library's folder", "create the folder first")
+    recordings_of(options.trial)  # raises InputError where there are none
     settings = settings_of(options)
     model = _read_chosen_model(options)
     _check_folder(options.out, options.trial)
@@ -130,21 +150,21 @@ def _run_folder(options, told: Told) -> None:
         print(rows[-1]["line"])
     _write_overview(rows, options, told)
     if not any(row["bvh"] for row in rows):
-        raise InputError(options.trial, "none of its trials could be made", "at least one", rows[0]["line"])
+        raise InputError(options.trial, "no trial could be reconstructed", "at least one", rows[0]["line"])
 
 
 def _check_folder(out: Path, trials: Path) -> None:
     if out.exists() and not out.is_dir():
-        raise InputError(out, "is a file", "a folder, as the trials are one", "choose another name")
+        raise InputError(out, "is a file", "a folder, because the input is one", "choose another name")
     if out.resolve() == trials.resolve():
-        raise InputError(out, "is the folder of the trials", "another one", "choose another folder")
+        raise InputError(out, "is the folder of the trials", "another folder", "choose another folder")
     if not out.exists():
         check_outputs(out)
         out.mkdir()
 
 
 def _kept(made, options) -> dict:
-    """Writes what became of one trial; its row of trials.json."""
+    """Write the files of one trial's result; return its row of trials.json."""
     from ..files.bvh import bvh
     from ..files.tables import write_report
     from ..markers.files.model_json import write_model
@@ -161,14 +181,14 @@ def _kept(made, options) -> dict:
     write_model(made.made.model, place.parent / f"{place.name}.model.json")
     try:
         notes = add_to_library(made.made, name.replace("/", "_"), options) if options.add_to else []
-    except InputError as error:  # of this clip alone
+    except InputError as error:  # concerns this clip only
         notes = [f"not added: {error}"]
     return {**row, "bvh": f"{name}.bvh", "report": f"{name}.report.json", "subject": made.made.model.subject,
             "line": "; ".join([f"{name}: {summary(made.made)}", *filter(None, [made.note]), *notes])}  # fmt: skip
 
 
 def _write_overview(rows, options, told: Told) -> None:
-    """trials.json, and report.html where matplotlib is there to draw it."""
+    """Write trials.json, and report.html if matplotlib is installed."""
     from ..evaluation.plots import require_matplotlib
     from ..files.tables import write_report
     from ..files.whole import atomic_write
@@ -184,7 +204,13 @@ def _write_overview(rows, options, told: Told) -> None:
 
 
 def settings_of(options):
-    """The recipe's settings."""
+    """Build the reconstruction settings from the command line.
+
+    Args:
+        options: the parsed command line.
+    Returns:
+        The `ReconstructSettings`.
+    """
     from ..markers.files.marker_set_text import chosen_set
     from ..markers.reconstruct import ReconstructSettings
 
@@ -195,7 +221,14 @@ def settings_of(options):
 
 
 def read_trial(path: Path, options):
-    """A recording, at the rate that was asked for."""
+    """Read a marker recording, at the frame rate of the command line if it sets one.
+
+    Args:
+        path: the file.
+        options: the parsed command line.
+    Returns:
+        The recording.
+    """
     from ..markers.files.marker_files import read_markers
 
     trial = read_markers(path, unit=options.unit, subject=options.subject, up=options.up)
@@ -203,14 +236,14 @@ def read_trial(path: Path, options):
 
 
 def _read_chosen_model(options):
-    """The model of `--model`, None without one."""
+    """Read the model of `--model`; None without one."""
     from ..markers.files.model_json import read_model
 
     return None if options.model is None else read_model(options.model)
 
 
 def _with_file(error: InputError, options) -> InputError:
-    """The same error, told with its file: trials know only the file's name."""
+    """Add the file's path to an error: trials know only the file's name."""
     for path in (options.trial, options.static):
         if path is not None and error.where == path.stem:
             return InputError(path, str(error).split(": ", 1)[1])
@@ -218,7 +251,13 @@ def _with_file(error: InputError, options) -> InputError:
 
 
 def as_take(made):
-    """The reconstruction as a take, for those who write takes: Blender's formats too."""
+    """Convert a reconstruction to a take, for the writers of takes (Blender's formats too).
+
+    Args:
+        result: the reconstruction.
+    Returns:
+        A `Take`.
+    """
     from ..motion.contacts import detect
 
     known = {} if made.release is None else {"ball": made.release.path}
@@ -229,7 +268,13 @@ def as_take(made):
 
 
 def summary(made) -> str:
-    """What came out, in a line."""
+    """Describe a reconstruction in one line.
+
+    Args:
+        result: the reconstruction.
+    Returns:
+        Frames, duration, markers and their mean distance.
+    """
     residual = made.solved.residual[np.isfinite(made.solved.residual)]
     near = f", markers {1000.0 * np.mean(residual):.1f} mm off" if len(residual) else ""
     return f"{len(made.motion)} frames, {made.motion.duration:.1f} s, {len(made.model.markers)} markers{near}"
@@ -240,7 +285,15 @@ def _is_throw(words) -> bool:
 
 
 def add_to_library(made, name: str, options) -> list[str]:
-    """The motion as a clip of a library, a throw's words at its release; notes for people."""
+    """Add the motion to a library as a clip; a throw's labels are placed at its release.
+
+    Args:
+        result: the reconstruction.
+        name: name of the clip.
+        options: the parsed command line.
+    Returns:
+        Notes for the user.
+    """
     from ..library.keep_words import add_clip
 
     key = None
@@ -250,9 +303,16 @@ def add_to_library(made, name: str, options) -> list[str]:
 
 
 def add_release(verbs):
-    verb = verbs.add_parser("release", help="when and how a ball left the hand of a recorded throw")
+    """Add the verb `release`.
+
+    Args:
+        verbs: the sub-parsers to add it to.
+    Returns:
+        The parser of this verb.
+    """
+    verb = verbs.add_parser("release", help="when and how a ball leaves the hand in a recorded throw")
     verb.add_argument("trial", type=Path, metavar="TRIAL", help="markers, .c3d or .trc")
-    verb.add_argument("--motion", type=Path, required=True, metavar="M.bvh", help="the motion made from this trial")
+    verb.add_argument("--motion", type=Path, required=True, metavar="M.bvh", help="the motion of this trial")
     verb.add_argument("--report", type=Path, required=True, metavar="R.json")
     add_options(verb, "release")
     verb.set_defaults(run=run_release)
@@ -260,7 +320,13 @@ def add_release(verbs):
 
 
 def run_release(options, told: Told, writers: Mapping[str, Writer]) -> None:
-    """`release`: finds the release and writes what was asked for."""
+    """Run `release`: find the ball's release and write the requested files.
+
+    Args:
+        options: the parsed command line.
+        reporter: progress, notes and cancellation.
+        writers: further output formats, by file suffix (Blender's).
+    """
     from ..files.bvh import bvh
     from ..files.tables import write_ball, write_report
     from ..markers.files.marker_files import read_markers

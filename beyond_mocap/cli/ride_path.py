@@ -1,5 +1,7 @@
-"""The verb `path`: a recording rides another path, and keeps clear of bodies that are already moving: it waits a little
-or goes round, as little as it takes."""
+"""The verb `path`: a recording follows another path and keeps its distance from bodies that already move.
+
+To keep the distance it waits or takes a detour, as little as possible.
+"""
 
 from __future__ import annotations
 
@@ -19,24 +21,37 @@ if TYPE_CHECKING:
     from ..path_editing.detour import Change, Follower
     from ..path_editing.ride import Ridden, RideSettings, RideSource
 
-_WHOLE = 0.95  # of a path, that is as good as all of it
-_ROUNDS = 3  # of looking for delays and detours
-_HIPS = 0.9  # metres that hips are above the ground, about: only whether bodies are on one floor depends on it
+_WHOLE = 0.95  # share of a path that counts as all of it
+_ROUNDS = 3  # searches for delays and detours at most
+_HIPS = 0.9  # metres, rough height of hips above the ground; only decides whether bodies are on one floor
 
 
 def add_path(verbs):
-    verb = verbs.add_parser("path", help="a recording rides another path")
+    """Add the verb `path`.
+
+    Args:
+        verbs: the sub-parsers to add it to.
+    Returns:
+        The parser of this verb.
+    """
+    verb = verbs.add_parser("path", help="move a recording onto another path")
     verb.add_argument("input", type=Path, metavar="IN.bvh")
     verb.add_argument("--path", type=Path, required=True, metavar="CURVE.csv", help="x_m,y_m[,z_m]: the new path")
     verb.add_argument("--out", type=Path, required=True, metavar="OUT.bvh")
-    # Blender's own Cycles add-on reads what stands behind `--` (batch.py) and ends Blender over `--cycle`: hence --loop
+    # Blender's Cycles add-on reads the arguments after `--` (batch.py) and quits over `--cycle`: hence the alias --loop
     add_options(verb, "path_editing")
     verb.set_defaults(run=run_path)
     return verb
 
 
 def run_path(options, told: Told, writers: Mapping[str, Writer]) -> None:
-    """`path`: rides it, and writes what was asked for about it."""
+    """Run `path`: move the recording onto the path and write the requested files.
+
+    Args:
+        options: the parsed command line.
+        reporter: progress, notes and cancellation.
+        writers: further output formats, by file suffix (Blender's).
+    """
     from ..files.bvh import bvh
 
     begun = time.perf_counter()
@@ -44,11 +59,11 @@ def run_path(options, told: Told, writers: Mapping[str, Writer]) -> None:
     check_outputs(options.out, options.report, options.provenance, never=inputs)
     write = writer_of(options.out, writers)
     if options.control_degree and not options.control_points:
-        raise InputError("--control-degree", "without --control-points", "both", "add --control-points")
+        raise InputError("--control-degree", "set without --control-points", "both", "add --control-points")
     if options.distance and not options.avoid:
-        raise InputError("--distance", "without --avoid", "both", "add --avoid OTHER.bvh")
+        raise InputError("--distance", "set without --avoid", "both", "add --avoid OTHER.bvh")
     if options.closed and options.control_points:
-        raise InputError("--closed", "with --control-points", "one of them", "a B-spline has two ends")
+        raise InputError("--closed", "set with --control-points", "one of them", "remove one: a B-spline is open")
     path, ground = _path(options), _ground(options)
     clip = bvh.read(options.input, options.unit)
     loaded = time.perf_counter()
@@ -71,23 +86,23 @@ def run_path(options, told: Told, writers: Mapping[str, Writer]) -> None:
         write(take, options.out)
     _write_tables(options, take, report)
     told.end((*notes, *asked, *ridden.warnings, *_left_over(source, ridden, path, options)))
-    gone = float(np.maximum(np.diff(ridden.arc), 0.0).sum())  # where it begins anew it is set back
+    gone = float(np.maximum(np.diff(ridden.arc), 0.0).sum())  # a repeated path starts again at 0
     print(f"{options.out}: {len(ridden.motion)} frames, {ridden.motion.duration:.1f} s, {gone:.1f} "
           f"m{_unit(clip, options)}")
 
 
 def _left_over(source, ridden, path, options) -> list[str]:
-    """A line where the motion ends long before the path."""
+    """Report where the motion ends long before the path."""
     from ..motion.path.arc_length import ArcLength
 
     gone, length = float(ridden.arc[-1]), ArcLength(path).length
     if options.cycle or options.end == "repeat" or source.still or gone >= _WHOLE * length:
         return []
-    return [f"the motion ends after {gone:.1f} of {length:.1f} m; --cycle goes on"]
+    return [f"the motion ends after {gone:.1f} of {length:.1f} m of the path; --cycle repeats it"]
 
 
 def _unit(clip, options) -> str:
-    """What is said of the output's unit where it is not the input's."""
+    """Describe the output's unit where it differs from the input's."""
     same = options.out.suffix.lower() != ".bvh" or np.isclose(clip.form.unit, 0.01)
     return "" if same else "; positions in centimetres (--unit 0.01)"
 
@@ -103,7 +118,7 @@ def _write_tables(options, take, report: dict | None) -> None:
 
 
 def _path(options):
-    """The new path."""
+    """Read the new path."""
     from ..path_editing import path_line
     from ..path_editing.path_line import read_curve
 
@@ -115,7 +130,7 @@ def _path(options):
 
 
 def _ground(options):
-    """The mesh that the feet stand on, None for the path's own height."""
+    """Read the ground mesh; None for the path's own height."""
     if options.ground is None:
         return None
     from ..files.obj import read_mesh
@@ -125,7 +140,7 @@ def _ground(options):
 
 
 def _prepared(motion, options):
-    """The recording taken off its own path, and the settings."""
+    """Separate the recording from its own path; return it with the settings."""
     from ..path_editing.ride import RideSettings, prepare
 
     settings = RideSettings(
@@ -136,7 +151,7 @@ def _prepared(motion, options):
 
 
 def _apart(source, path, settings, ground, options):
-    """The settings that keep it clear of other bodies, and what these ask of it, one line each."""
+    """Add delays and detours that avoid other bodies; return the settings and a line for each change."""
     if not options.avoid:
         return settings, ()
     from ..path_editing.collisions import DISTANCE
@@ -148,7 +163,7 @@ def _apart(source, path, settings, ground, options):
 
 
 def _ridden(source, path, settings, ground, options):
-    """What was ridden, and the same as a take."""
+    """Move the motion onto the path; return the result and the same as a take."""
     from ..path_editing.path_ride import carried
     from ..path_editing.ride import ride
 
@@ -163,7 +178,7 @@ def _ridden(source, path, settings, ground, options):
 
 
 def _report(source, ridden, take, path, ground) -> dict:
-    """The contract's report, and beside it how well the path was ridden."""
+    """Build the report: the common figures, and how well the motion follows the path."""
     from ..evaluation.report import evaluate, rounded
     from ..path_editing.path_ride import figures
 
@@ -179,7 +194,7 @@ def _report(source, ridden, take, path, ground) -> dict:
 
 
 def _read_others(paths: Sequence[Path]) -> list[Follower]:
-    """The bodies of other recordings, which stay where they are; second 0 is their first frame."""
+    """Read the other recordings as fixed bodies; second 0 is their first frame."""
     from ..files.bvh import bvh
     from ..path_editing.detour import Follower
 
@@ -193,11 +208,23 @@ def _read_others(paths: Sequence[Path]) -> list[Follower]:
 def _keep_clear(
     others: list[Follower], distance: float, source: RideSource, path, settings: RideSettings, ground, name: str
 ) -> tuple[RideSettings, tuple[str, ...]]:
-    """`settings` with the delay and the detours that keep the rider `distance` metres from `others`; what was asked of
-    it and what could not be resolved, one line each. name: of the rider, for the lines."""
+    """Search for the delay and detours that keep a body `distance` metres from others.
+
+    Args:
+        others: the bodies that stay as they are.
+        distance: metres between two bodies' centres at least.
+        source: the recording, separated from its path.
+        path: the new path.
+        settings: the settings to start from.
+        ground: the ground mesh, or None.
+        name: name of the body, for the lines.
+    Returns:
+        The new settings, and one line for each change and for each collision that remains.
+    """
     from ..path_editing.apart import Limits, resolved
     from ..path_editing.ride import ride
 
+    # Search with unplanted feet, which is faster and moves the root the same way.
     bare, limits = ride(source, path, replace(settings, plant=False), ground), Limits(distance)
     me = replace(_build_follower(name, bare), path=path, arc=bare.arc, by_arc=settings.by_arc_length)
     for _ in range(_ROUNDS):
@@ -221,13 +248,13 @@ def _build_follower(name: str, ridden: Ridden) -> Follower:
 
 
 def _apply_change(settings: RideSettings, change: Change, fps: float) -> RideSettings:
-    """The settings with a change; riders wait for whole frames."""
+    """Apply a change to the settings; bodies wait for whole frames."""
     waits = float(np.ceil(round(change.delay * fps, 3)) / fps)
     return replace(settings, delay=settings.delay + waits, detours=change.detours)
 
 
 def _find_collisions(followers: list[Follower], distance: float) -> list:
-    """The collisions of the first body with the others."""
+    """Find the collisions of the first body with the others."""
     from ..path_editing.collisions import collisions
 
     times = np.unique(np.concatenate([follower.times for follower in followers]))

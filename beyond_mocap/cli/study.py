@@ -1,4 +1,4 @@
-"""The verb `study`: how natural motions look to people; orders, forms and the analysis of what comes back."""
+"""The verb `study`: prepare, run and analyse a rating study of how natural motions look."""
 
 from __future__ import annotations
 
@@ -14,18 +14,25 @@ from ..base.settings.options import add_options
 from .outputs import Told, Writer, add_own_verbs, check_outputs
 
 CLIPS, FORMS, ANSWERS = "clips", "forms", "answers"
-"""Folders of a study."""
+"""Folders inside a study's folder."""
 _MOVIE = ".mp4"
-_EMBED_MOST = 200_000_000  # bytes of all clips in one form
+_EMBED_MOST = 200_000_000  # bytes of all clips in one form at most
 
 
 def add_study(verbs):
-    verb = verbs.add_parser("study", help="how natural motions look to people: order, form, analyse")
+    """Add the verb `study`.
+
+    Args:
+        verbs: the sub-parsers to add it to.
+    Returns:
+        The parser of this verb.
+    """
+    verb = verbs.add_parser("study", help="how natural motions look to raters: order, form, analyse")
     return add_own_verbs(verb, "study_verb", _add_order, _add_form, _add_analyse)
 
 
 def _add_order(verbs):
-    verb = verbs.add_parser("order", help="neutral names for clips, and an order for each rater")
+    verb = verbs.add_parser("order", help="give clips neutral names and each rater an order")
     verb.add_argument("clips", type=Path, metavar="CLIPS.csv", help="file,system,scenario; two are 'training'")
     add_options(verb, "study.order")
     verb.set_defaults(run=run_order)
@@ -33,26 +40,32 @@ def _add_order(verbs):
 
 
 def _add_form(verbs):
-    verb = verbs.add_parser("form", help="a page, and a table, for each rater")
-    verb.add_argument("study", type=Path, metavar="FOLDER", help="what study order wrote")
+    verb = verbs.add_parser("form", help="write a page and a table for each rater")
+    verb.add_argument("study", type=Path, metavar="FOLDER", help="folder written by study order")
     add_options(verb, "study.form")
     verb.set_defaults(run=run_form)
     return verb
 
 
 def _add_analyse(verbs):
-    verb = verbs.add_parser("analyse", help="one-sided tests, effect sizes and pictures of the answers")
+    verb = verbs.add_parser("analyse", help="test the answers: one-sided tests, effect sizes")
     verb.add_argument("study", type=Path, metavar="FOLDER")
     verb.add_argument("--answers", type=Path, nargs="+", metavar="FILE", help="files or folders; else FOLDER/answers")
     add_options(verb, "study.analyse")
     verb.add_argument("--report", type=Path, required=True, metavar="R.json")
-    verb.add_argument("--html", type=Path, metavar="R.html", help="a page with pictures; needs matplotlib")
+    verb.add_argument("--html", type=Path, metavar="R.html", help="a page with plots; needs matplotlib")
     verb.set_defaults(run=run_analyse)
     return verb
 
 
 def run_order(options, told: Told, writers: Mapping[str, Writer]) -> None:
-    """`study order`: writes study.json and, if asked, the movies under neutral names; motions are to be rendered."""
+    """Run `study order`: write study.json and, if requested, copy the movies under neutral names.
+
+    Args:
+        options: the parsed command line.
+        reporter: progress, notes and cancellation.
+        writers: further output formats, by file suffix (Blender's).
+    """
     from ..files.whole import whole_folder
     from ..study.form import MOVIES
     from ..study.order import ordered, read_clips, write_study
@@ -76,14 +89,14 @@ def run_order(options, told: Told, writers: Mapping[str, Writer]) -> None:
             told.progress(number / len(movies), clip.name)
     told.end()
     if options.copy and len(movies) < len(study.clips):
-        told.note(f"{len(study.clips) - len(movies)} of {len(study.clips)} clips are no movies and are to be rendered")
+        told.note(f"{len(study.clips) - len(movies)} of {len(study.clips)} clips are not movies; render them")
     shown = len(next(iter(study.orders.values())))
     print(f"{options.out}: study {study.id}, {len(study.clips)} clips of {len(study.systems)} systems, "
           f"{len(study.orders)} raters with {shown} pages each")  # fmt: skip
 
 
 def _from(folder: Path, path: Path) -> str:
-    """A path as it is called from a folder that need not be there yet, so that both can be moved together."""
+    """Build the relative path from a folder that need not exist yet, so that both can be moved together."""
     try:
         return Path(os.path.relpath(path.resolve(), folder.resolve())).as_posix()
     except ValueError:  # on another drive
@@ -91,15 +104,21 @@ def _from(folder: Path, path: Path) -> str:
 
 
 def _copy(source: Path, target: Path) -> None:
-    """One movie, under its neutral name; neither time nor name of the file are kept."""
+    """Copy one movie under its neutral name, without its time stamps and original name."""
     source = source.resolve()
     if not source.is_file():
-        raise InputError(source, "no such file", "a movie", "correct the table, or leave --copy out")
+        raise InputError(source, "no such file", "a movie", "correct the table, or remove --copy")
     shutil.copyfile(source, target.with_suffix(source.suffix.lower()))
 
 
 def run_form(options, told: Told, writers: Mapping[str, Writer]) -> None:
-    """`study form`: a page and a table for each rater in FOLDER/forms."""
+    """Run `study form`: write a page and a table for each rater to FOLDER/forms.
+
+    Args:
+        options: the parsed command line.
+        reporter: progress, notes and cancellation.
+        writers: further output formats, by file suffix (Blender's).
+    """
     from ..files.whole import atomic_write
     from ..study.form import clip_source, form_page, form_table
     from ..study.order import read_study
@@ -121,25 +140,31 @@ def run_form(options, told: Told, writers: Mapping[str, Writer]) -> None:
         told.progress(number / len(study.orders), rater)
     told.end()
     if absent:
-        missing = f"{len(absent)} of {len(found)} clips are not there yet, such as {absent[0]}{_MOVIE}"
+        missing = f"{len(absent)} of {len(found)} clips are missing, such as {absent[0]}{_MOVIE}"
         told.note(f"{options.study / CLIPS}: {missing}")
     print(f"{options.study / FORMS}: {len(study.orders)} forms")
 
 
 def _embedded(folder: Path, found: Mapping[str, Path]) -> dict[str, str]:
-    """Data addresses of all clips."""
+    """Build the data URLs of all clips."""
     from ..evaluation.html_page import build_data_address
 
     size = sum(path.stat().st_size for path in found.values())
     if size > _EMBED_MOST:
         what = f"{size / 1e6:.0f} MB of movies"
-        raise InputError(folder / CLIPS, what, f"{_EMBED_MOST / 1e6:.0f} MB at most in a page", "leave --embed out")
+        raise InputError(folder / CLIPS, what, f"{_EMBED_MOST / 1e6:.0f} MB at most in a page", "remove --embed")
     kinds = {name: mimetypes.guess_type(path.name)[0] or "video/mp4" for name, path in found.items()}
     return {name: build_data_address(path.read_bytes(), kinds[name]) for name, path in found.items()}
 
 
 def run_analyse(options, told: Told, writers: Mapping[str, Writer]) -> None:
-    """`study analyse`: the report, and its page."""
+    """Run `study analyse`: write the report and, if requested, its page.
+
+    Args:
+        options: the parsed command line.
+        reporter: progress, notes and cancellation.
+        writers: further output formats, by file suffix (Blender's).
+    """
     from ..files.tables import write_report
     from ..files.whole import atomic_write
     from ..study.analysis import analysed
@@ -157,5 +182,5 @@ def run_analyse(options, told: Told, writers: Mapping[str, Writer]) -> None:
         atomic_write(options.html, page)
     told.end(found.notes)
     for one in found.findings:
-        said = "more natural" if one.better else "not shown to be more natural"
+        said = "more natural" if one.better else "not significantly more natural"
         print(f"{one.new} over {one.old}: {said}, difference {one.mean:+.2f}, one-sided {p_text(one.holm_p)}")

@@ -1,4 +1,4 @@
-"""The verbs `synthesize` and `evaluate`: one player's motion, and every figure of one."""
+"""The verbs `synthesize` and `evaluate`: synthesize one player's motion, and evaluate a motion."""
 
 from __future__ import annotations
 
@@ -14,7 +14,14 @@ from .outputs import Told, Writer, add_take_files, check_outputs, writer_of
 
 
 def add_synthesize(verbs) -> argparse.ArgumentParser:
-    verb = verbs.add_parser("synthesize", help="one player's motion from a track, annotations and a library")
+    """Add the verb `synthesize`.
+
+    Args:
+        verbs: the sub-parsers to add it to.
+    Returns:
+        The parser of this verb.
+    """
+    verb = verbs.add_parser("synthesize", help="synthesize a player's motion from track, annotations and library")
     verb.add_argument("--library", type=Path, required=True)
     verb.add_argument("--track", type=Path, required=True, metavar="T.csv")
     verb.add_argument("--annotations", type=Path, required=True, metavar="A.txt")
@@ -22,7 +29,7 @@ def add_synthesize(verbs) -> argparse.ArgumentParser:
     add_take_files(verb)
     verb.add_argument("--report", type=Path, metavar="R.json")
     add_options(verb, "synthesis")
-    verb.add_argument("--pins", type=Path, metavar="P.csv", help="where hands, feet and gaze have to be, and when")
+    verb.add_argument("--pins", type=Path, metavar="P.csv", help="targets of hands, feet and gaze with times")
     add_options(verb, "player")
     add_options(verb, "library")
     verb.set_defaults(run=run_synthesize)
@@ -30,7 +37,13 @@ def add_synthesize(verbs) -> argparse.ArgumentParser:
 
 
 def run_synthesize(options, told: Told, writers: Mapping[str, Writer]) -> None:
-    """`synthesize`: one player, and what was asked to be written about it."""
+    """Run `synthesize`: synthesize one player's motion and write the requested files.
+
+    Args:
+        options: the parsed command line.
+        reporter: progress, notes and cancellation.
+        writers: further output formats, by file suffix (Blender's).
+    """
     from ..annotation import read_timeline, validate
     from ..files.tables import write_ball, write_report
     from ..files.tracking.tracking import read_track_csv
@@ -73,18 +86,25 @@ def run_synthesize(options, told: Told, writers: Mapping[str, Writer]) -> None:
         write_report(options.report, report)
     told.end()
     if library.notes:
-        notes = f"{len(library.notes)} notes on how its recordings were read and mended"
+        notes = f"{len(library.notes)} notes on how its recordings were read and repaired"
         told.note(f"{options.library}: {notes}; the command 'library' prints them")
     of_take = [line for line in take.warnings if line not in library.notes]
     for line in (*of_take, *(f"{options.track}: {line}" for line in data.lines)):
         told.note(line)
     if options.ball and take.ball is None:
-        told.note(f"{options.track} has no ball, so {options.ball} was not written")
+        told.note(f"{options.track} has no ball, so {options.ball} is not written")
     print(f"{options.out}: {len(take.motion)} frames, {take.motion.duration:.1f} s")
 
 
 def add_evaluate(verbs) -> argparse.ArgumentParser:
-    verb = verbs.add_parser("evaluate", help="every figure of a motion")
+    """Add the verb `evaluate`.
+
+    Args:
+        verbs: the sub-parsers to add it to.
+    Returns:
+        The parser of this verb.
+    """
+    verb = verbs.add_parser("evaluate", help="measure a motion")
     verb.add_argument("motion", type=Path, metavar="M.bvh")
     verb.add_argument("--track", type=Path, metavar="T.csv")
     verb.add_argument("--annotations", type=Path, metavar="A.txt")
@@ -92,13 +112,21 @@ def add_evaluate(verbs) -> argparse.ArgumentParser:
     verb.add_argument("--library", type=Path)
     add_options(verb, "library")
     verb.add_argument("--report", type=Path, required=True, metavar="R.json")
-    verb.add_argument("--html", type=Path, metavar="R.html", help="a page with pictures; needs matplotlib")
+    verb.add_argument("--html", type=Path, metavar="R.html", help="a page with plots; needs matplotlib")
     verb.set_defaults(run=run_evaluate)
     return verb
 
 
 def run_evaluate(options, told: Told, writers: Mapping[str, Writer]) -> None:
-    """`evaluate`: the report of a motion that was written before. `--unit` is the library's where there is one."""
+    """Run `evaluate`: report on a motion that was written before.
+
+    If there is a library, `--unit` applies to its recordings.
+
+    Args:
+        options: the parsed command line.
+        reporter: progress, notes and cancellation.
+        writers: further output formats, by file suffix (Blender's).
+    """
     from ..annotation import read_timeline, validate
     from ..evaluation.html import html_report
     from ..evaluation.plots import require_matplotlib
@@ -123,7 +151,7 @@ def run_evaluate(options, told: Told, writers: Mapping[str, Writer]) -> None:
     ball = read_ball(options.ball) if options.ball else None
     played = played_from_tables(motion, provenance, ball, start, str(options.provenance))
     library = open_library(options, told) if options.library else None
-    if timeline is not None and track is not None and library is not None:  # else some words or times are not known
+    if timeline is not None and track is not None and library is not None:  # otherwise some labels or times are unknown
         validate(timeline, library.words, start, float(track.times[-1]), str(options.annotations))
     report = evaluate_played(played, track=track, timeline=timeline, library=library)
     write_report(options.report, report)
@@ -134,14 +162,14 @@ def run_evaluate(options, told: Told, writers: Mapping[str, Writer]) -> None:
     if library is not None and (strangers := _strangers(played.clips, library)):
         first, count = strangers[0], len(strangers)
         told.note(
-            f"{options.provenance}: {count} clips, such as {first}, are not in {options.library}: nothing to compare "
-            "with"
+            f"{options.provenance}: {count} clips, such as {first}, are not in {options.library} and cannot be "
+            "compared"
         )
     print(options.report)
 
 
 def _strangers(clips: tuple[str, ...], library) -> list[str]:
-    """Those paths of a provenance that are neither recordings of the library nor made beside its cache."""
+    """Find the clips of a provenance table that are neither in the library nor in its cache folder."""
     from ..library.scan import CACHE_FOLDER
 
     own = {clip.path for clip in library.clips}

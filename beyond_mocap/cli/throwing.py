@@ -1,5 +1,4 @@
-"""The verb `throw`: throws and kicks from trained networks. Its own verbs: train, synthesize,
-evaluate, examples."""
+"""The verb `throw`: throws and kicks from trained networks, with the verbs train, synthesize, evaluate and examples."""
 
 from __future__ import annotations
 
@@ -23,13 +22,20 @@ if TYPE_CHECKING:
 
 
 def add_throw(verbs):
+    """Add the verb `throw`.
+
+    Args:
+        verbs: the sub-parsers to add it to.
+    Returns:
+        The parser of this verb.
+    """
     verb = verbs.add_parser("throw", help="throws and kicks from networks: train, synthesize, evaluate, examples")
     return add_own_verbs(verb, "throw_verb", *(_add_train, _add_synthesize, _add_evaluate, _add_examples))
 
 
 def _add_train(verbs):
     verb = verbs.add_parser("train", help="train networks on a folder of BVH and annotations (see make training)")
-    verb.add_argument("folder", type=Path, metavar="FOLDER", help="recordings, annotations and, if any, throws.csv")
+    verb.add_argument("folder", type=Path, metavar="FOLDER", help="recordings, annotations and optionally throws.csv")
     verb.add_argument("--out", type=Path, required=True, metavar="W.npz", help="the trained model")
     add_options(verb, "throw.train")
     verb.set_defaults(run=run_train)
@@ -37,10 +43,16 @@ def _add_train(verbs):
 
 
 def run_train(options, told: Told, writers: Mapping[str, Writer]) -> None:
-    """`throw train`: trains and writes the model."""
+    """Run `throw train`: train a model and write it.
+
+    Args:
+        options: the parsed command line.
+        reporter: progress, notes and cancellation.
+        writers: further output formats, by file suffix (Blender's).
+    """
     check_outputs(options.out, never=(options.config, options.skeleton))
     if options.out.suffix.lower() != ".npz":
-        raise InputError(options.out, "no file of weights", "a name ending in .npz", "choose another ending")
+        raise InputError(options.out, "not a weights file", "a name ending in .npz", "choose another file type")
     _require_training()
     from training.train import train_folder
 
@@ -48,10 +60,10 @@ def run_train(options, told: Told, writers: Mapping[str, Writer]) -> None:
 
 
 def _require_training() -> None:
-    """InputError, one line, where jax, optax or the project's `training` folder is missing: in Blender, say."""
+    """Raise InputError if jax, optax or the project's `training` folder is missing, for example in Blender."""
     core = __name__.partition(".cli.")[0]
     try:
-        if core != "beyond_mocap":  # inside Blender the core has another name, and training knows it by this one
+        if core != "beyond_mocap":  # inside Blender the core has another name, but training imports it by this one
             raise ImportError
         import jax  # noqa: F401
         import optax  # noqa: F401
@@ -59,7 +71,7 @@ def _require_training() -> None:
         import training  # noqa: F401
     except ImportError:
         raise InputError(
-            "throw train", "this Python has no training", "jax and optax, and the project's folder",
+            "throw train", "this Python cannot train", "jax, optax and the project's folder",
             "in the project's folder run 'make training', then .venv-training/bin/python -m beyond_mocap throw train "
             "...",
         ) from None
@@ -69,23 +81,29 @@ def _add_synthesize(verbs):
     verb = verbs.add_parser("synthesize", help="a throw or kick that hits a target")
     verb.add_argument("--target", type=_point, required=True, metavar="X,Y,Z", help="metres, Z up")
     verb.add_argument("--out", type=Path, required=True, metavar="OUT.bvh")
-    verb.add_argument("--model", type=Path, metavar="W.npz", help="default: the weights that come with the project")
+    verb.add_argument("--model", type=Path, metavar="W.npz", help="default: the weights supplied with the project")
     add_options(verb, "throw")
     place = verb.add_mutually_exclusive_group()
-    place.add_argument("--start", type=_place, metavar="X,Y", help="where the hips are in the first frame; default 0,0")
-    place.add_argument("--over", type=_place, metavar="X,Y", help="where the hips are at the release")
-    place.add_argument("--ball-place", type=_place, metavar="X,Y", help="where the ball lies that is kicked")
+    place.add_argument("--start", type=_place, metavar="X,Y", help="hips in the first frame; default 0,0")
+    place.add_argument("--over", type=_place, metavar="X,Y", help="position of the hips at the release")
+    place.add_argument("--ball-place", type=_place, metavar="X,Y", help="position of the ball that is kicked")
     add_options(verb, "throw.ball")
-    verb.add_argument("--library", type=Path, metavar="L", help="with --track: run-up and recovery from it")
+    verb.add_argument("--library", type=Path, metavar="L", help="with --track: source of run-up and recovery")
     verb.add_argument("--track", type=Path, metavar="T.csv", help="the player's track; the throw is on it at --time")
-    verb.add_argument("--annotations", type=Path, metavar="A.txt", help="what else the player does on the track")
+    verb.add_argument("--annotations", type=Path, metavar="A.txt", help="the player's other actions on the track")
     add_options(verb, "library", "cache", "unit")
     verb.set_defaults(run=run_synthesize)
     return verb
 
 
 def run_synthesize(options, told: Told, writers: Mapping[str, Writer]) -> None:
-    """`throw synthesize`: makes it and writes what was asked for."""
+    """Run `throw synthesize`: synthesize a throw or kick and write the requested files.
+
+    Args:
+        options: the parsed command line.
+        reporter: progress, notes and cancellation.
+        writers: further output formats, by file suffix (Blender's).
+    """
     from ..files.tables import write_ball, write_report
     from ..throws.throw import throw_at
 
@@ -93,11 +111,11 @@ def run_synthesize(options, told: Told, writers: Mapping[str, Writer]) -> None:
     inputs = (options.model, options.skeleton, options.track, options.annotations)
     check_outputs(options.out, options.ball, options.report, never=inputs)
     write = writer_of(options.out, writers)
-    for one, other, why in (("library", "track", "a player's way"), ("track", "library", "a folder of recordings"),
-                            ("annotations", "track", "a player's way"),
-                            ("track", "time", "the second at which the ball leaves")):  # fmt: skip
+    for one, other, why in (("library", "track", "a player's track"), ("track", "library", "a folder of recordings"),
+                            ("annotations", "track", "a player's track"),
+                            ("track", "time", "the time of the ball's release")):  # fmt: skip
         if getattr(options, one) and getattr(options, other) is None:
-            raise InputError(f"--{one}", f"without --{other}", why, f"add --{other}")
+            raise InputError(f"--{one}", f"set without --{other}", why, f"add --{other}")
     model = _read_chosen_model(options)
     player = _Player.of(options, model, told) if options.library else None
     skeleton, form = _skeleton(options, player)
@@ -132,7 +150,7 @@ def run_synthesize(options, told: Told, writers: Mapping[str, Writer]) -> None:
 
 
 def _point(text: str, count: int = 3) -> tuple[float, ...]:
-    """Numbers with commas between."""
+    """Parse numbers separated by commas, in metres."""
     try:
         values = tuple(float(part) for part in text.split(","))
     except ValueError:
@@ -147,7 +165,7 @@ def _place(text: str) -> tuple[float, ...]:
 
 
 def _read_chosen_model(options):
-    """The model asked for; without one that of the limb's action which comes with the project."""
+    """Read the model of the command line; without one, the supplied model for the limb's action."""
     if options.model is None:
         from ..throws.network_npz import shipped_model
 
@@ -159,7 +177,7 @@ def _read_chosen_model(options):
 
 
 def _skeleton(options, player):
-    """Whose bones throw, and the form of their file; None for the model's own."""
+    """Read the skeleton and the form of its file; (None, None) for the model's own."""
     if options.skeleton is None:
         return (player.library.skeleton if player else None), None
     from ..files.bvh import bvh
@@ -172,6 +190,7 @@ def _skeleton(options, player):
 
 
 def _order(options, player):
+    """Build the request of the throw from the command line."""
     from ..throws.throw import Order
 
     over = options.over
@@ -186,7 +205,14 @@ def _order(options, player):
 
 @dataclass(frozen=True, eq=False)
 class _Player:
-    """A player on a track, in whose motion the throw is one moment, at second `at`."""
+    """A player on a track whose motion includes the throw.
+
+    Attributes:
+        library: the library for run-up and recovery.
+        plan: track, annotations and settings.
+        action: "throw" or "kick".
+        time: seconds on the track's clock at which the ball leaves.
+    """
 
     library: Library
     plan: Plan
@@ -195,7 +221,7 @@ class _Player:
 
     @classmethod
     def of(cls, options, model, told: Told) -> _Player:
-        """Library, track and annotations read."""
+        """Read library, track and annotations of the command line."""
         from ..annotation import Timeline, read_timeline
         from ..files.tracking.tracking import read_track_csv
         from ..library.build import build
@@ -216,12 +242,12 @@ class _Player:
         return cls(library, plan, model.settings.action, options.time)
 
     def place(self, at: float) -> tuple[float, ...]:
-        """(2,) m: where the track is at that second."""
+        """Find the track's position (2,) m at a time."""
         track = self.plan.sampled(self.plan.fps)
         return tuple(float(np.interp(at, track.times, column)) for column in track.positions.T)
 
     def joined(self, thrown, told: Told):
-        """The throw within the player's motion, and lines for people."""
+        """Insert the throw into the player's motion; return it with lines for the user."""
         from ..throws.join_throw import join_throw, trim_waiting
         from ..throws.run_up import EDGE, construct_run_up
         from ..throws.throw_order import within
@@ -237,8 +263,8 @@ class _Player:
 
 
 def _add_evaluate(verbs):
-    verb = verbs.add_parser("evaluate", help="how good trained networks are on recorded throws or kicks")
-    verb.add_argument("--model", type=Path, required=True, metavar="W.npz", help="what throw train wrote")
+    verb = verbs.add_parser("evaluate", help="measure trained networks on recorded throws or kicks")
+    verb.add_argument("--model", type=Path, required=True, metavar="W.npz", help="the trained model")
     verb.add_argument("--examples", type=Path, required=True, metavar="FOLDER", help="recordings with annotations")
     add_options(verb, "throw.evaluate")
     verb.set_defaults(run=run_evaluate)
@@ -246,7 +272,13 @@ def _add_evaluate(verbs):
 
 
 def run_evaluate(options, told: Told, writers: Mapping[str, Writer]) -> None:
-    """`throw evaluate`: generates every example anew and writes how far off it is."""
+    """Run `throw evaluate`: regenerate every example and measure its errors.
+
+    Args:
+        options: the parsed command line.
+        reporter: progress, notes and cancellation.
+        writers: further output formats, by file suffix (Blender's).
+    """
     from ..files.tables import write_report
     from ..files.whole import atomic_write
     from ..throws.evaluate_throws import FULL, RAW, evaluate_throws, some_of_each
@@ -279,20 +311,23 @@ def run_evaluate(options, told: Told, writers: Mapping[str, Writer]) -> None:
 
 
 def _read_examples(folder: Path, model, told: Told) -> list:
-    """The folder's examples: those on bones of the model's names as they are, else all brought to its skeleton, because
-    hands that rest otherwise turn otherwise."""
+    """Read the examples of a folder.
+
+    Examples on the model's joint names stay as they are; otherwise all are retargeted to the model's skeleton, because
+    hands with another rest pose rotate differently.
+    """
     from ..throws.throw_examples import examples_in
 
     settings = model.settings
     found = examples_in(folder, settings.action, settings.fps, told=told.note, cancelled=told.cancelled)
     if all(example.motion.skeleton.names == model.skeleton.names for example in found):
         return found
-    told.note(f"{folder}: other skeletons than the model's; brought to its own")
+    told.note(f"{folder}: skeletons differ from the model's; motions are retargeted to it")
     return examples_in(folder, settings.action, settings.fps, model.skeleton, cancelled=told.cancelled)
 
 
 def _choose_subjects(examples, wanted: list[str], folder: Path):
-    """The examples of the wanted subjects, all without any. InputError for one that nobody is."""
+    """Select the examples of some subjects, all without any name; InputError for an unknown subject."""
     there = sorted({example.subject for example in examples})
     for name in wanted:
         if name not in there:
@@ -301,15 +336,21 @@ def _choose_subjects(examples, wanted: list[str], folder: Path):
 
 
 def _add_examples(verbs):
-    verb = verbs.add_parser("examples", help="make throws or kicks with known targets, to train on and to test with")
-    verb.add_argument("--out", type=Path, required=True, metavar="FOLDER", help="a new or an empty folder")
+    verb = verbs.add_parser("examples", help="write synthetic throws or kicks with known targets to train and test")
+    verb.add_argument("--out", type=Path, required=True, metavar="FOLDER", help="a new or empty folder")
     add_options(verb, "throw.examples")
     verb.set_defaults(run=run_examples)
     return verb
 
 
 def run_examples(options, told: Told, writers: Mapping[str, Writer]) -> None:
-    """`throw examples`: makes them and writes them."""
+    """Run `throw examples`: write synthetic throws or kicks with known targets.
+
+    Args:
+        options: the parsed command line.
+        reporter: progress, notes and cancellation.
+        writers: further output formats, by file suffix (Blender's).
+    """
     from ..throws.planted_examples import write_planted
     from ..throws.throw_examples import TABLE_NAME
 

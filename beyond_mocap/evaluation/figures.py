@@ -1,8 +1,8 @@
-"""The report's groups of figures, each a dict of its own, NaN or None where nothing is known.
+"""The report's groups of figures, each a dict, NaN or None where a value is unknown.
 
-How well the words were met is Faustino's annotation similarity (§3.2.2 eq. 18), as printed and over the asked words
-only. Words are sets per frame; sides are those after mirroring. A frame whose asked words are None (transition, or
-nothing known to be asked) is left out.
+How well the motion matches the requested labels is Faustino's annotation similarity (§3.2.2 eq. 18), as printed and
+over the requested labels only. Labels are sets per frame; sides are those after mirroring. Frames without requested
+labels (a transition, or unknown) are left out.
 """
 
 from __future__ import annotations
@@ -27,7 +27,13 @@ from .reference import View, source_poses
 
 
 def place(view: View) -> dict:
-    """Root and pelvis error, surge, speed coverage."""
+    """Measure root and pelvis error, surge and speed coverage.
+
+    Args:
+        view: the take beside its library and track.
+    Returns:
+        The report's groups.
+    """
     pelvis, fps = view.played.pelvis, view.fps
     own = _mean(view.own("sway"))
     out = {"root_error_m": dict.fromkeys(("mean", "p95", "max")),
@@ -45,8 +51,10 @@ def place(view: View) -> dict:
 
 
 def _surge(view: View) -> dict:
-    """Surge against the rms of the used recordings at the same speed; `track` is what the track itself asks for, behind
-    the window behind which the root is held to it."""
+    """Measure surge against the rms of the used recordings at the same speed.
+
+    The key `track` is the surge of the track itself, smoothed with the window within which the root must follow it.
+    """
     ours = movement.surge(view.played.pelvis, view.fps)
     own = movement.class_rms(view.own("surge"), movement.speed_class(view.own("speed")))
     rms, real = _rms(ours), _rms(own[movement.speed_class(view.speed)])
@@ -57,11 +65,18 @@ def _surge(view: View) -> dict:
 
 
 def keys(view: View) -> list[dict]:
-    """One group for each key moment."""
+    """Measure each key moment.
+
+    Args:
+        view: the take beside its library and track.
+    Returns:
+        One group for each key moment.
+    """
     return [_key(view, moment) for moment in view.moments]
 
 
 def _key(view: View, moment: Moment) -> dict:
+    """Measure one key moment: times, errors of position, contact gap, and the clip used."""
     played, time = view.played, moment.asked.in_force
     place: dict[str, float | None] = {"position_error_m": None, "pelvis_error_m": None, "ball_shift_m": None}
     met_at, met_gap = met(played, moment)
@@ -81,7 +96,13 @@ def _key(view: View, moment: Moment) -> dict:
 
 
 def skate_and_ground(view: View) -> dict:
-    """Skate in all its forms and the ground."""
+    """Measure foot slide in all its forms, and the feet's height above the ground.
+
+    Args:
+        view: the take beside its library and track.
+    Returns:
+        The report's groups.
+    """
     played, fps = view.played, view.fps
     planted = played.feet
     travel = movement.stance_travel(planted[:, :, 1], movement.stances(played.contacts))
@@ -109,7 +130,14 @@ def skate_and_ground(view: View) -> dict:
 
 
 def polish(view: View, ik_miss: np.ndarray | None) -> dict:
-    """What polish did to the laid-out clips: foot correction, missed targets, pelvis drop, changed bones."""
+    """Measure what polishing changed: foot correction, missed targets, pelvis drop, bone lengths.
+
+    Args:
+        view: the take beside its library and track.
+        ik_miss: (T,) or (T, 2) m by which inverse kinematics missed its targets, or None.
+    Returns:
+        The report's groups.
+    """
     played = view.played
     shift, drop = _against_source(view)
     if played.correction is not None:
@@ -123,8 +151,11 @@ def polish(view: View, ik_miss: np.ndarray | None) -> dict:
 
 
 def _against_source(view: View) -> tuple[np.ndarray, float]:
-    """Planted feet's distance (N,) m from the source pose set at the output's pelvis and heading, and how far the
-    pelvis sinks below the source's at most, m; away from seams, where two clips are mixed."""
+    """Compare planted feet and pelvis with the source poses, away from transitions, where two clips are blended.
+
+    Returns the distance (N,) m of planted feet from the source pose placed at the output's pelvis and heading, and the
+    largest drop of the pelvis below the source's, m.
+    """
     if view.library is None or not len(view.used):
         return np.zeros(0), math.nan
     played, hips = view.played, view.played.body.hips
@@ -140,14 +171,20 @@ def _against_source(view: View) -> tuple[np.ndarray, float]:
 
 
 def _bone_change(view: View) -> float:
-    """Largest difference of any bone's length in any frame from the library's skeleton, m."""
+    """Measure the largest difference of a bone's length in any frame from the library's skeleton, m."""
     skeleton, positions = view.library.skeleton, view.played.positions
     bones = np.linalg.norm(positions[:, 1:] - positions[:, list(skeleton.parents[1:])], axis=-1)
     return float(np.max(np.abs(bones - view.size * np.linalg.norm(skeleton.offsets[1:], axis=-1)), initial=0.0))
 
 
 def seams_and_loops(view: View) -> dict:
-    """Seams, the rest of the frames, warp and loops."""
+    """Measure transitions, the other frames, playback rate and loops.
+
+    Args:
+        view: the take beside its library and track.
+    Returns:
+        The report's groups.
+    """
     out = {"seam_jerk_ratio": dict.fromkeys(("median", "p95", "max", "share_above_real"))}
     if view.reference is not None:
         values = movement.jerk(view.played.positions, view.fps)
@@ -167,7 +204,13 @@ def seams_and_loops(view: View) -> dict:
 
 
 def poses(view: View) -> dict:
-    """Pose realism and smoothness."""
+    """Measure pose realism and smoothness.
+
+    Args:
+        view: the take beside its library and track.
+    Returns:
+        The report's groups.
+    """
     played = view.played
     features = realism.pose_features(played.motion.skeleton, played.positions, view.fps, played.body.hips)
     curve = realism.smoothness(played.motion.skeleton, played.positions, view.fps)
@@ -183,8 +226,16 @@ def poses(view: View) -> dict:
 def asked_words(
     timeline: Timeline, times: np.ndarray, moments: Sequence[Moment] = ()
 ) -> list[frozenset[str] | None]:
-    """Words asked for at each of `times` (T,) s; None where nothing counts: transitions, the entry and exit of each key
-    moment's clip (Faustino §3.2.2), and automatic locomotion that was not filled in."""
+    """List the requested labels at each time.
+
+    Args:
+        timeline: the timeline.
+        times: (T,) seconds on the track's clock.
+        moments: the key moments with the first and last frame of their clips.
+    Returns:
+        For each time the labels, None where none count: in transitions, at the entry and exit of each key moment's clip
+        (Faustino §3.2.2), and where automatic locomotion is not filled in.
+    """
     out = [found or None for found in words_per_frame(timeline, times)]
     for moment in moments:
         out[moment.entry : moment.exit + 1] = [None] * (moment.exit + 1 - moment.entry)
@@ -192,8 +243,15 @@ def asked_words(
 
 
 def filled_timeline(view: View) -> Timeline:
-    """The timeline with automatic locomotion filled in by the library's gaits, where it is not yet (Faustino §3.1.1);
-    made clips count where one is shown."""
+    """Fill automatic locomotion into the timeline by the library's gaits (Faustino §3.1.1).
+
+    Synthetic clips count as the library's if one is played.
+
+    Args:
+        view: the take beside its library and track.
+    Returns:
+        The filled timeline; the same one without library or track.
+    """
     library = with_made(view.library, view.played)
     if library is None or view.track is None:
         return view.timeline
@@ -208,8 +266,14 @@ def filled_timeline(view: View) -> Timeline:
 
 
 def annotation_similarity(view: View) -> dict:
-    """Similarity over all frames, at the key moments, and at those that the library has, over asked words; the first
-    two as printed too (Faustino eq. 18)."""
+    """Measure how well the played labels match the requested ones.
+
+    Args:
+        view: the take beside its library and track.
+    Returns:
+        Means over all frames, over the key moments, and over those that the library has, for requested labels only; the
+        first two also as Faustino's eq. 18 is printed.
+    """
     played = view.played
     if view.timeline is None or played.words is None:
         return dict.fromkeys(("all", "keys", "had_keys", "eq18_all", "eq18_keys"))
@@ -217,7 +281,7 @@ def annotation_similarity(view: View) -> dict:
     want, have = [m.asked.words for m in view.moments], [m.words for m in view.moments]
     offered = [] if view.library is None else view.library.keys
     had = [m for m in view.moments if serving(offered, m.asked.words)]
-    return {  # means of the frames that count (Faustino Table 2 averages so)
+    return {  # means over the frames that count, as in Faustino Table 2
         "all": _mean(similarity(asked, played.words)), "keys": _mean(similarity(want, have)),
         "had_keys": _mean(similarity([m.asked.words for m in had], [m.words for m in had])),
         "eq18_all": _mean(similarity(asked, played.words, eq18)), "eq18_keys": _mean(similarity(want, have, eq18)),
@@ -225,7 +289,15 @@ def annotation_similarity(view: View) -> dict:
 
 
 def warnings(view: View, ik_miss: np.ndarray | None, asked: Timeline | None) -> list[str]:
-    """What gave way, and when."""
+    """List what was relaxed in the take and when, and visible jolts.
+
+    Args:
+        view: the take beside its library and track.
+        ik_miss: (T,) or (T, 2) m by which inverse kinematics missed its targets, or None.
+        requested: the user's own timeline without automatic spans, or None.
+    Returns:
+        One line for each warning.
+    """
     lines: list[str] = [*give_way(view.played, track=view.track, timeline=view.timeline, library=view.library,
                                   ik_miss=ik_miss, asked=asked)]
     if view.reference is None:
@@ -237,17 +309,32 @@ def warnings(view: View, ik_miss: np.ndarray | None, asked: Timeline | None) -> 
 
 
 def eq18(asked: Iterable[str], played: Iterable[str]) -> float:
-    """Faustino eq. 18 for one frame as printed: -1 all words alike .. 1 none, NaN where neither has a word.
+    """Compute Faustino's eq. 18 for one frame as printed.
 
-    With 1 for a present and -1 for an absent word, the products over words that either frame has, negated, over their
-    number r: one word in common counts -1, one that only one of them has counts +1."""
+    With 1 for a present and -1 for an absent label, it is the negated sum of products over the labels that either frame
+    has, divided by their number: a common label counts -1, a label that only one has counts +1.
+
+    Args:
+        requested: the requested labels.
+        played: the labels of the played clip.
+    Returns:
+        -1 if all labels agree to 1 if none does; NaN if neither has a label.
+    Source: Faustino 2024, section 3.2.2, equation (18).
+    """
     asked, played = set(asked), set(played)
     either = asked | played
     return (len(asked ^ played) - len(asked & played)) / len(either) if either else np.nan
 
 
 def asked_similarity(asked: Iterable[str], played: Iterable[str]) -> float:
-    """Eq. 18 over the asked words only: -1 all are played .. 1 none is; words beyond those count neither way."""
+    """Compute eq. 18 over the requested labels only; further labels do not count.
+
+    Args:
+        requested: the requested labels.
+        played: the labels of the played clip.
+    Returns:
+        -1 if all are played to 1 if none is; NaN without requested labels.
+    """
     asked = set(asked)
     return 1.0 - 2.0 * len(asked & set(played)) / len(asked) if asked else np.nan
 
@@ -255,7 +342,17 @@ def asked_similarity(asked: Iterable[str], played: Iterable[str]) -> float:
 def similarity(
     asked: Sequence[Iterable[str] | None], played: Sequence[Iterable[str]], measure=asked_similarity
 ) -> np.ndarray:
-    """`measure` at every frame: (T,), NaN where nothing was asked. Takes repeat words, so each pair is scored once."""
+    """Measure the similarity at every frame.
+
+    Takes repeat labels, so each pair is measured once.
+
+    Args:
+        requested: T sets of labels, None where none count.
+        played: T sets of labels.
+        measure: the similarity of one pair.
+    Returns:
+        (T,), NaN where no labels are requested.
+    """
     known: dict[tuple, float] = {}
     out = np.full(len(played), np.nan)
     for frame, (want, have) in enumerate(zip(asked, played)):
@@ -292,7 +389,7 @@ def _rms(values: np.ndarray) -> float:
 
 
 def _spread(values: np.ndarray, names: Sequence[str]) -> dict[str, float]:
-    """Mean, median, p95 or max of values (N,), those that `names` asks for; NaN where there are none."""
+    """Compute the measures `names` of values (N,): mean, median, p95 or max; NaN without values."""
     known = values[np.isfinite(values)]
     measures = {"mean": np.mean, "median": np.median, "p95": lambda v: np.percentile(v, 95), "max": np.max}
     return {name: float(measures[name](known)) if len(known) else math.nan for name in names}

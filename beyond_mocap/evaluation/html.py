@@ -1,6 +1,7 @@
-"""The report as one page for a browser: pictures, stick figures and every figure beside its target, in a single file.
+"""The report as one HTML page: plots, stick figures and every figure beside its target, in a single file.
 
-    page = html_report(played, evaluate_played(played, track=track, library=library), track=track, library=library)
+    page = build_html_report(played, evaluate_played(played, track=track, library=library), track=track,
+    library=library)
     Path("report.html").write_text(page, encoding="utf-8")
 
 The page loads nothing and runs nothing: pictures are inside it, all names are escaped.
@@ -35,8 +36,9 @@ from .reference import View
 from .report import judge_figures
 
 MOST_MOMENTS = 12
-"""Strips of key moments on the page; the table tells all of them."""
+"""Key moments with stick figures on the page; the table lists all."""
 
+# Seconds around a moment at which stick figures are drawn.
 _STRIP_SECONDS = (-0.5, -0.3, -0.2, -0.1, -1e-9, 0.1, 0.2, 0.3, 0.5)
 _KEY_TEXTS = {"time_error_s": "time error {:.3f} s", "contact_gap_m": "gap to the ball {:.3f} m",
               "ball_shift_m": "ball moved {:.3f} m"}  # fmt: skip
@@ -51,9 +53,18 @@ def html_report(
     played: Played, report: Mapping, *, track: Track | None = None, timeline: Timeline | None = None,
     library: Library | None = None, title: str = "Take",
 ) -> str:  # fmt: skip
-    """The page as text. played, track, timeline and library: what `report` (of `evaluate_played`) was made from.
+    """Build the page.
 
-    Raises InputError where matplotlib is not installed, or the library has another skeleton than the motion."""
+    Args:
+        played: the motion with its sources.
+        report: its report, from `evaluate_played`.
+        track, timeline, library: what the report was built from, or None.
+        title: title of the page.
+    Returns:
+        The page as text.
+    Raises:
+        InputError: if matplotlib is not installed, or the library has another skeleton than the motion.
+    """
     plots.require_matplotlib()
     view = View(played, track, timeline, library)
     over_time = build_image(plots.curves(view), "distance from the track, toe heights, speed, smoothness")
@@ -79,7 +90,7 @@ def _warnings(report: Mapping) -> Html:
 def _clips(view: View) -> Html:
     names = plots.legend(view)
     if not names:
-        unknown = "No provenance was given: it is not known which clips are played."
+        unknown = "The played clips are unknown without provenance."
         return build_section("Clips", element("p", unknown, class_="quiet"))
     chips = [
         element(
@@ -87,13 +98,13 @@ def _clips(view: View) -> Html:
             f"{np.sum(view.played.clip == clip) / view.fps:.1f} s",
         ) for clip, (number, colour) in names.items()
     ]  # fmt: skip
-    picture = build_image(plots.clips(view), "clips, seams and time warp")
+    picture = build_image(plots.clips(view), "clips, transitions and playback rate")
     return build_section("Clips", picture, element("p", *chips, class_="chips"))
 
 
 def _words(view: View) -> Html:
     picture = plots.words(view)
-    return build_section("Words", build_image(picture, "words asked and got")) if picture else Html()
+    return build_section("Labels", build_image(picture, "labels requested and played")) if picture else Html()
 
 
 def _moments(view: View, report: Mapping) -> Html:
@@ -116,8 +127,8 @@ def _strip(view: View, frame: int, name: str) -> Html:
 
 
 def _told(key: Mapping) -> str:
-    """One key moment in a line."""
-    source = f"{key['clip']}, frame {key['clip_frame']:.1f}" if key["clip_frame"] is not None else "no key of a clip"
+    """Describe one key moment in a line."""
+    source = f"{key['clip']}, frame {key['clip_frame']:.1f}" if key["clip_frame"] is not None else "no key moment"
     out = [f"played: {source}"]
     if key.get("used_instead"):
         out.append("used instead: " + " ".join(key["used_instead"]))
@@ -134,8 +145,13 @@ def _worst(view: View) -> Html:
 
 
 def worst_frames(view: View) -> list[tuple[int, str]]:
-    """(output frame, why) of the hardest jolts and of the worst slide of a standing foot, each at least a second
-    apart."""
+    """Find the strongest jolts and the worst slide of a foot in contact, at least a second apart.
+
+    Args:
+        view: the take beside its library and track.
+    Returns:
+        (output frame, description) of each.
+    """
     jolts = movement.jerk(view.played.positions, view.fps), 1, "jolt of {:.0f} m/s³"
     speeds = np.nan_to_num(contact_speeds(view.played.feet, view.played.contacts, view.fps))
     slides = speeds.max(axis=1, initial=0.0), 0, "foot slides at {:.2f} m/s"
@@ -162,7 +178,7 @@ def _figures(report: Mapping) -> Html:
 
 
 def _key_table(report: Mapping) -> Html:
-    """One line per key moment, one column per figure; the targets stand in the head."""
+    """Build the table of key moments: one line for each, one column for each figure, targets in the head."""
     if not report["keys"]:
         return Html()
     rows = {row.name: row for row in judge_figures(report)}

@@ -1,8 +1,8 @@
-"""Pages for a browser, in one file that loads nothing: style, elements, tables and pictures of every report.
+"""HTML pages in one file that loads nothing: style, elements, tables and pictures of every report.
 
-    build_page("Walk", element("h1", "Walk"), build_section("Speed", build_image(png, "speed over time")))
+    build_page("Walk", build_element("h1", "Walk"), build_section("Speed", build_image(png, "speed over time")))
 
-Text is escaped wherever it is put in; only `Html`, which these functions return, is taken as it is.
+All text is escaped; only `Html`, which these functions return, is inserted unchanged.
 """
 
 from __future__ import annotations
@@ -24,28 +24,41 @@ td.n, th.n { text-align: right; font-variant-numeric: tabular-nums; white-space:
 td.name { overflow-wrap: anywhere; min-width: 9em; max-width: 22em }
 .quiet { color: #666; font-weight: normal } .met { color: #23703a } .missed { color: #b3261e; font-weight: 600 }
 """
-_WITHOUT_END = frozenset({"img", "br", "input", "td", "th"})  # void, or closed by what follows
+_WITHOUT_END = frozenset({"img", "br", "input", "td", "th"})  # void elements, or closed by the next one
 
 
 class Html(str):
-    """Text that is HTML already. Joined or formatted it is plain text again, so it is escaped rather than trusted."""
+    """Text that is HTML already.
+
+    Joined or formatted it becomes plain text again, so it is escaped rather than trusted.
+    """
 
 
 def element(name: str, /, *content: str, **attributes: object) -> Html:
-    """Builds an element.
+    """Build an element.
 
     Args:
-        name: of the element, such as "p".
-        content: what stands in it, in order; text is escaped, Html is not.
-        attributes: `class_` stands for class, an underscore for a hyphen; True has no value; None, False and "" are
-            left out.
+        name: name of the element, such as "p".
+        content: its content in order; text is escaped, Html is not.
+        attributes: `class_` stands for class, an underscore for a hyphen; True gives an attribute without a value;
+            None,
+            False and "" are left out.
+    Returns:
+        The element.
     """
     begin = name + "".join(_format_attribute(key, value) for key, value in attributes.items())
     return Html(f"<{begin}>{fragment(*content)}" + ("" if name in _WITHOUT_END else f"</{name}>"))
 
 
 def fragment(*content: str, between: str = "") -> Html:
-    """Puts text, which is escaped, and Html one behind another."""
+    """Join text, which is escaped, and Html.
+
+    Args:
+        content: the parts in order.
+        separator: text between the parts.
+    Returns:
+        The joined HTML.
+    """
     return Html(between.join(part if isinstance(part, Html) else escape(str(part)) for part in content))
 
 
@@ -59,8 +72,15 @@ def _format_attribute(key: str, value: object) -> str:
 
 
 def build_page(title: str, *parts: str, style: str = "") -> str:
-    """Builds the whole document. parts: of the body, empty ones are left out; style: CSS that goes before the shared
-    one."""
+    """Build the whole document.
+
+    Args:
+        title: title of the page.
+        parts: parts of the body; empty ones are left out.
+        style: CSS in addition to the shared style.
+    Returns:
+        The document as text.
+    """
     head = fragment(
         Html('<meta charset="utf-8"><meta name="viewport" content="width=device-width">'), element("title", title),
         element("style", Html(_STYLE + style)),
@@ -70,46 +90,106 @@ def build_page(title: str, *parts: str, style: str = "") -> str:
 
 
 def build_section(title: str, *parts: str) -> Html:
-    """Builds a titled part of the page."""
+    """Build a part of the page with a heading.
+
+    Args:
+        title: the heading.
+        parts: its content.
+    Returns:
+        The section.
+    """
     return fragment(element("h2", title), *parts, between="\n")
 
 
 def build_list(lines: Iterable[str]) -> Html:
-    """Builds a list with a point for each line; nothing for no lines."""
+    """Build a list with one item for each line; empty without lines.
+
+    Args:
+        lines: the items.
+    Returns:
+        The list.
+    """
     points = [element("li", line) for line in lines]
     return element("ul", *points) if points else Html()
 
 
 def build_table(head: Sequence[str], rows: Iterable[Html], **attributes: object) -> Html:
-    """Builds a table that scrolls where it is too wide. head: titles, () for none; rows: of `build_row`."""
+    """Build a table that scrolls if it is too wide.
+
+    Args:
+        head: titles of the columns; () for none.
+        rows: from `build_row`.
+        attributes: attributes of the table element.
+    Returns:
+        The table.
+    """
     cells = [title if isinstance(title, Html) else element("th", title) for title in head]
     lines = ([element("tr", *cells)] if cells else []) + list(rows)
     return element("div", element("table", fragment(*lines, between="\n"), **attributes), class_="scroll")
 
 
 def build_row(*cells: str, class_: str = "") -> Html:
-    """Builds a row of a table; text becomes a cell, Html has to be one."""
+    """Build a row of a table.
+
+    Args:
+        cells: text becomes a cell; Html has to be one.
+        class_: CSS class of the row.
+    Returns:
+        The row.
+    """
     return element("tr", *(cell if isinstance(cell, Html) else element("td", cell) for cell in cells), class_=class_)
 
 
 def build_number_cell(value: float | None, digits: int = 0, scale: float = 1.0, status: str = "") -> Html:
-    """Builds a cell with scale x value, a dash where it is unknown. status: "met", "missed" or ""."""
+    """Build a cell with a number, a dash if it is unknown.
+
+    Args:
+        value: the number; None or NaN if unknown.
+        digits: decimals.
+        scale: factor of the displayed number.
+        status: "met", "missed" or "".
+    Returns:
+        The cell.
+    """
     if value is None or not math.isfinite(value):
         return element("td", "–", class_="n")
     return element("td", f"{scale * value:.{digits}f}", class_=f"n {status}".strip())
 
 
 def build_title(title: str, note: str = "", class_: str = "n") -> Html:
-    """Builds the title of a column, by default of numbers, with a note, such as the unit, below."""
+    """Build the title of a column, by default of numbers.
+
+    Args:
+        title: the title.
+        note: text below it, such as the unit.
+        class_: CSS class.
+    Returns:
+        The cell.
+    """
     below = (element("br"), element("span", note, class_="quiet")) if note else ()
     return element("th", title, *below, class_=class_)
 
 
 def build_image(png: bytes, text: str, class_: str = "") -> Html:
-    """Builds a picture that is inside the page. text: what is seen in it."""
+    """Build a picture that is stored inside the page.
+
+    Args:
+        png: the picture.
+        text: description of its content.
+        class_: CSS class.
+    Returns:
+        The image element.
+    """
     return element("img", class_=class_, alt=text, src=build_data_address(png, "image/png"))
 
 
 def build_data_address(data: bytes, kind: str) -> str:
-    """Builds the address that holds the data itself. kind: its media type, such as "image/png"."""
+    """Build the data URL of a file.
+
+    Args:
+        data: the file's content.
+        kind: its media type, such as "image/png".
+    Returns:
+        The URL.
+    """
     return f"data:{kind};base64,{base64.b64encode(data).decode('ascii')}"

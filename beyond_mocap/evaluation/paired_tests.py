@@ -1,8 +1,8 @@
-"""One way of making throws against another, subject by subject, by paired one-sided tests (Fredriksson §4.5).
+"""Compare one method with another, subject by subject, by paired one-sided tests (Fredriksson §4.5).
 
-His standard deviations are divided by n, his t by n - 1: both are kept apart here. Shapiro and Wilk's test comes first;
-where it rejects normality, Wilcoxon's signed ranks stand in for Student's t. With four subjects the smallest p that
-ranks can give is 1/16: they cannot reject anything at 0.025, which `least_p` tells.
+Fredriksson divides standard deviations by n but t statistics by n - 1; both are kept separate here. Shapiro and Wilk's
+test comes first; if it rejects normality, Wilcoxon's signed ranks replace Student's t. With four subjects the smallest
+p from ranks is 1/16, so they cannot reject anything at 0.025; `least_p` reports this.
 """
 
 from __future__ import annotations
@@ -12,17 +12,25 @@ from dataclasses import dataclass
 import numpy as np
 
 CULLED = 3.0
-"""Standard deviations from the mean beyond which a throw is left out (Fredriksson §8.3)."""
+"""Standard deviations from the mean beyond which a throw is an outlier (Fredriksson §8.3)."""
 NORMALITY = 0.05
-"""Level of the test for normality; he names none."""
+"""Significance level of the normality test; Fredriksson does not name one."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Comparison:
-    """differences (N,): new - old by subject; negative ones are for the new way. mean; spread: standard deviation
-    divided by n, as he prints it. normal: p of Shapiro and Wilk, NaN where there are too few or all alike. test:
-    "t" or "Wilcoxon", whichever counts. p: its one-sided p that the new way is no better; t_p, wilcoxon_p: both, NaN
-    where they cannot be had. least_p: the smallest that `test` could have given."""
+    """The result of a comparison. NaN where there is too little data.
+
+    Attributes:
+        differences: (N,) new - old by subject; negative values favour the new method.
+        mean: their mean.
+        spread: their standard deviation divided by n, as Fredriksson prints it.
+        normal: p of Shapiro and Wilk's test.
+        test: the test that counts, "t" or "Wilcoxon".
+        p: its one-sided p that the new method is no better.
+        t_p, wilcoxon_p: p of both tests.
+        least_p: the smallest p that `test` could have given.
+    """
 
     differences: np.ndarray
     mean: float
@@ -35,7 +43,13 @@ class Comparison:
     least_p: float
 
 def judged(differences: np.ndarray) -> Comparison:
-    """The tests of differences (N,), new - old."""
+    """Compare two methods by the differences of their figures.
+
+    Args:
+        differences: (N,) new - old, smaller is better.
+    Returns:
+        The comparison.
+    """
     from scipy.stats import shapiro, ttest_1samp, wilcoxon
 
     off = np.asarray(differences, float)
@@ -54,8 +68,15 @@ def judged(differences: np.ndarray) -> Comparison:
 
 
 def kept(values: np.ndarray) -> np.ndarray:
-    """(N,) bool: finite and within three standard deviations of the mean of the finite ones. Fewer than eleven can
-    have none beyond, whatever they are."""
+    """Find the values within three standard deviations of the mean of the finite ones.
+
+    Up to ten values can never contain an outlier by this rule.
+
+    Args:
+        values: (N,), NaN or infinite if unknown.
+    Returns:
+        (N,) bool, True for finite values that are no outliers.
+    """
     values = np.asarray(values, float)
     known = np.isfinite(values)
     if not known.any():

@@ -1,6 +1,6 @@
-"""The figures of a take frame by frame, and its footprints: what overlays and curves show of it.
+"""A take's figures frame by frame and its footprints, for overlays and curves.
 
-Nothing is measured here that the report does not measure: `movement` says how (`../shared/metrics.md`).
+They are the report's figures; `movement` defines them.
 """
 
 from __future__ import annotations
@@ -19,12 +19,17 @@ from .reference import View
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class PerFrame:
-    """Figures of T output frames, NaN where nothing is known.
+    """Figures of T output frames, NaN where unknown.
 
-    times (T,) s on the track's clock. track (T, 2) m: where the measured track is. root_error, pelvis_error (T,) m.
-    slide (T, 2) m/s: speed of each foot (left, right) over the ground while it stands. correction (T, 2) m by which
-    polish moved each foot. jerk (T,): the largest within +-8 frames, over the 95th percentile of recordings at that
-    speed. speed, asked_speed (T,) m/s behind a 1 s window."""
+    Attributes:
+        times: (T,) seconds on the track's clock.
+        track: (T, 2) m, the measured track.
+        root_error, pelvis_error: (T,) m.
+        slide: (T, 2) m/s, ground speed of each foot (left, right) while it is in contact.
+        correction: (T, 2) m by which polishing moved each foot.
+        jerk: (T,) largest jerk within +-8 frames, divided by the 95th percentile of recordings at that speed.
+        speed, requested_speed: (T,) m/s of the body and of the track, smoothed with a 1 s window.
+    """
 
     times: np.ndarray
     track: np.ndarray
@@ -38,15 +43,21 @@ class PerFrame:
 
     @property
     def speed_gap(self) -> np.ndarray:
-        """(T,) m/s by which the body is faster than the track asks."""
+        """(T,) m/s by which the body is faster than the track."""
         return self.speed - self.asked_speed
 
 
 @dataclass(frozen=True, kw_only=True)
 class Footprint:
-    """One stance. side: 0 left, 1 right. start, end: its first and last second. heel, toe: mean places (2,) m of the
-    foot's joints on the ground; where they are the same the foot has no toe joint. direction: radians of the foot, from
-    +x. slide: metres that its toe travelled (`movement.stance_travel`)."""
+    """One stance.
+
+    Attributes:
+        side: 0 left, 1 right.
+        start, end: its first and last second on the track's clock.
+        heel, toe: mean positions (2,) m of the foot's joints on the ground; equal if the foot has no toe joint.
+        direction: radians of the foot, from +x.
+        slide: metres that its toe travelled (`movement.stance_travel`).
+    """
 
     side: int
     start: float
@@ -59,9 +70,15 @@ class Footprint:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Strike:
-    """One key moment in space. time: seconds; words: what was asked. part: the point (3,) m of the body's striking
-    surface that is nearest to the ball's centre, ball: that centre (3,) m, gap: metres between both surfaces; where no
-    ball is met, `part` is the pelvis, ball None and gap NaN."""
+    """One key moment in space.
+
+    Attributes:
+        time: seconds on the track's clock.
+        words: the requested labels.
+        part: (3,) m, the point of the striking surface nearest to the ball's centre; without a ball the pelvis.
+        ball: (3,) m, the ball's centre, or None.
+        gap: metres between both surfaces, NaN without a ball.
+    """
 
     time: float
     words: tuple[str, ...]
@@ -71,7 +88,13 @@ class Strike:
 
 
 def per_frame(view: View) -> PerFrame:
-    """The figures of every frame."""
+    """Measure every frame of a take.
+
+    Args:
+        view: the take beside its library and track.
+    Returns:
+        The figures.
+    """
     played, count = view.played, view.count
     unknown = np.full(count, np.nan)
     wanted = np.full((count, 2), np.nan) if view.wanted is None else view.wanted
@@ -92,7 +115,13 @@ def per_frame(view: View) -> PerFrame:
 
 
 def footprints(view: View) -> tuple[Footprint, ...]:
-    """Every stance, in the order of time."""
+    """Find every stance.
+
+    Args:
+        view: the take beside its library and track.
+    Returns:
+        The footprints, ordered by time.
+    """
     played = view.played
     spans = movement.stances(played.contacts)
     travel = movement.stance_travel(played.feet[:, :, 1], spans)
@@ -104,7 +133,7 @@ def _footprint(view: View, span: Sequence[int], slide: float) -> Footprint:
     played, (first, end, side) = view.played, span
     heel, toe = played.feet[first:end, side, :, :2].mean(axis=0)
     along = toe - heel
-    if np.hypot(*along) < 1e-3:  # no toe joint: the foot points where the body goes
+    if np.hypot(*along) < 1e-3:  # no toe joint: the foot points in the body's direction of travel
         along = played.pelvis[min(end, view.count - 1)] - played.pelvis[max(first - 1, 0)]
     direction = float(np.arctan2(along[1], along[0]))
     return Footprint(side=side, start=float(played.times[first]), end=float(played.times[end - 1]),
@@ -112,11 +141,18 @@ def _footprint(view: View, span: Sequence[int], slide: float) -> Footprint:
 
 
 def strikes(view: View) -> tuple[Strike, ...]:
-    """Every key moment, in the order of the timeline."""
+    """Find every key moment in space.
+
+    Args:
+        view: the take beside its library and track.
+    Returns:
+        The strikes, in the order of the timeline.
+    """
     return tuple(_strike(view, moment) for moment in view.moments)
 
 
 def _strike(view: View, moment: Moment) -> Strike:
+    """Find the nearest points of body and ball at one key moment."""
     played, words = view.played, touching_words(moment)
     when, gap = met(played, moment)
     found = surfaces(played.motion.skeleton, words)
@@ -134,12 +170,13 @@ def _strike(view: View, moment: Moment) -> Strike:
 
 
 def _skin(inside: np.ndarray, ball: np.ndarray, radius: float) -> np.ndarray:
-    """The point (3,) m of a surface, `radius` m off its line's point `inside` (3,), towards the ball (3,)."""
+    """Find the point (3,) m of a surface towards the ball (3,), `radius` m away from the point `inside` (3,) on its
+    line."""
     away = ball - inside
     return inside + away * min(1.0, radius / max(float(np.linalg.norm(away)), 1e-9))
 
 
 def _around(view: View, frame: int) -> tuple[np.ndarray, np.ndarray]:
-    """Joints' places and rotations of some frames up to `frame`."""
+    """Return the joints' positions and rotations of the last frames up to `frame`."""
     frames = slice(max(frame - 3, 0), frame + 1)
     return view.played.positions[frames], view.played.rotations[frames]

@@ -1,6 +1,6 @@
-"""Pictures of one take: curves and bars over its time, and stick figures. Each is a PNG as bytes, drawn by matplotlib.
+"""Plots of one take: curves and bars over time, and stick figures, each a PNG as bytes, drawn by matplotlib.
 
-matplotlib is imported inside the functions, since only this page needs it; without a window, without global state.
+matplotlib is imported inside the functions, because only these plots need it; no window and no global state are used.
 """
 
 from __future__ import annotations
@@ -30,18 +30,28 @@ _SPACING = 1.3  # metres between two figures of a strip
 
 
 def require_matplotlib() -> None:
-    """InputError, with what to do, where matplotlib is not installed."""
+    """Check that matplotlib is installed.
+
+    Raises:
+        InputError: with the next step, if it is not.
+    """
     try:
         import matplotlib  # noqa: F401
     except ImportError:
         raise InputError(
-            "--html", "matplotlib is not installed", "it for the pictures",
-            "python -m pip install 'matplotlib>=3.8', or leave --html out",
+            "HTML report", "matplotlib is not installed", "matplotlib for the plots",
+            "run python -m pip install 'matplotlib>=3.8', or write no HTML report",
         ) from None  # fmt: skip
 
 
 def curves(view: View) -> bytes:
-    """Root error, feet, speed and steadiness over time, one above the other."""
+    """Draw root error, feet, speed and smoothness over time, one above the other.
+
+    Args:
+        view: the take beside its library and track.
+    Returns:
+        A PNG.
+    """
     canvas, axes = _canvas(2.0, 2.0, 2.0, 1.6)
     for draw, ax in zip((_draw_root, _draw_feet, _draw_speed, _draw_smoothness), axes):
         draw(ax, view)
@@ -51,8 +61,13 @@ def curves(view: View) -> bytes:
 
 
 def legend(view: View) -> dict[int, tuple[int, str]]:
-    """Number on the bars of `clips` and colour "#rrggbb" of each clip that is played, by its index, most played
-    first."""
+    """Choose number and colour of each played clip.
+
+    Args:
+        view: the take beside its library and track.
+    Returns:
+        Clip index -> (number on the bars of `draw_clips`, colour "#rrggbb"), most played first.
+    """
     from matplotlib import colormaps
     from matplotlib.colors import to_hex
 
@@ -63,27 +78,39 @@ def legend(view: View) -> dict[int, tuple[int, str]]:
 
 
 def clips(view: View) -> bytes:
-    """Which clip is played when, by the numbers of `legend`, with its seams, and how fast it is played."""
+    """Draw which clip plays when, by the numbers of `choose_clip_colours`, with transitions and playback rate.
+
+    Args:
+        view: the take beside its library and track.
+    Returns:
+        A PNG.
+    """
     canvas, (bar, warp) = _canvas(0.8, 1.4)
     names = legend(view)
     edges = [0, *view.seams, view.count]
     for low, high in zip(edges[:-1], edges[1:]):
         _clip_bar(bar, view, low, high, names)
     bar.set_yticks([])
-    _title(bar, "clips and seams; ' marks a mirrored clip", "clip")
+    _title(bar, "clips and transitions; ' marks a mirrored clip", "clip")
     rate = np.append(played_rate(*view.source), np.nan)
     rate[view.seams - 1] = np.nan
     warp.plot(view.played.times, rate, color=MIDDLE, lw=1)
     for limit in (0.85, 1.15):
         warp.axhline(limit, color="#999999", lw=0.8, ls="--")
-    _title(warp, "time warp", "played / recorded")
+    _title(warp, "playback rate", "played / recorded")
     _mark_moments(warp, view)
     _time_axis(warp, view)
     return render_png(canvas)
 
 
 def words(view: View) -> bytes | None:
-    """Words asked (upper half of each row) and got (lower half); None where no words are known."""
+    """Draw requested labels (upper half of each row) and played ones (lower half).
+
+    Args:
+        view: the take beside its library and track.
+    Returns:
+        A PNG; None without labels.
+    """
     if view.played.words is None:
         return None
     got = [frozenset(w) for w in view.played.words]
@@ -104,17 +131,24 @@ def words(view: View) -> bytes | None:
         ax.plot(times, [row - 0.2] * len(times), "v", color=RIGHT, ms=6)
     ax.set_yticks(range(len(rows)), rows)
     ax.set_ylim(len(rows) - 0.5, -0.5)
-    _title(ax, "words: asked (blue; red: key moments) above got (green)")
+    _title(ax, "labels: requested (blue; red: key moments) above played (green)")
     ax.grid(axis="y", visible=False)
     _time_axis(ax, view)
     return render_png(canvas)
 
 
 def strip(view: View, frames: Sequence[int], marked: int | None = None) -> bytes:
-    """Stick figures side by side, seen from the body's left side and a little from ahead; left blue, right red.
+    """Draw stick figures side by side, seen from the body's left and slightly from the front; left blue, right red.
 
-    frames: output frames, drawn in their order; marked: the one whose number is bold. The ball is drawn where it is
-    near."""
+    The ball is drawn where it is near.
+
+    Args:
+        view: the take beside its library and track.
+        frames: output frames, in drawing order.
+        marked: the frame with a bold label, or None.
+    Returns:
+        A PNG.
+    """
     middle = frames[len(frames) // 2]
     facing = float(heading_from_positions(view.played.motion.skeleton, view.played.positions[middle]))
     turn = about_up(np.array(-facing + np.radians(20.0)))
@@ -135,7 +169,15 @@ def strip(view: View, frames: Sequence[int], marked: int | None = None) -> bytes
 
 
 def create_canvas(height: float, rows: int = 1, columns: int = 1, **layout):
-    """A figure without a window, so many inches high, and its axes row by row. layout: as `Figure.subplots` has it."""
+    """Create a figure without a window.
+
+    Args:
+        height: inches.
+        rows, columns: number of axes.
+        layout: arguments of `Figure.subplots`.
+    Returns:
+        The figure, and its axes row by row.
+    """
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(WIDTH, height), dpi=DPI, layout="constrained")
@@ -145,7 +187,11 @@ def create_canvas(height: float, rows: int = 1, columns: int = 1, **layout):
 
 
 def plain(axes) -> None:
-    """The look of all pictures: a faint grid behind, no frame above and on the right, small figures."""
+    """Apply the common style: a faint grid behind, no frame at the top and right, small text.
+
+    Args:
+        axes: the axes.
+    """
     for ax in axes:
         ax.grid(color="#e6e6e6", lw=0.6)
         ax.set_axisbelow(True)
@@ -155,7 +201,13 @@ def plain(axes) -> None:
 
 
 def render_png(figure) -> bytes:
-    """The figure as a PNG, which says nothing of the program that drew it."""
+    """Render a figure as a PNG without metadata of the program.
+
+    Args:
+        figure: a matplotlib figure.
+    Returns:
+        The PNG.
+    """
     out = io.BytesIO()
     figure.savefig(out, format="png", metadata={"Software": None})
     return out.getvalue()
@@ -164,12 +216,12 @@ def render_png(figure) -> bytes:
 def _draw_root(ax, view: View) -> None:
     _title(ax, "distance from the track", "cm")
     if view.wanted is None:
-        ax.text(0.5, 0.5, "no track was given", ha="center", va="center", transform=ax.transAxes, fontsize=9,
+        ax.text(0.5, 0.5, "no track", ha="center", va="center", transform=ax.transAxes, fontsize=9,
                 color="#777777")
         return
     times, pelvis = view.played.times, view.played.pelvis
     error, smooth = movement.pelvis_error(pelvis, view.wanted), movement.root_error(pelvis, view.wanted, view.fps)
-    ax.plot(times, 100 * error, color="#bbbbbb", lw=1, label="pelvis, as it sways")
+    ax.plot(times, 100 * error, color="#bbbbbb", lw=1, label="pelvis with its sway")
     ax.plot(times, 100 * smooth, color=LEFT, lw=1.4, label="root (1.5 s window)")
     ax.axhline(1.5, color="#999999", lw=0.8, ls="--", label="target for 95 % of root")
     ax.set_ylim(bottom=0.0)
@@ -190,7 +242,7 @@ def _draw_feet(ax, view: View) -> None:
 def _draw_speed(ax, view: View) -> None:
     times = view.played.times
     if view.wanted is not None:
-        ax.plot(times, movement.travel_speed(view.wanted, view.fps), color="#8fb8de", lw=3, label="asked by the track")
+        ax.plot(times, movement.travel_speed(view.wanted, view.fps), color="#8fb8de", lw=3, label="track")
     ax.plot(times, view.speed, color=MIDDLE, lw=1, label="played")
     if view.reference is not None and np.isfinite(view.reference.fastest):
         ax.axhline(1.15 * view.reference.fastest, color=RIGHT, lw=0.8, ls="--", label="fastest recording x 1.15")
@@ -200,15 +252,15 @@ def _draw_speed(ax, view: View) -> None:
 
 
 def _draw_smoothness(ax, view: View) -> None:
-    """Faustino's App. D, with his cuts and the recordings' own level."""
+    """Draw the smoothness of Faustino's App. D, with the transitions and the recordings' level."""
     played = view.played
     curve = realism.smoothness(played.motion.skeleton, played.positions, view.fps)
-    ax.plot(played.times[1:], 100 * curve, color=MIDDLE, lw=1, label="from the frame before")
+    ax.plot(played.times[1:], 100 * curve, color=MIDDLE, lw=1, label="from the previous frame")
     if view.reference is not None:
         level = view.reference.smoothness_p95[movement.speed_class(view.speed)]
         ax.plot(played.times, 100 * level, color=LEFT, lw=1, ls="--", label="95 % of recordings at that speed")
     for number, seam in enumerate(view.seams):
-        label = "seam" if number == 0 else None
+        label = "transition" if number == 0 else None
         ax.axvline(played.times[seam], color=BALL, lw=0.8, alpha=0.7, zorder=0, label=label)
     ax.set_ylim(bottom=0.0)
     _title(ax, "smoothness: distance of features (Faustino App. D)", "cm")
@@ -230,13 +282,13 @@ def _clip_bar(ax, view: View, low: int, high: int, names: dict[int, tuple[int, s
 
 
 def _bars(ax, view: View, flags: np.ndarray, bottom: float, colour: str, height: float = 0.36) -> None:
-    """A bar wherever flags (T,) hold."""
+    """Draw a bar wherever flags (T,) are True."""
     spans = [(view.played.start_time + a / view.fps, (b - a) / view.fps) for a, b in runs(flags)]
     ax.broken_barh(spans, (bottom, height), facecolors=colour, linewidth=0)
 
 
 def _figure(ax, view: View, frame: int, turn: np.ndarray, offset: float) -> None:
-    """One pose and the ball, the pelvis at `offset`."""
+    """Draw one pose and the ball, with the pelvis at `offset`."""
     skeleton, places = view.played.motion.skeleton, view.played.positions[frame]
     origin = places[view.played.body.hips] * [1.0, 1.0, 0.0]
     seen = rotate(turn, places - origin)
@@ -256,7 +308,7 @@ def _figure(ax, view: View, frame: int, turn: np.ndarray, offset: float) -> None
 
 
 def _canvas(*heights: float):
-    """A figure of panels so many inches high above one another, and their axes."""
+    """Create a figure of panels one above another, with heights in inches; return it and its axes."""
     rows = len(heights)
     return create_canvas(sum(heights) + 0.1 * rows, rows, sharex=True, gridspec_kw={"height_ratios": heights})
 
@@ -267,7 +319,7 @@ def _time_axis(ax, view: View) -> None:
 
 
 def _legend(ax, columns: int) -> None:
-    """Above the axes, at the right, beside the title: never on the curves."""
+    """Draw the legend above the axes at the right, beside the title, where it covers no curve."""
     ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=columns, fontsize=8, frameon=False, borderpad=0.1)
 
 

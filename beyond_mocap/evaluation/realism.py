@@ -1,7 +1,7 @@
-"""How near each pose is to some recorded pose, and how smooth the motion is.
+"""How near each pose is to a recorded pose, and how smooth the motion is.
 
-A pose is its joints' places and 0.12 s of their velocity, in the frame of the body's heading with its origin on the
-ground below the hips (as the search sees it); distances are root mean squares over joints, in metres.
+A pose is its joints' positions and 0.12 s of their velocity, in the frame of the body's heading with its origin on the
+ground below the hips (as in the search); distances are root mean squares over joints, in metres.
 """
 
 from __future__ import annotations
@@ -16,32 +16,62 @@ from ..motion.skeleton import Skeleton
 from ..synthesis.quality import movement
 from ..synthesis.quality.movement import speed_class
 
-VELOCITY_SECONDS = 0.12  # weighs m/s against metres, as `library.features.HORIZON`
-_ROWS_AT_ONCE = 512  # of distances, which bounds the memory
+VELOCITY_SECONDS = 0.12  # weight of m/s against metres, like `library.features.HORIZON`
+_ROWS_AT_ONCE = 512  # rows of distances at once, to limit memory
 
 
 def local_positions(skeleton: Skeleton, positions: np.ndarray, hips: int) -> np.ndarray:
-    """World positions (T, J, 3) m seen from the body: X ahead, Y left, Z up, origin below the hips on the ground;
-    float32."""
+    """Transform positions to the body's frame: X ahead, Y left, Z up, origin on the ground below the hips.
+
+    Args:
+        skeleton: the skeleton, J joints.
+        positions: (T, J, 3) m, world frame.
+        hips: index of the hips.
+    Returns:
+        (T, J, 3) m, float32.
+    """
     return turned(positions - ground_point(positions, hips), -heading_from_positions(skeleton, positions))
 
 
 def ground_point(positions: np.ndarray, joint: int) -> np.ndarray:
-    """The point on the ground below a joint: positions (T, J, 3) m -> (T, 1, 3) m."""
+    """Find the point on the ground below a joint.
+
+    Args:
+        positions: (T, J, 3) m, world frame.
+        joint: its index.
+    Returns:
+        (T, 1, 3) m.
+    """
     return positions[:, joint, None] * np.array([1.0, 1.0, 0.0])
 
 
 def turned(vectors: np.ndarray, angle: np.ndarray) -> np.ndarray:
-    """Vectors (T, J, 3) turned about Z by one angle per frame (T,) radians; float32."""
+    """Rotate vectors about Z by one angle per frame.
+
+    Args:
+        vectors: (T, J, 3).
+        angle: (T,) radians.
+    Returns:
+        (T, J, 3), float32.
+    """
     return quaternion.turned_about_up(vectors, angle[:, None]).astype(np.float32)
 
 
 def pose_features(skeleton: Skeleton, positions: np.ndarray, fps: float, hips: int) -> np.ndarray:
-    """Features (T, 6 J) float32 in metres of world positions (T, J, 3): places, then 0.12 s of velocity, both per
-    sqrt(J).
+    """Build features of poses: positions, then 0.12 s of velocity, both divided by sqrt(J).
 
-    Velocities are the world's, turned into the heading frame, so travel counts. The Euclidean distance of two rows is
-    then the root mean square over joints."""
+    Velocities are world velocities rotated into the heading frame, so travel counts. The Euclidean distance of two rows
+    is
+    the root mean square over joints.
+
+    Args:
+        skeleton: the skeleton, J joints.
+        positions: (T, J, 3) m, world frame.
+        fps: frames per second.
+        hips: index of the hips.
+    Returns:
+        (T, 6 J) m, float32.
+    """
     places = local_positions(skeleton, positions, hips)
     moves = turned(time_derivative(positions, fps), -heading_from_positions(skeleton, positions)) * VELOCITY_SECONDS
     both = np.concatenate([places, moves], axis=1).reshape(len(positions), -1)
@@ -49,7 +79,14 @@ def pose_features(skeleton: Skeleton, positions: np.ndarray, fps: float, hips: i
 
 
 def mirrored_features(features: np.ndarray, body: Humanoid) -> np.ndarray:
-    """The features (T, 6 J) of the mirrored poses: sides exchanged, left of the body becomes right."""
+    """Compute the features of the mirrored poses: sides exchanged, left and right of the body swapped.
+
+    Args:
+        features: (T, 6 J) m.
+        body: the skeleton's humanoid joints.
+    Returns:
+        (T, 6 J) m.
+    """
     parts = features.reshape(len(features), 2, -1, 3)[:, :, list(body.mirror)]
     return (parts * np.array([1.0, -1.0, 1.0], dtype=np.float32)).reshape(len(features), -1)
 
@@ -57,11 +94,17 @@ def mirrored_features(features: np.ndarray, body: Humanoid) -> np.ndarray:
 def nearest_distance(
     features: np.ndarray, library: np.ndarray, left_out: np.ndarray | None = None, owner: np.ndarray | None = None
 ) -> np.ndarray:
-    """Distance (T,) m from each row of features (T, D) to the nearest row of library (N, D).
+    """Measure the distance from each row of features to the nearest row of a library.
 
-    left_out (T,), owner (N,): where given, library rows whose owner equals a feature row's left_out do not count;
-    infinite where none is left. Exhaustive, in chunks; |a-b|^2 = |a|^2 - 2ab + |b|^2 loses about 1e-3 m in float32 near
-    zero."""
+    The search is exhaustive, in chunks; |a-b|^2 = |a|^2 - 2ab + |b|^2 loses about 1e-3 m in float32 near zero.
+
+    Args:
+        features: (T, D) m.
+        library: (N, D) m.
+        left_out, owner: (T,), (N,) or None; library rows whose owner equals a row's left_out do not count.
+    Returns:
+        (T,) m, infinite if no library row counts.
+    """
     squares = np.einsum("nd,nd->n", library, library)
     out = np.empty(len(features))
     for start in range(0, len(features), _ROWS_AT_ONCE):
@@ -74,27 +117,48 @@ def nearest_distance(
 
 
 def real_p95(values: np.ndarray, speed: np.ndarray) -> np.ndarray:
-    """95th percentile (5,) m, by `movement.real_p95`, in each speed class of speed (M,) m/s: of leave-one-clip-out
-    distances (M,), infinite where a library has one clip only, or of uncut recordings' smoothness (M,), NaN between
-    clips."""
+    """Compute the 95th percentile of values in each speed class, with `movement.real_p95`.
+
+    Args:
+        values: (M,) m: leave-one-clip-out distances (infinite if a library has one clip only), or smoothness of uncut
+            recordings (NaN between clips).
+        speed: (M,) m/s.
+    Returns:
+        (5,) m.
+    """
     known = np.isfinite(values)
     return movement.real_p95(values[known], speed[known])
 
 
 def unreal(distance: np.ndarray, speed: np.ndarray, real: np.ndarray) -> np.ndarray:
-    """Frames (T,) bool whose nearest library pose is farther (T,) m than the real p95 (5,) m at their speed (T,)
-    m/s."""
+    """Find the frames whose nearest library pose is farther than the recordings' 95th percentile.
+
+    Args:
+        distance: (T,) m to the nearest pose.
+        speed: (T,) m/s.
+        real: (5,) m, the percentile of each speed class.
+    Returns:
+        (T,) bool.
+    """
     return distance > real[speed_class(speed)]
 
 
 def smoothness(skeleton: Skeleton, positions: np.ndarray, fps: float) -> np.ndarray:
-    """Distance (T-1,) m between the feature vectors of consecutive frames of world positions (T, J, 3) m: the curves of
-    Faustino's App. D (§5.2.1), whose peaks are what counts.
+    """Measure the distance between the features of consecutive frames, the curves of Faustino's App. D (§5.2.1).
 
-    The features are those of his §3.2: position, velocity and acceleration of all joints seen from the root, in the
-    scale of `library.features`. He reduces them by PCA to 98 % of their energy, which leaves the curve as it is
-    (on a take from five folders of recordings 96 % of its height, correlation 0.999); here nothing is reduced, so that
-    a motion has one curve, whatever library it comes from."""
+    Peaks of the curve are what counts. The features are those of Faustino's §3.2: position, velocity and acceleration
+    of
+    all joints relative to the root, in the scale of `library.features`. Faustino reduces them by PCA to 98 % of their
+    energy, which hardly changes the curve (on a take from five folders of recordings 96 % of its height, correlation
+    0.999). Without that reduction a motion has one curve, whatever library it comes from.
+
+    Args:
+        skeleton: the skeleton, J joints.
+        positions: (T, J, 3) m, world frame.
+        fps: frames per second.
+    Returns:
+        (T-1,) m.
+    """
     joints = feature_joints(skeleton)
     facing = np.unwrap(heading_from_positions(skeleton, positions))
     return np.linalg.norm(np.diff(raw_features(positions[:, joints], facing, fps), axis=0), axis=-1)

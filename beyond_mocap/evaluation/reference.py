@@ -1,12 +1,12 @@
-"""What a library's uncut recordings score themselves, worked out once per library and output rate, and a take beside
-them (`View`).
+"""The scores of a library's uncut recordings, computed once per library and frame rate, and a take beside them
+(`View`).
 
-Measured are the recordings as they are used: brought to the library's skeleton and repaired (`library.repair`), which
-leaves their jerk as it was: the 95th percentile moves by 1 % at most where clips keep their speed class, by 4 to 9 % on
-a library of five bodies whose clips nearly all get other feet.
+Recordings are measured as they are used: retargeted to the library's skeleton and repaired (`library.repair`). Repair
+leaves their jerk nearly unchanged: the 95th percentile moves by 1 % at most where clips keep their speed class, by 4 to
+9 % on a library of five bodies whose clips nearly all get other feet.
 
-Every recording is resampled to the output's rate and measured frame by frame; a take's own score is then a look-up of
-the frames it used. Twins are not measured again: all figures here are the same for left and right.
+Every recording is resampled to the output's frame rate and measured frame by frame; a take's own score is then a
+look-up of the frames it used. Mirrored clips are not measured again: all figures here are the same for left and right.
 """
 
 from __future__ import annotations
@@ -30,18 +30,29 @@ from ..synthesis.quality.moments import moments
 from ..synthesis.quality.played import Played, find_transitions
 from . import realism
 
-POSES_PER_SECOND = 10.0
-LEFT_OUT_POSES = 3000
+POSES_PER_SECOND = 10.0  # of a recording that are compared with
+LEFT_OUT_POSES = 3000  # poses at most in the leave-one-clip-out estimate
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Recording:
-    """One uncut clip at the output's rate, T frames, measured.
+    """Figures of one uncut clip at the output's frame rate, T frames.
 
-    features (T, 6 J) float32 m, of `realism.pose_features`. sway, surge, speed (T,): m, m/s, m/s. contact_speed (T, 2)
-    m/s, NaN without contact. skating (T,) bool. heel_rest: height of its heel joint on a flat foot, m. support (T, 2)
-    m. tip (T,) m. jerk (T-3,) m/s^3. smoothness (T,) m from each frame to the next, NaN at the end. stances (S, 3) of
-    its own frames and their travel (S,) m."""
+    Attributes:
+        path: of the clip.
+        rate: its own frames per second.
+        features: (T, 6 J) m, float32, from `realism.build_pose_features`.
+        sway, surge, speed: (T,) m, m/s, m/s.
+        contact_speed: (T, 2) m/s, NaN without contact.
+        skating: (T,) bool.
+        heel_rest: height of its heel joint on a flat foot, m.
+        support: (T, 2) m, height of the feet in contact.
+        tip: (T,) m, height of the lowest tip.
+        jerk: (T-3,) m/s^3.
+        smoothness: (T,) m from each frame to the next, NaN at the end.
+        stances: (S, 3) first frame, end and side.
+        travel: (S,) m, travel of the stances.
+    """
 
     path: str
     rate: float
@@ -62,13 +73,25 @@ class Recording:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class LibraryReference:
-    """A library's recordings at `fps`, one after the other (N frames), and what is real for them.
+    """Figures of a library's recordings at `fps`, one after the other (N frames), and the level of real motion.
 
-    index: path -> recording; first (C + 1,): each recording's first row; rate (C,): its own frames per second; the
-    per-frame arrays are Recording's, joined; jerk_above_real (N,): 1 where the window around a frame is above jerk_p95,
-    NaN at a clip's ends. Speed classes are `movement.speed_class`'s: jerk_p95 (5,) m/s^3, smoothness_p95 and pose_p95
-    (5,) m. poses (M, 6 J): some ten a second of all clips, twins included. heel_rest: height of the heel joint on a
-    flat foot, m. fastest: highest speed of a root behind a 1 s window, slowest: the slowest gait, m/s."""
+    Speed classes are those of `movement.speed_class`.
+
+    Attributes:
+        fps: frames per second.
+        index: path -> recording.
+        first: (C + 1,) each recording's first row.
+        rate: (C,) each recording's own frames per second.
+        sway, surge, speed, contact_speed, skating, support, tip, smoothness, stances, travel: those of `Recording`,
+            joined.
+        jerk_above_real: (N,) 1 where the window around a frame is above jerk_p95, else 0, NaN at a clip's ends.
+        heel_rest: height of the heel joint on a flat foot, m.
+        jerk_p95: (5,) m/s^3 by speed class.
+        smoothness_p95, pose_p95: (5,) m by speed class.
+        poses: (M, 6 J) about ten a second of all clips, mirrored ones included.
+        fastest: highest speed of a root, smoothed with a 1 s window, m/s.
+        slowest: speed of the slowest gait, m/s.
+    """
 
     fps: float
     index: dict[str, int]
@@ -94,18 +117,31 @@ class LibraryReference:
     slowest: float
 
     def rows(self, clips: tuple[str, ...], clip: np.ndarray, clip_frame: np.ndarray) -> np.ndarray:
-        """Fractional row (T,) of each output frame's source, NaN where it is not known.
+        """Find the row of each output frame's source.
 
-        clips: table of paths; clip (T,) int index into it, -1 unknown; clip_frame (T,) in the clip's own rate."""
+        Args:
+            clips: table of paths.
+            clip: (T,) int, index into the table, -1 if unknown.
+            clip_frame: (T,) at the clip's own frame rate.
+        Returns:
+            (T,) fractional rows, NaN if unknown.
+        """
         table = np.array([self.index.get(path, -1) for path in clips] + [-1])
         own = table[clip]
         frame = np.clip(clip_frame * self.fps / self.rate[own], 0, np.diff(self.first)[own] - 1)
         return np.where((own >= 0) & (clip >= 0), self.first[own] + frame, np.nan)
 
     def used_stances(self, rows: np.ndarray) -> np.ndarray:
-        """Travel (S',) m of the source stances that a take touched; rows (T,) int of the frames it used."""
+        """Select the travel of the source stances that a take uses.
+
+        Args:
+            rows: int, the rows of the frames it uses.
+        Returns:
+            (S',) m.
+        """
         used = np.zeros(self.first[-1] + 1, dtype=int)
         used[rows + 1] = 1
+        # count[i] is the number of used rows before row i, so a stance is used if it grows over the stance.
         count = np.cumsum(used)
         return self.travel[count[self.stances[:, 1]] > count[self.stances[:, 0]]]
 
@@ -114,7 +150,14 @@ _MADE: WeakKeyDictionary[Library, dict[float, LibraryReference]] = WeakKeyDictio
 
 
 def library_reference(library: Library, fps: float) -> LibraryReference:
-    """The library's reference at `fps`, kept in memory as long as the library is."""
+    """Return the library's reference at a frame rate; it stays in memory as long as the library.
+
+    Args:
+        library: the library.
+        fps: frames per second.
+    Returns:
+        The reference.
+    """
     made = _MADE.setdefault(library, {})
     if fps not in made:
         made[fps] = build_reference(library, fps)
@@ -122,7 +165,14 @@ def library_reference(library: Library, fps: float) -> LibraryReference:
 
 
 def build_reference(library: Library, fps: float) -> LibraryReference:
-    """Measures every recording of a library at `fps` frames per second."""
+    """Measure every recording of a library.
+
+    Args:
+        library: the library.
+        fps: frames per second of the output.
+    Returns:
+        The reference.
+    """
     originals, twins = _originals(library.clips)
     measured = [measure(clip, fps) for clip in originals]
     lengths = [len(recording.sway) for recording in measured]
@@ -147,7 +197,7 @@ _JOINED = ("sway", "surge", "speed", "contact_speed", "skating", "support", "tip
 
 
 def _originals(clips: tuple[Clip, ...]) -> tuple[list[Clip], np.ndarray]:
-    """One clip per path, unmirrored where there is one, and whether its twin is in the library too (C,)."""
+    """Select one clip per path, unmirrored if possible, and whether its mirrored twin is in the library too (C,)."""
     chosen: dict[str, Clip] = {}
     count: dict[str, int] = {}
     for clip in sorted(clips, key=lambda clip: clip.mirrored):
@@ -157,7 +207,14 @@ def _originals(clips: tuple[Clip, ...]) -> tuple[list[Clip], np.ndarray]:
 
 
 def measure(clip: Clip, fps: float) -> Recording:
-    """One clip at `fps`, uncut, measured frame by frame."""
+    """Measure one clip, uncut, frame by frame.
+
+    Args:
+        clip: the clip.
+        fps: frames per second of the output.
+    Returns:
+        Its figures.
+    """
     motion = resample(clip.recording, fps)
     skeleton, hips = motion.skeleton, identify(motion.skeleton).hips
     positions, rotations = forward_kinematics(motion)
@@ -179,8 +236,8 @@ def measure(clip: Clip, fps: float) -> Recording:
 
 
 def _above(recording: Recording, real: np.ndarray) -> np.ndarray:
-    """Per frame of a recording 1 where the window around it has more jerk than is real, 0 where not, NaN at its
-    ends."""
+    """Flag each frame of a recording: 1 if the window around it has more jerk than `real`, 0 if not, NaN at its ends.
+    """
     out = np.full(len(recording.sway), np.nan)
     windows, speed = movement.uncut_windows(recording.jerk, recording.speed)
     start = movement.JERK_REACH + movement.SEAM_TO_JERK
@@ -189,8 +246,12 @@ def _above(recording: Recording, real: np.ndarray) -> np.ndarray:
 
 
 def _poses(measured: list[Recording], twins: np.ndarray, body: Humanoid, fps: float) -> tuple[np.ndarray, np.ndarray]:
-    """Poses to compare with (M, 6 J), and the 95th percentile (5,) of the distance that a clip's own poses have to all
-    other clips' (its twin left out with it), over at most 3000 poses evenly spread."""
+    """Select the poses to compare with (M, 6 J), and compute the 95th percentile (5,) of the leave-one-clip-out
+    distance.
+
+    That is the distance of a clip's own poses to all other clips' (its mirrored twin left out too), over at most 3000
+    poses evenly spread.
+    """
     step = max(int(round(fps / POSES_PER_SECOND)), 1)
     rows = np.concatenate([recording.features[::step] for recording in measured])
     owner = np.concatenate([np.full(len(r.features[::step]), i) for i, r in enumerate(measured)])
@@ -204,10 +265,17 @@ def _poses(measured: list[Recording], twins: np.ndarray, body: Humanoid, fps: fl
 
 
 def source_poses(library: Library, clips: tuple[str, ...], clip, mirrored, clip_frame) -> np.ndarray:
-    """Joints (T, J, 3) m of each output frame's source as recorded, seen from the body; NaN where it is not known.
+    """Compute the recorded pose of each output frame's source, in the body's frame.
 
-    clips: table of paths; clip (T,) int index into it, -1 unknown; mirrored (T,) bool; clip_frame (T,) in the clip's
-    rate."""
+    Args:
+        library: the library, J joints.
+        clips: table of paths.
+        clip: (T,) int, index into the table, -1 if unknown.
+        mirrored: (T,) bool.
+        clip_frame: (T,) at the clip's own frame rate.
+    Returns:
+        (T, J, 3) m, NaN if unknown.
+    """
     table = {(source.path, source.mirrored): source.motion for source in library.clips}
     out = np.full((len(clip), len(library.skeleton), 3), np.nan)
     for number, side in set(zip(clip.tolist(), mirrored.tolist())):
@@ -221,7 +289,7 @@ def source_poses(library: Library, clips: tuple[str, ...], clip, mirrored, clip_
 
 
 def _slowest_gait(library: Library) -> float:
-    """Speed of the slowest gait that gets about, m/s; NaN where the library has no locomotion."""
+    """Find the speed of the slowest gait that travels, m/s; NaN for a library without locomotion."""
     try:
         return min(gait.speed for gait in library.gaits if gait.word != STANDING)
     except InputError:
@@ -229,8 +297,22 @@ def _slowest_gait(library: Library) -> float:
 
 
 class View:
-    """What all figures of one report share, worked out once: the take, the frames of the library it used, its seams,
-    its speed, what was asked."""
+    """A take beside its library and track: what all figures of a report share, computed once.
+
+    Attributes:
+        played: the motion with its sources, T frames.
+        track, timeline, library: what it was synthesized from, or None.
+        fps, count: frames per second and number of frames.
+        reference: the library's own scores, or None.
+        scale: stature relative to the library's skeleton.
+        stride: clip frames per output frame at playback rate 1.
+        reference_rows: (T,) fractional rows of the reference, NaN if unknown.
+        used_rows: (U,) int, the rows of the known frames.
+        transitions: first frame of each clip but the first.
+        speed: (T,) m/s.
+        target: (T, 2) m, the track at the output frames, or None.
+        moments: the key moments with their clips.
+    """
 
     def __init__(self, played: Played, track: Track | None, timeline: Timeline | None, library: Library | None):
         motion = played.motion
@@ -248,11 +330,17 @@ class View:
 
     @property
     def source(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Clip, mirrored, clip_frame and stride per frame, as `pieces` wants them."""
+        """Clip, mirrored, clip_frame and stride per frame, in the order that `played` functions take."""
         return self.played.clip, self.played.mirrored, self.played.clip_frame, self.stride
 
     def own(self, name: str) -> np.ndarray:
-        """A figure of the uncut recordings at the frames that were used: (U, ...), empty without library."""
+        """Return a figure of the uncut recordings at the used frames.
+
+        Args:
+            name: a field of `LibraryReference`.
+        Returns:
+            (U, ...), empty without a library.
+        """
         return np.zeros(0) if self.reference is None else getattr(self.reference, name)[self.used]
 
     def _rows(self) -> np.ndarray:
@@ -262,10 +350,10 @@ class View:
 
 
 def _size(skeleton: Skeleton, library: Skeleton) -> float:
-    """How many times as tall as the library's skeleton another one is; InputError where it is not the same one."""
+    """Compute the stature of a skeleton relative to the library's; InputError if the bones differ otherwise."""
     if skeleton.same_bones(library, 5e-3):
         return 1.0
     size = stature(skeleton) / stature(library) if skeleton.names == library.names else 1.0
     if not skeleton.same_bones(library.scaled(size), 5e-3):
-        raise InputError("motion", "another skeleton than the library's", "a motion made from this library")
+        raise InputError("motion", "its skeleton differs from the library's", "a motion from this library")
     return size

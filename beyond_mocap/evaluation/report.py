@@ -1,5 +1,5 @@
-"""The report: every figure of `../shared/metrics.md` for one player's take, in the form of `../shared/contract.md`;
-several side by side, and one as text beside its targets."""
+"""The report: every figure of a player's take as JSON, several reports side by side, and one as text beside its
+targets."""
 
 from __future__ import annotations
 
@@ -22,16 +22,21 @@ from .reference import View
 
 VERSION = 1
 DEEPEST = 30
-"""Objects and lists in each other, of which no report has so many."""
+"""Nesting depth that no report reaches."""
 
 SECONDS = ("load", "library", "search", "construct", "polish", "total")
 
 
 def evaluate(take: Take, track: Track | None, library: Library | None) -> dict:
-    """The report of a take in memory: a dict in the form of the contract's Report JSON, None where nothing is known.
+    """Build the report of a take in memory.
 
-    track: the player's samples as measured, seconds and metres. library: what it was made from; without it there are no
-    scores of the recordings beside ours."""
+    Args:
+        take: the take.
+        track: the player's samples as measured, seconds and metres, or None.
+        library: the library it was synthesized from; without it there are no scores of the recordings.
+    Returns:
+        The report as plain values for JSON, None where a value is unknown.
+    """
     report = evaluate_played(
         played_from_take(take), track=track, timeline=take.timeline, library=library, ik_miss=take.ik_miss,
         asked=take.plan.timeline if take.plan else Timeline(),
@@ -52,11 +57,20 @@ def evaluate_played(
     played: Played, *, track: Track | None = None, timeline: Timeline | None = None, library: Library | None = None,
     ik_miss: np.ndarray | None = None, asked: Timeline | None = None,
 ) -> dict:  # fmt: skip
-    """The report of anything played, from memory or files (`played_from_take`, `played_from_tables`).
+    """Build the report of a motion with its sources, from memory or files (`played_from_take`, `played_from_tables`).
 
-    ik_miss: (T,) or (T, 2) metres by which inverse kinematics missed its targets, where that is known. asked: the
-    user's own words, where `timeline` has automatic ones beside them. InputError where the library has another skeleton
-    than the motion."""
+    Args:
+        played: the motion with its sources, T frames.
+        track: the player's track, or None.
+        timeline: the timeline, or None.
+        library: the library, or None.
+        ik_miss: (T,) or (T, 2) m by which inverse kinematics missed its targets, or None.
+        requested: the user's own timeline if `timeline` includes automatic spans.
+    Returns:
+        The report as plain values for JSON, None where a value is unknown.
+    Raises:
+        InputError: if the library has another skeleton than the motion.
+    """
     view = View(played, track, timeline, library)
     report = {
         "version": VERSION, "seed": None, "fps": played.motion.fps, "frames": len(played.motion),
@@ -70,12 +84,18 @@ def evaluate_played(
 
 
 def _seconds_of(lines: list[str]) -> list[list[list[float]]]:
-    """For each line the stretches [first, last] s that it is about."""
+    """List for each line the spans [first, last] in seconds that it refers to."""
     return [[[round(edge, 3) for edge in span] for span in spans_of(line)] for line in lines]
 
 
 def rounded(value):
-    """The same report with floats at five significant digits, NaN and infinity as None, numpy numbers as Python's."""
+    """Round all floats to five significant digits and convert to plain values.
+
+    Args:
+        value: a report or a part of it.
+    Returns:
+        The same with NaN and infinity as None and numpy numbers as Python's.
+    """
     if isinstance(value, Mapping):
         return {key: rounded(entry) for key, entry in value.items()}
     if isinstance(value, (list, tuple)):
@@ -90,9 +110,15 @@ def rounded(value):
 
 
 def table(reports: Mapping[str, dict]) -> str:
-    """Reports side by side as a Markdown table: one column per report, one row per figure, in the reports' order.
+    """Format reports side by side as a Markdown table.
 
-    Nested figures are named with dots, key moments are numbered from 1; texts (warnings) are counted."""
+    Args:
+        reports: name -> report.
+    Returns:
+        One column per report, one row per figure, in the reports' order. Nested figures are named with dots, key
+        moments
+        are numbered from 1, texts (warnings) are counted.
+    """
     columns = {name: flat(report) for name, report in reports.items()}
     rows = dict.fromkeys(figure for column in columns.values() for figure in column)
     lines = ["| figure | " + " | ".join(columns) + " |", "|---|" + "---|" * len(columns)]
@@ -102,19 +128,33 @@ def table(reports: Mapping[str, dict]) -> str:
 
 
 def check_depth(value, where: object) -> None:
-    """InputError, with `where` it is from, for a value out of JSON that is nested deeper than any report is."""
+    """Check that a value from JSON is not nested deeper than any report.
+
+    Args:
+        value: the value.
+        where: its file, for the error.
+    Raises:
+        InputError: if it is.
+    """
     level, depth = [value], 0
     while level:
         if depth > DEEPEST:
-            raise InputError(where, f"nested more than {DEEPEST} deep", "a report", "make it again")
+            raise InputError(where, f"nested more than {DEEPEST} levels deep", "a report", "write the report again")
         inner = [list(one.values()) if isinstance(one, Mapping) else one for one in level
                  if isinstance(one, (Mapping, list))]  # fmt: skip
         level, depth = [entry for entries in inner for entry in entries], depth + 1
 
 
 def flat(report: Mapping) -> dict[str, Any]:
-    """A report as one row per figure: nested names joined with dots, key moments numbered from 1, warnings counted.
-    InputError as `check_depth`."""
+    """Flatten a report to one row per figure.
+
+    Args:
+        report: the report.
+    Returns:
+        Name -> value: nested names joined with dots, key moments numbered from 1, warnings counted.
+    Raises:
+        InputError: see `check_depth`.
+    """
     check_depth(report, "report")
     return _flat(report, "")
 
@@ -133,12 +173,26 @@ def _flat(value, name: str) -> dict[str, Any]:
 
 
 def cell(value) -> str:
-    """One figure as text for a Markdown table."""
+    """Format one figure for a Markdown table.
+
+    Args:
+        value: the figure.
+    Returns:
+        The text.
+    """
     return _shown(value, "-").replace("|", "\\|")
 
 
 class Row(NamedTuple):
-    """One figure as text: `own` is the recordings' score, status "met", "missed" or ""."""
+    """One figure as text.
+
+    Attributes:
+        name: name of the figure, with dots.
+        value: the take's value.
+        own: the recordings' score.
+        target: the target, or "".
+        status: "met", "missed" or "".
+    """
 
     name: str
     value: str
@@ -148,7 +202,13 @@ class Row(NamedTuple):
 
 
 def judge_figures(report: Mapping) -> Iterator[Row]:
-    """Every figure of a report (`evaluate`) that is known or has a target."""
+    """Compare every figure of a report with its target.
+
+    Args:
+        report: from `evaluate`.
+    Returns:
+        A row for each figure that is known or has a target.
+    """
     table = flat(report)
     fps = float(report.get("fps") or 30.0)
     for name, value in table.items():

@@ -1,1 +1,1 @@
-"""File formats that several features share: metres, seconds, Z up inside; each file's own form outside."""
+"""File formats that several features share: metres, seconds and Z up in the core, each file's own form outside."""

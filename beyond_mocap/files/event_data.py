@@ -1,5 +1,7 @@
-"""What a provider's people wrote down of a match: passes, shots, saves, in one form for all of them; and which tracked
-player each of its people is: by id, by shirt number, by name."""
+"""A match's event data in one form for all providers, and the assignment of its players to tracked players.
+
+Players are assigned by id, then by shirt number, then by name.
+"""
 
 from __future__ import annotations
 
@@ -12,22 +14,31 @@ from ..annotation.event_words import EVENT_KINDS
 from ..motion.track.match_data import REFEREE, Match, MatchPlayer
 
 NOT_PLAYED = frozenset(kind.name for kind in EVENT_KINDS if kind.touch == "none")
-"""Kinds that are no touch of the ball."""
+"""Kinds of events without a ball touch."""
 
 CERTAIN = frozenset(kind.name for kind in EVENT_KINDS if kind.touch == "certain")
-"""Kinds that are a touch for certain."""
+"""Kinds of events that are certainly a ball touch."""
 
 _OTHER = {"home": "away", "away": "home"}
 
 
 @dataclass(frozen=True, kw_only=True)
 class MatchEvent:
-    """Somebody did something.
+    """One event of a match.
 
-    time: s from the begin of its period, on the events' own clock. period: 1 for the first. player: the tracking's id,
-    "" where he is not known. team: "home", "away" or "". kind: of `annotation.event_words.KINDS`. part: "foot",
-    "head", "chest", "hand" or "". side: "left", "right" or "". details: further words ("throw-in", "lost"). said: how
-    the provider calls it. success: None where it does not say. place: (x, y) m on the tracking's pitch, or NaN."""
+    Attributes:
+        time: s from the start of its period, on the events' own clock.
+        period: 1 for the first.
+        player: the tracking's id, "" if unknown.
+        team: "home", "away" or "".
+        kind: of `annotation.event_labels.KINDS`.
+        part: "foot", "head", "chest", "hand" or "".
+        side: "left", "right" or "".
+        details: further properties ("throw-in", "lost").
+        original_text: the provider's name of the event.
+        success: None if the provider does not say.
+        place: (x, y) m on the tracking's pitch, or NaN.
+    """
 
     time: float
     period: int
@@ -43,14 +54,20 @@ class MatchEvent:
 
     @property
     def played(self) -> bool:
-        """Whether the ball is touched, as far as is known."""
+        """Whether the event is known to be, or may be, a ball touch."""
         return self.kind not in NOT_PLAYED
 
 
 @dataclass(frozen=True)
 class MatchEvents:
-    """All events of a match by period and time. provider: whose form they had. where: the file, for messages. notes:
-    what was guessed or is missing, for people."""
+    """All events of a match, ordered by period and time.
+
+    Attributes:
+        events: the events.
+        provider: the provider of the file.
+        where: the file, for messages.
+        notes: assumptions and missing data, one line each.
+    """
 
     events: tuple[MatchEvent, ...]
     provider: str
@@ -60,7 +77,14 @@ class MatchEvents:
 
 @dataclass(frozen=True)
 class Who:
-    """Somebody as events name him: id; team "home", "away" or ""; shirt number, -1 where unknown; name."""
+    """A player as events name them.
+
+    Attributes:
+        id: the provider's id.
+        team: "home", "away" or "".
+        number: shirt number, -1 if unknown.
+        name: the name, or "".
+    """
 
     id: str
     team: str = ""
@@ -69,21 +93,35 @@ class Who:
 
     @classmethod
     def spelled(cls, said: str, team: str = "") -> "Who":
-        """From one cell: "home_7", "away 11", "Player7", or a name or an id."""
+        """Parse one cell: "home_7", "away 11", "Player7", or a name or an id.
+
+        Args:
+            text: the cell.
+            team: the team if the cell does not name it.
+        Returns:
+            The player.
+        """
         match = re.fullmatch(r"(?i)(home|away|player)?[ _-]*#?(\d{1,2})", said.strip())
         ground = match[1].lower() if match and match[1] and match[1].lower() != "player" else team
         return cls(said.strip(), ground, int(match[2]) if match else -1, said.strip())
 
     @property
     def said(self) -> str:
-        """For messages."""
+        """The player's name for messages."""
         return self.name or f"{self.team} {self.number if self.number >= 0 else self.id}".strip()
 
 
 def same_players(everybody: Sequence[Who], match: Match | None) -> tuple[dict[Who, tuple[str, str]], list[str]]:
-    """Who -> (id, team) in the match, of those who are found, and notes.
+    """Assign the players of events to the players of a match.
 
-    Feeds may call the other team home: the way round in which more are found counts."""
+    Feeds may exchange home and away: the assignment that finds more players is used.
+
+    Args:
+        event_players: the players of the events.
+        match: the tracked match, or None.
+    Returns:
+        Event player -> (id, team) in the match for those that are found, and notes.
+    """
     if match is None:
         return {}, []
     players = [player for player in match.players if player.team != REFEREE]
@@ -93,7 +131,7 @@ def same_players(everybody: Sequence[Who], match: Match | None) -> tuple[dict[Wh
     best = straight
     if len(turned) > len(straight):
         best = turned
-        notes.append("home and away are the other way round in the events")
+        notes.append("home and away are exchanged in the events")
     lost = [who.said for who in everybody if who not in best]
     if lost:
         notes.append(f"{len(lost)} of {len(everybody)} players of the events are not tracked: {', '.join(lost[:6])}")
@@ -101,7 +139,7 @@ def same_players(everybody: Sequence[Who], match: Match | None) -> tuple[dict[Wh
 
 
 def _found(who: Who, players: Sequence[MatchPlayer], team: str) -> MatchPlayer | None:
-    """The one player who fits: the id alone, else within his team number, then name."""
+    """Find the one player who matches: by id, then within the team by number, then by name."""
     by_id = [player for player in players if player.id == who.id and team in ("", player.team)]
     own = [player for player in players if team in ("", player.team)]
     by_number = [player for player in own if who.number >= 0 and player.number == who.number] if team else []
@@ -112,6 +150,6 @@ def _found(who: Who, players: Sequence[MatchPlayer], team: str) -> MatchPlayer |
 
 
 def _plain(name: str) -> str:
-    """A name in small letters without accents."""
+    """Convert a name to lower case without accents."""
     flat = unicodedata.normalize("NFKD", name)
     return " ".join("".join(letter for letter in flat if not unicodedata.combining(letter)).lower().split())

@@ -1,5 +1,8 @@
-"""The providers of events, one record each, the second file that goes with a file of events, and the tables that kloppy
-leaves out: our own, of which docs/match/match-input.md names the columns, and Metrica's."""
+"""The providers of event data, one record each, and readers for tables that kloppy does not support.
+
+These are the project's own table (columns in docs/match/match-input.md) and Metrica's. The second file of a provider's
+events is found here too.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +21,7 @@ from .tables import number, read_rows
 from .tracking.feed import Provider, find_provider, load_through_kloppy, read_head
 from .tracking.match_arrays import USUAL_PITCH
 
-_TABLE_KINDS = {  # of plain tables -> kind
+_TABLE_KINDS = {  # event types of plain tables -> kind
     "miss": "shot", "goal": "shot", "post": "shot", "saved shot": "shot", "cross": "pass", "blocked pass": "deflection",
     "takeon": "take-on", "ball touch": "touch", "recovery": "touch", "challenge": "tackle", "dispossessed": "touch",
     "ball lost": "touch", "ball out": "out", "set piece": "other", "fault received": "foul", "card": "other",
@@ -30,13 +33,13 @@ _HEAD = {"header", "head"}
 
 @dataclass(frozen=True, kw_only=True)
 class EventProvider(Provider):
-    """What is known of a provider's events.
+    """A provider of event data.
 
-    Args:
-        arguments: kloppy's names for "events", the file, and "meta", the second one; none where kloppy reads nothing.
-        second: what the second file begins with; empty where there is no second file.
-        read_table: reads a CSV, which has no second file; None where kloppy reads all.
-        tells_foot: whether it tells left feet from right ones; where not, kloppy says "right" for either.
+    Attributes:
+        arguments: kloppy's names for "events" (the file) and "meta" (the second file); empty if kloppy reads nothing.
+        second_pattern: pattern of the second file's beginning; empty if there is no second file.
+        read_table: reads a CSV, which has no second file; None if kloppy reads all files.
+        has_foot_side: whether the data has left and right feet; without them kloppy says "right" for both.
     """
 
     second: bytes = b""
@@ -44,22 +47,43 @@ class EventProvider(Provider):
     tells_foot: bool = True
 
     def has_table(self, path: Path) -> bool:
-        """Whether a file of this provider is one for `read_table`."""
+        """Return whether a file of this provider is one for `read_table`.
+
+        Args:
+            path: the file.
+        """
         return self.read_table is not None and (not self.arguments or path.suffix.lower() == ".csv")
 
 
 def guessed_event_provider(path: Path) -> EventProvider:
-    """Whose form a file has; InputError where it is none that is known."""
+    """Detect the provider of a file from its content.
+
+    Args:
+        path: the file.
+    Returns:
+        The provider.
+    Raises:
+        InputError: if no provider's form fits.
+    """
     found = find_provider(path, EVENT_PROVIDERS)
     if found is None:
-        what = "a form that is not known" if read_head(path).strip() else "an empty file"
-        raise InputError(path, what, f"events of one of {', '.join(EVENT_PROVIDERS)}", "name the provider")
+        what = "unknown format" if read_head(path).strip() else "the file is empty"
+        raise InputError(path, what, f"events of one of {', '.join(EVENT_PROVIDERS)}", "choose the provider")
     return found
 
 
 def other_file(path: Path, provider: EventProvider, meta: str | os.PathLike | None) -> Path | None:
-    """The lineups or metadata that an events file needs: `meta`, else the one beside it whose name, or else whose
-    form fits; None where it needs none. InputError where there is none."""
+    """Find the lineups or metadata that a file of events needs.
+
+    Args:
+        path: the file of events.
+        provider: its provider.
+        meta: the second file; None searches beside `path` for a matching name, then for matching content.
+    Returns:
+        The second file; None if none is needed.
+    Raises:
+        InputError: if it is missing.
+    """
     if not provider.second or provider.has_table(path):
         return None
     if meta is not None:
@@ -76,12 +100,22 @@ def other_file(path: Path, provider: EventProvider, meta: str | os.PathLike | No
                and re.match(provider.second, read_head(one))]  # fmt: skip
     if len(fitting) == 1:
         return fitting[0]
-    expected = f"one as {names[0]}" if names[0] != path.name else "the provider's lineups or metadata"
-    raise InputError(path, f"no second file beside it for {provider.name}", expected, "put it there, or name it")
+    expected = f"a file such as {names[0]}" if names[0] != path.name else "the provider's lineups or metadata"
+    raise InputError(path, f"the second file for {provider.name} is missing", expected, "add it, or choose it")
 
 
 def load_events(path: Path, provider: EventProvider, meta: Path | None):
-    """kloppy's dataset in the provider's own coordinates. InputError without kloppy, and where it cannot read them."""
+    """Load events with kloppy, in the provider's own coordinates.
+
+    Args:
+        path: the file of events.
+        provider: its provider.
+        meta: the second file, or None.
+    Returns:
+        kloppy's dataset.
+    Raises:
+        InputError: if kloppy is not installed or cannot read the files.
+    """
     known = {"events": str(path), "meta": str(meta)}
     arguments = {key: known[name] for key, name in provider.arguments.items()}
     others = f" and their {meta.name}" if meta else ""
@@ -90,13 +124,29 @@ def load_events(path: Path, provider: EventProvider, meta: Path | None):
 
 
 def pitch_size(match: Match | None) -> tuple[float, float]:
-    """Length and width, m, of the tracking's pitch, or of a usual one."""
+    """Return the size of the tracking's pitch, or of a usual one.
+
+    Args:
+        match: the tracked match, or None.
+    Returns:
+        Length and width, m.
+    """
     return (match.length, match.width) if match else USUAL_PITCH
 
 
 def read_plain_events(path: Path, match: Match | None):
-    """Rows of time_s,type,player[,detail,success,x,y,period,part,side]: seconds of the match's clock, or of the
-    period's where a column names it."""
+    """Read a table time_s,type,player[,detail,success,x,y,period,part,side].
+
+    Times are seconds of the match's clock, or of the period's if there is a column `period`.
+
+    Args:
+        path: the file.
+        match: the tracked match, or None.
+    Returns:
+        (event, player or None) of each row.
+    Raises:
+        InputError: with the line, if a cell is invalid.
+    """
     rows = []
     for place, row in read_rows(path, ("time_s", "type", "player")):
         time, period = number(row["time_s"], "time_s", place), 1
@@ -111,7 +161,7 @@ def read_plain_events(path: Path, match: Match | None):
         words = detail.replace("/", " ").replace("_", " ")
         part = row.get("part", "").lower() or _part_in(words, said)
         if part and part not in BODY_PARTS:
-            raise InputError(place, f"part {part!r}", f"one of {', '.join(BODY_PARTS)}, or none")
+            raise InputError(place, f"part {part!r}", f"one of {', '.join(BODY_PARTS)}, or blank")
         sides = f"{row.get('side', '')} {words}".split() if part == "foot" else ()
         side = next((one for one in ("left", "right") if one in sides), "")
         details = ("throw-in",) if "throw in" in f"{said} {words}".replace("-", " ") else ()
@@ -124,14 +174,23 @@ def read_plain_events(path: Path, match: Match | None):
 
 
 def _part_in(words: str, said: str) -> str:
-    """The part that a detail names."""
+    """Find the body part that a detail names."""
     if _HEAD & {*words.split(), said}:
         return "head"
     return "foot" if "foot" in words else ""
 
 
 def read_metrica_events(path: Path, match: Match | None):
-    """Metrica's own table of events, which kloppy leaves out."""
+    """Read Metrica's own table of events, which kloppy does not support.
+
+    Args:
+        path: the file.
+        match: the tracked match, or None.
+    Returns:
+        (event, player or None) of each row.
+    Raises:
+        InputError: with the line, if a cell is invalid.
+    """
     rows = []
     needed = ("Team", "Type", "Subtype", "Period", "Start Time [s]", "From", "Start X", "Start Y")
     length, width = pitch_size(match)
@@ -158,7 +217,7 @@ _ALONE, _WITH_METADATA = {"event_data": "events"}, {"event_data": "events", "met
 _WITH_LINEUPS = {"event_data": "events", "lineup_data": "meta"}
 _LINEUPS = (("events", "lineups"), ("event", "lineup"))
 
-# in the order of the choices that saved scenes number: a new one goes to the end
+# saved scenes store the position in this order: add new providers at the end
 EVENT_PROVIDERS: dict[str, EventProvider] = {record.name: record for record in (
     EventProvider(
         name="opta", title="Opta", files="F24 or F73 with F7", renamed=(("f24", "f7"), ("F24", "F7"), ("f73", "f7")),

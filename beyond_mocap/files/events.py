@@ -1,5 +1,7 @@
-"""Events of a match in: providers' files through kloppy, whose kinds, qualifiers and results become our words, and
-plain tables, with the tracking's players."""
+"""Read a match's event data: providers' files through kloppy, and plain tables, with the tracking's players.
+
+kloppy's kinds, qualifiers and results are converted to the kinds and details of `annotation.event_labels`.
+"""
 
 from __future__ import annotations
 
@@ -14,13 +16,13 @@ from .event_data import MatchEvent, MatchEvents, Who, same_players
 from .event_providers import EVENT_PROVIDERS, EventProvider, guessed_event_provider, load_events, other_file, pitch_size
 from .tracking.match_repairs import home_end
 
-_LEAST_KNOWN = 0.5  # share of the events' players who must be in the tracking
+_LEAST_KNOWN = 0.5  # smallest share of the events' players that must be tracked
 _KINDS = {
     "PASS": "pass", "SHOT": "shot", "TAKE_ON": "take-on", "CARRY": "carry", "CLEARANCE": "clearance",
     "INTERCEPTION": "interception", "RECOVERY": "touch", "MISCONTROL": "miscontrol", "BALL_OUT": "out",
     "FOUL_COMMITTED": "foul", "DUEL": "tackle", "GOALKEEPER": "save",
 }  # fmt: skip
-_BY_NAME = {  # of events that kloppy leaves generic
+_BY_NAME = {  # names of events that kloppy treats as generic -> kind
     "ball receipt*": "receive", "reception": "receive", "receival": "receive", "touch": "touch", "ball touch": "touch",
     "block": "deflection",
 }  # fmt: skip
@@ -44,13 +46,20 @@ def read_events(
     path: str | os.PathLike, meta: str | os.PathLike | None = None, provider: str | None = None,
     match: Match | None = None,
 ) -> MatchEvents:
-    """A provider's events, with the players of a tracked match.
+    """Read a provider's events, with the players of a tracked match.
 
-    meta: lineups or metadata where the provider has them in a second file (Opta's F7, StatsBomb's lineups, the metadata
-    of Metrica and Sportec, Stats Perform's MA1); where None, one beside `path` whose name fits. provider: one of
-    `event_providers.EVENT_PROVIDERS`; where None, guessed from the content. match: whose ids the players get and on
-    whose pitch the places are; without one they keep their own. InputError where files are missing or not of that form,
-    and where most players are not in the match: the events are of another one."""
+    Args:
+        path: the file of events.
+        meta: lineups or metadata if the provider has a second file (Opta's F7, StatsBomb's lineups, the metadata of
+            Metrica and Sportec, Stats Perform's MA1); None searches beside `path`.
+        provider: key of `event_providers.EVENT_PROVIDERS`; None detects it from the content.
+        match: the tracked match that gives the players' ids and the pitch; without it they keep their own.
+    Returns:
+        The events.
+    Raises:
+        InputError: if files are missing or invalid, or most players are not in the match, so the events are of another
+            match.
+    """
     if not Path(path).is_file():
         found = "is a folder" if Path(path).is_dir() else "no such file"
         raise InputError(path, found, "a file of events", "check the path")
@@ -64,24 +73,24 @@ def read_events(
     else:
         rows = _through_kloppy(path, record, second, match)
     if not rows:
-        raise InputError(path, "no events", "some", "export it again")
+        raise InputError(path, "has no events", "at least one event", "export it again")
     events, notes = _with_players(path, rows, match)
-    told = [f"{second.name} taken as its second file"] if second and meta is None else []
-    told += [f"{meta}: not used, since events of {record.name} are in one file"] if meta and not second else []
+    told = [f"{second.name} is used as its second file"] if second and meta is None else []
+    told += [f"{meta}: not used, because events of {record.name} are in one file"] if meta and not second else []
     return MatchEvents(tuple(events), record.name, str(path), tuple([*told, *notes]))
 
 
 def _with_players(path: Path, rows: list[tuple[MatchEvent, Who | None]], match: Match | None):
-    """The events with the tracking's ids, by period and time, and notes."""
+    """Assign the tracking's ids to the events, ordered by period and time; return them with notes."""
     everybody = list(dict.fromkeys(who for _, who in rows if who is not None))
     known, notes = same_players(everybody, match)
     few = match is not None and len(known) < _LEAST_KNOWN * len(everybody)
-    if few and all(who.number < 0 and not who.name for who in everybody):  # nothing says that it is another match
+    if few and all(who.number < 0 and not who.name for who in everybody):  # nothing shows that it is another match
         ids = ", ".join([who.id for who in everybody if who not in known][:3])
         notes = [
-            f"{path.name}: {len(everybody) - len(known)} of {len(everybody)} players cannot be assigned, for these "
+            f"{path.name}: {len(everybody) - len(known)} of {len(everybody)} players cannot be assigned, because the "
             f"events have neither shirt numbers nor names, and the tracking has other ids than theirs ({ids} ...): "
-            "what they do is left out"
+            "their events are ignored"
         ]
     elif few:
         lost = ", ".join(who.said for who in everybody if who not in known)
@@ -96,6 +105,7 @@ def _with_players(path: Path, rows: list[tuple[MatchEvent, Who | None]], match: 
 
 
 def _through_kloppy(path: Path, provider: EventProvider, second: Path | None, match: Match | None):
+    """Load events with kloppy and convert them."""
     dataset = load_events(path, provider, second)
     place = _placing(dataset, match)
     rows = []
@@ -112,15 +122,15 @@ def _through_kloppy(path: Path, provider: EventProvider, second: Path | None, ma
 def _who(record) -> Who | None:
     player = record.player
     if player is None:
-        raw = record.raw_event.get("from") if isinstance(record.raw_event, dict) else None  # Metrica's, of whom its
-        name = raw.get("name") if isinstance(raw, dict) else None  # metadata knows nothing
+        raw = record.raw_event.get("from") if isinstance(record.raw_event, dict) else None  # Metrica's player, whom its
+        name = raw.get("name") if isinstance(raw, dict) else None  # metadata does not list
         return Who.spelled(str(name), str(record.team.ground) if record.team else "") if name else None
     shirt = -1 if player.jersey_no is None else int(player.jersey_no)
     return Who(str(player.player_id), str(player.team.ground), shirt, player.name or "")
 
 
 def _placing(dataset, match: Match | None):
-    """The map from one of kloppy's records and its team to (x, y) m on the tracking's pitch."""
+    """Build the map from one of kloppy's records and its team to (x, y) m on the tracking's pitch."""
     system = dataset.metadata.coordinate_system
     size, length, width = system.pitch_dimensions, *pitch_size(match)
     down = system.vertical_orientation.name == "TOP_TO_BOTTOM"
@@ -141,7 +151,7 @@ def _placing(dataset, match: Match | None):
 
 
 def _ends(match: Match | None) -> dict[int, float]:
-    """Period -> the end that the home team keeps there, -1 or 1; those where it cannot be told are left out."""
+    """Find the end that the home team defends, -1 or 1, for each period in which it is clear."""
     if match is None:
         return {}
     teams = np.array([player.team for player in match.players])
@@ -153,7 +163,14 @@ def _ends(match: Match | None) -> dict[int, float]:
 
 
 def translate_kind(event, tells_foot: bool) -> tuple[str, str, str, tuple[str, ...], bool | None]:
-    """Kind, part, side, details, success of one of kloppy's events. tells_foot: left feet are told from right ones."""
+    """Convert one of kloppy's events.
+
+    Args:
+        event: the event.
+        has_foot_side: whether the provider's data has left and right feet.
+    Returns:
+        Kind, body part, side, details, success.
+    """
     names = [_name_of_qualifier(one) for one in getattr(event, "qualifiers", None) or ()]
     result = getattr(getattr(event, "result", None), "name", "")
     success = True if result in _GOOD else False if result in _BAD else None

@@ -1,4 +1,4 @@
-"""Values out of a JSON text, each told as InputError with its place where it is not what it has to be."""
+"""Check values from a JSON text; InputErrors name the place of an invalid value."""
 
 from __future__ import annotations
 
@@ -9,37 +9,62 @@ from ..base.errors import InputError
 
 
 def object_of(said: str, name: str, page: str):
-    """What a text stands for, without names that come twice and without NaN; `page` of the docs describes it.
-    InputError with line and column, after `name`."""
+    """Parse a JSON text, without duplicate names and without NaN.
+
+    Args:
+        text: the JSON text.
+        name: the file's name for errors.
+        page: page of the docs that describes it.
+    Returns:
+        The value.
+    Raises:
+        InputError: with line and column, if the text is invalid.
+    """
     try:
         return json.loads(said, object_pairs_hook=_once, parse_constant=_no_number)
     except json.JSONDecodeError as error:
         raise InputError(f"{name}:{error.lineno}:{error.colno}", error.msg, "JSON", f"see {page}") from None
     except (ValueError, RecursionError) as error:
-        raise InputError(name, str(error) or "nested too deep", "JSON", f"see {page}") from None
+        raise InputError(name, str(error) or "nested too deeply", "JSON", f"see {page}") from None
 
 
 def _once(pairs) -> dict:
-    """An object in which no name comes twice."""
+    """Build an object in which no name is repeated."""
     out = dict(pairs)
     if len(out) != len(pairs):
         names = [name for name, _ in pairs]
-        raise ValueError(f"{next(name for name in names if names.count(name) > 1)!r} twice in one object")
+        raise ValueError(f"{next(name for name in names if names.count(name) > 1)!r} is repeated in one object")
     return out
 
 
 def _no_number(said: str):
-    raise ValueError(f"{said}, which is no number")
+    raise ValueError(f"{said} is not a number")
 
 
 def check_object(value, where: str) -> None:
-    """InputError where a value is no object."""
+    """Check that a value is an object.
+
+    Args:
+        value: the value.
+        where: its place, for errors.
+    Raises:
+        InputError: if it is not.
+    """
     if not isinstance(value, dict):
         raise InputError(where, shown(value), "an object {...}")
 
 
 def check_names(value, where: str, known, needed) -> None:
-    """InputError where a value is no object, lacks one of the `needed` names, or has one that is not `known`."""
+    """Check that a value is an object with the right names.
+
+    Args:
+        value: the value.
+        where: its place, for errors.
+        known: all allowed names.
+        needed: the required names.
+    Raises:
+        InputError: if it is not.
+    """
     check_object(value, where)
     for name in needed:
         if name not in value:
@@ -50,7 +75,16 @@ def check_names(value, where: str, known, needed) -> None:
 
 
 def number(value, where: str) -> float:
-    """A finite number."""
+    """Check that a value is a finite number.
+
+    Args:
+        value: the value.
+        where: its place, for errors.
+    Returns:
+        The number.
+    Raises:
+        InputError: if it is not.
+    """
     try:
         good = isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
     except OverflowError:
@@ -61,44 +95,97 @@ def number(value, where: str) -> float:
 
 
 def whole_number(value, where: str) -> int:
-    """A whole number."""
+    """Check that a value is a whole number.
+
+    Args:
+        value: the value.
+        where: its place, for errors.
+    Returns:
+        The number.
+    Raises:
+        InputError: if it is not.
+    """
     if isinstance(value, bool) or not isinstance(value, int) and number(value, where) != int(value):
         raise InputError(where, shown(value), "a whole number")
     return int(value)
 
 
 def truth(value, where: str) -> bool:
-    """true or false."""
+    """Check that a value is true or false.
+
+    Args:
+        value: the value.
+        where: its place, for errors.
+    Returns:
+        The value.
+    Raises:
+        InputError: if it is not.
+    """
     if not isinstance(value, bool):
         raise InputError(where, shown(value), "true or false")
     return value
 
 
 def text(value, where: str) -> str:
-    """A text."""
+    """Check that a value is a text.
+
+    Args:
+        value: the value.
+        where: its place, for errors.
+    Returns:
+        The text.
+    Raises:
+        InputError: if it is not.
+    """
     if not isinstance(value, str):
         raise InputError(where, shown(value), "a text")
     return value
 
 
 def numbers(value, where: str, count: int, expected: str) -> tuple:
-    """So many finite numbers; `expected` is how they are told of."""
+    """Check that a value is a list of finite numbers.
+
+    Args:
+        value: the value.
+        where: its place, for errors.
+        count: number of entries.
+        expected: what errors say they expect.
+    Returns:
+        The numbers.
+    Raises:
+        InputError: if it is not.
+    """
     if not isinstance(value, (list, tuple)) or len(value) != count:
         raise InputError(where, shown(value), expected)
     return tuple(number(one, where) for one in value)
 
 
 def entries(value, where: str) -> list:
-    """A list."""
+    """Check that a value is a list.
+
+    Args:
+        value: the value.
+        where: its place, for errors.
+    Returns:
+        The list.
+    Raises:
+        InputError: if it is not.
+    """
     if not isinstance(value, (list, tuple)):
         raise InputError(where, shown(value), "a list [...]")
     return list(value)
 
 
 def shown(value) -> str:
-    """A value as it stands in the file, shortened."""
+    """Format a value as JSON, shortened to 40 characters, for errors.
+
+    Args:
+        value: the value.
+    Returns:
+        The text.
+    """
     try:
         said = json.dumps(value, ensure_ascii=True, default=str)
-    except RecursionError:  # what can just be read may be too deep to be written
-        return "a value nested too deep"
+    except RecursionError:  # a value that can just be read may be too deep to write
+        return "a value nested too deeply"
     return said if len(said) <= 40 else said[:37] + "..."

@@ -1,7 +1,7 @@
-"""The ground as a mesh out of a Wavefront OBJ file: its vertices and faces, everything else left alone.
+"""Read a ground mesh from a Wavefront OBJ file: vertices and faces only.
 
-Metres; Y up and -Z ahead, as Blender and others write OBJ by default, so that a hill that is exported with the defaults
-lies here where it lay there: the file's (X, Y, Z) is our (X, -Z, Y).
+Metres; Y up and -Z ahead, as Blender and others write OBJ by default, so that a hill exported with the defaults keeps
+its place: the file's (X, Y, Z) is (X, -Z, Y) here.
 """
 
 from __future__ import annotations
@@ -14,14 +14,21 @@ import numpy as np
 from ..base.errors import InputError
 from .content import content
 
-_FARTHEST = 1e5  # metres
+_FARTHEST = 1e5  # metres; larger coordinates are in a wrong unit
 
 
 def read_mesh(path: str | os.PathLike) -> tuple[np.ndarray, np.ndarray]:
-    """vertices (V, 3) m, Z up, and triangles (F, 3), indices of them; faces of more corners are split into fans.
+    """Read vertices and triangles; faces with more corners are split into fans.
 
-    InputError, with the line, where a number is none, a face names a vertex that is not there or has fewer than three
-    corners; where there are no faces."""
+    Args:
+        path: the file.
+    Returns:
+        Vertices (V, 3) m, Z up, and triangles (F, 3) int, their indices.
+    Raises:
+        InputError: with the line, for an invalid number, a face with an unknown vertex or fewer than three corners, or
+            a
+            file without faces.
+    """
     vertices, triangles = [], []
     for place, words in _lines(path):
         if words[0] == "v":
@@ -39,7 +46,8 @@ def read_mesh(path: str | os.PathLike) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _lines(path) -> Iterator[tuple[str, list[str]]]:
-    """(place, words) of every line that says something; place is `file:line`. A backslash at a line's end goes on."""
+    """Iterate over (place, words) of every line with content; place is `file:line`. A trailing backslash continues a
+    line."""
     held: list[str] = []
     for count, line in enumerate(_text(path).split("\n"), 1):
         line = line.partition("#")[0].rstrip()
@@ -55,10 +63,10 @@ def _lines(path) -> Iterator[tuple[str, list[str]]]:
 def _text(path) -> str:
     data = content(path, "an OBJ file")
     if not data.strip():
-        raise InputError(path, "an empty file", "an OBJ file", "export it again")
+        raise InputError(path, "the file is empty", "an OBJ file", "export it again")
     if b"\0" in data:
         raise InputError(path, "binary content", "an OBJ file", "export it as Wavefront OBJ")
-    return data.decode("utf-8-sig", errors="replace")  # names of objects and materials may be in any coding
+    return data.decode("utf-8-sig", errors="replace")  # names of objects and materials may have any encoding
 
 
 def _vertex(words: list[str], place: str) -> list[float]:
@@ -74,12 +82,12 @@ def _vertex(words: list[str], place: str) -> list[float]:
 
 
 def _corner(word: str, count: int, place: str) -> int:
-    """Index of the vertex that a corner `v`, `v/vt`, `v//vn` or `v/vt/vn` names; negative ones count from the end."""
+    """Parse a corner `v`, `v/vt`, `v//vn` or `v/vt/vn` to its vertex's index; negative numbers count from the end."""
     try:
         named = int(word.partition("/")[0])
     except ValueError:
         raise InputError(place, f"corner {word[:40]!r}", "a vertex's number", "export it again") from None
     index = named - 1 if named > 0 else count + named
     if not 0 <= index < count or named == 0:
-        raise InputError(place, f"vertex {named} of {count}", "one that stands above", "export it again")
+        raise InputError(place, f"vertex {named} of {count}", "a vertex defined above", "export it again")
     return index

@@ -1,4 +1,4 @@
-"""An .npz as plain arrays and one text, of which nothing is ever executed and no size is believed."""
+"""Read an .npz as plain arrays and one text; nothing in it is executed, and stated sizes are verified."""
 
 from __future__ import annotations
 
@@ -15,22 +15,30 @@ import numpy as np
 from ..base.errors import InputError
 
 HEADER = "header"
-"""Name of the array that holds a text, as bytes of UTF-8."""
+"""Name of the array that holds a text as UTF-8 bytes."""
 
 _BROKEN = (zipfile.BadZipFile, zlib.error, struct.error, EOFError, OSError, ValueError, KeyError, IndexError, TypeError,
            AttributeError, NotImplementedError, RuntimeError, OverflowError, MemoryError, SyntaxError,
            tokenize.TokenError)  # fmt: skip
-"""What zipfile and numpy raise for files that are cut short, damaged or made to harm."""
+"""Errors of zipfile and numpy for truncated, damaged or malicious files."""
 
 
 def plain_arrays(
     data: bytes, kind: str, types: tuple[np.dtype, ...], unpacked: int, others: Mapping[str, str] | None = None
 ) -> dict[str, np.ndarray]:
-    """All arrays of a file's bytes by name, read-only, numbers all finite; and under HEADER its text, as bytes.
+    """Read all arrays of a file, with finite numbers only.
 
-    kind: what the file should be, for messages. types: of numbers that it may hold. unpacked: bytes of all its arrays
-    together above which it is no such file. others: what a file is instead that has an array of such a name and no
-    text. InputError where it is no zip of such arrays."""
+    Args:
+        data: the file's bytes.
+        kind: what it should be, for messages.
+        types: number types that it may hold.
+        max_bytes: largest total size of its arrays.
+        other_kinds: array name -> what a file with that array and without a text is instead.
+    Returns:
+        Name -> read-only array; under HEADER its text as bytes.
+    Raises:
+        InputError: if it is not a zip of such arrays.
+    """
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             members = archive.infolist()
@@ -39,20 +47,22 @@ def plain_arrays(
             names = [member.filename.removesuffix(".npy") for member in members]
             if HEADER not in names:
                 found = (what for name, what in (others or {}).items() if name in names)
-                raise InputError("the file", next(found, "an .npz of something else"), kind, "choose another file")
+                raise InputError("the file", next(found, "an .npz with other content"), kind, "choose another file")
             if len(set(names)) < len(names):
-                raise InputError("the arrays", "two of one name", kind, "choose another file")
+                raise InputError("the arrays", "two have the same name", kind, "choose another file")
             return {name: _array(archive.read(member), name, types) for name, member in zip(names, members)}
     except InputError:
         raise
     except _BROKEN:
-        raise InputError("the file", "damaged, cut short or of something else", kind,
+        raise InputError("the file", "damaged, truncated or of another kind", kind,
                          "copy it again or choose another file") from None  # fmt: skip
 
 
 def _array(data: bytes, name: str, types: tuple[np.dtype, ...]) -> np.ndarray:
-    """One array out of the bytes of a .npy: plain numbers of exactly the stated count, so that neither an object nor an
-    invented size is ever believed."""
+    """Read one array from the bytes of a .npy.
+
+    Only plain numbers of exactly the stated count are accepted, so neither objects nor false sizes are trusted.
+    """
     handle = io.BytesIO(data)
     version = np.lib.format.read_magic(handle)
     read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
@@ -62,19 +72,28 @@ def _array(data: bytes, name: str, types: tuple[np.dtype, ...]) -> np.ndarray:
         raise InputError(name[:80], f"values of type {str(dtype)[:40]}", f"one of {expected}")
     values = data[handle.tell() :]
     if any(size < 0 for size in shape) or math.prod(shape) * dtype.itemsize != len(values):
-        raise InputError(name[:80], f"{len(values)} bytes for shape {str(shape)[:40]}", "as many as the shape says")
+        raise InputError(name[:80], f"{len(values)} bytes for shape {str(shape)[:40]}", "the shape's number of bytes")
     array = np.frombuffer(values, dtype).reshape(shape, order="F" if fortran else "C")
     if dtype.kind == "f" and not np.isfinite(array).all():
-        raise InputError(name[:80], "a value that is no number", "finite numbers", "make the file again")
+        raise InputError(name[:80], "NaN or infinite values", "finite numbers", "create the file again")
     return array
 
 
 def header_text(arrays: dict[str, np.ndarray], page: str) -> str:
-    """The text of a file, which is taken out of its arrays. InputError where it is none; `page`: of the docs."""
+    """Take the text of a file out of its arrays.
+
+    Args:
+        arrays: from `read_plain_arrays`; HEADER is removed.
+        page: page of the docs that describes the file.
+    Returns:
+        The text.
+    Raises:
+        InputError: if it is not a text.
+    """
     header = arrays.pop(HEADER)
     if header.dtype != np.uint8:
-        raise InputError("the file", "an .npz of something else", f"a text under {HEADER!r}", f"see {page}")
+        raise InputError("the file", "an .npz with other content", f"a text under {HEADER!r}", f"see {page}")
     try:
         return header.tobytes().decode("utf-8")
     except UnicodeDecodeError:
-        raise InputError(HEADER, "no text in UTF-8", "JSON", f"see {page}") from None
+        raise InputError(HEADER, "is not UTF-8 text", "JSON", f"see {page}") from None

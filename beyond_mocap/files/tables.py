@@ -1,6 +1,6 @@
-"""The tables that leave and come back: the ball and its touches as CSV, and the JSON report.
+"""Write and read tables: the ball and its touches as CSV, and the JSON report.
 
-Every writer writes beside its target and renames, so that half a file is never seen.
+Every writer writes a temporary file and renames it, so that no incomplete file is visible.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from .content import content
 from .whole import atomic_write
 
 BALL_COLUMNS = ("time_s", "x_m", "y_m", "z_m", "measured")
-_FARTHEST = 1e4  # metres
+_FARTHEST = 1e4  # metres; larger coordinates are in a wrong unit
 _SEPARATORS = {";": "semicolons", "\t": "tabs", "|": "bars", ":": "colons", " ": "spaces"}
 _WITH_COMMA = re.compile(r"^([+-]?\d*),(\d*(?:[eE][+-]?\d+)?)$")
 _LATEST = 1e11  # seconds: feeds count from kick-off, some from 1970
@@ -35,14 +35,27 @@ TOUCH_COLUMNS = (
 
 
 def write_ball(path: str | os.PathLike, ball: BallPath) -> None:
-    """Writes `time_s,x_m,y_m,z_m,measured`; a position that is not known leaves its cells empty."""
+    """Write `time_s,x_m,y_m,z_m,measured`; an unknown position has empty cells.
+
+    Args:
+        path: the file.
+        ball: the ball's trajectory.
+    """
     rows = zip(ball.times, *np.asarray(ball.positions).T, np.asarray(ball.measured).astype(int))
     text = format_csv(BALL_COLUMNS, ((f"{t:.6f}", _metres(x), _metres(y), _metres(z), m) for t, x, y, z, m in rows))
     atomic_write(path, text)
 
 
 def read_ball(path: str | os.PathLike) -> BallPath:
-    """The table that `write_ball` wrote; InputError with the line of a row that is not of that form."""
+    """Read a table that `write_ball` wrote.
+
+    Args:
+        path: the file.
+    Returns:
+        The ball's trajectory.
+    Raises:
+        InputError: with the line, if a row is invalid.
+    """
     rows = list(read_rows(path, BALL_COLUMNS))
     positions = np.column_stack([parse_column(rows, name, blank=True) for name in BALL_COLUMNS[1:4]])
     times, measured = parse_column(rows, "time_s"), parse_flags(rows, "measured")
@@ -50,7 +63,12 @@ def read_ball(path: str | os.PathLike) -> BallPath:
 
 
 def write_touches(path: str | os.PathLike, touches: Iterable) -> None:
-    """Writes one row for each touch (`ball.tracked.solve.SolvedTouch`), in their order."""
+    """Write one row for each touch, in their order.
+
+    Args:
+        path: the file.
+        touches: `ball.tracked.solve.SolvedTouch` objects.
+    """
     rows = (
         (f"{touch.time:.4f}", f"{touch.uncertainty:.4f}", touch.player, touch.part, touch.kind,
          *(f"{value:.3f}" for value in np.concatenate([touch.position, touch.before, touch.after])),
@@ -60,12 +78,23 @@ def write_touches(path: str | os.PathLike, touches: Iterable) -> None:
 
 
 def write_report(path: str | os.PathLike, report: dict) -> None:
-    """Writes a report as JSON. Numbers that are not finite become null; numpy arrays become lists, tuples too."""
+    """Write a report as JSON; NaN and infinity become null, numpy arrays and tuples become lists.
+
+    Args:
+        path: the file.
+        report: the report.
+    """
     atomic_write(path, json.dumps(plain(report), indent=1, ensure_ascii=False, allow_nan=False) + "\n")
 
 
 def plain(value):
-    """`value` in JSON's own types: arrays and tuples as lists, numpy numbers as numbers, what is not finite as None."""
+    """Convert a value to JSON's own types.
+
+    Args:
+        value: a report or a part of it.
+    Returns:
+        The same with arrays, tuples and sets as lists, numpy numbers as numbers, NaN and infinity as None.
+    """
     if isinstance(value, dict):
         return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, np.ndarray):
@@ -83,12 +112,20 @@ def read_rows(
     path: str | os.PathLike, required: Sequence[str], others: Mapping[str, str] = MappingProxyType({}),
     separators: str = ",",
 ) -> Iterable[tuple[str, dict[str, str]]]:
-    """(place, row) for every row of a CSV file that is not empty; place is `file:line`, names and cells are stripped.
+    """Iterate over the rows of a CSV file, without empty ones; names and cells are stripped.
 
-    others: other names that stand for `required` ones, or for more. separators: the first with which the header is one
-    counts; with others than a comma, a comma in a number is its decimal point, as in many countries.
-
-    InputError where the file is missing, binary, empty, lacks a `required` column, or a row has too few cells."""
+    Args:
+        path: the file.
+        required: the columns that it must have.
+        others: alternative column name -> required or further column.
+        separators: allowed separators; the first that gives the required header is used. Without a comma as separator,
+            a
+            comma in a number is its decimal point.
+    Returns:
+        (place, row) of each row; place is `file:line`.
+    Raises:
+        InputError: if the file is missing, binary or empty, lacks a column, or a row has too few cells.
+    """
     text = _text(path)
     separator = next((one for one in separators if not _missing(_header(text, one, others), required)), ",")
     reader = csv.reader(io.StringIO(text, newline=""), delimiter=separator)
@@ -100,7 +137,7 @@ def read_rows(
             if not any(cell.strip() for cell in cells):
                 continue
             if len(cells) < len(names):
-                expected = f"{len(names)} as in the header"
+                expected = f"{len(names)}, like the header"
                 raise InputError(place, f"{len(cells)} cells", expected, "complete or delete the row")
             cells = [cell.strip() for cell in cells]
             if separator != ",":
@@ -111,7 +148,18 @@ def read_rows(
 
 
 def number(text: str, name: str, place: str, blank: bool = False) -> float:
-    """A finite number from a cell, NaN from a blank one where `blank` allows; InputError names column and place."""
+    """Parse a finite number from a cell.
+
+    Args:
+        text: the cell.
+        name: its column.
+        place: its line, for errors.
+        blank: whether a blank cell is allowed.
+    Returns:
+        The number; NaN for a blank cell.
+    Raises:
+        InputError: if the cell is not a number, or beyond 10 km or the latest possible time.
+    """
     if blank and text.lower() in ("", "nan"):
         return math.nan
     try:
@@ -119,7 +167,7 @@ def number(text: str, name: str, place: str, blank: bool = False) -> float:
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
-        raise InputError(place, f"{name} {text!r}", "a number", "correct the cell" + " or leave it empty" * blank)
+        raise InputError(place, f"{name} {text!r}", "a number", "correct the cell" + " or leave it blank" * blank)
     if name.endswith("_m") and abs(value) > _FARTHEST:
         raise InputError(place, f"{name} {text}", "metres from the pitch's centre", "check the unit")
     if name == "time_s" and abs(value) > _LATEST:
@@ -130,7 +178,7 @@ def number(text: str, name: str, place: str, blank: bool = False) -> float:
 def _text(path: str | os.PathLike) -> str:
     data = content(path, "a CSV file")
     if not data.strip():
-        raise InputError(path, "an empty file", "a CSV file with a header", "export it again")
+        raise InputError(path, "the file is empty", "a CSV file with a header", "export it again")
     try:
         if b"\0" in data:
             raise ValueError
@@ -140,7 +188,7 @@ def _text(path: str | os.PathLike) -> str:
 
 
 def _header(text: str, separator: str, others: Mapping[str, str]) -> list[str]:
-    """The names of the columns with this separator."""
+    """Parse the names of the columns with this separator."""
     try:
         return _named(next(csv.reader(io.StringIO(text, newline=""), delimiter=separator), []), others)
     except csv.Error:
@@ -148,7 +196,7 @@ def _header(text: str, separator: str, others: Mapping[str, str]) -> list[str]:
 
 
 def _named(names: Sequence[str], others: Mapping[str, str]) -> list[str]:
-    """Names of columns, stripped; one of `others` is what it stands for, unless that is there itself."""
+    """Strip the names of columns; one of `others` becomes its alternative unless that exists itself."""
     names = [name.strip() for name in names]
     return [others[name] if name in others and others[name] not in names else name for name in names]
 
@@ -163,17 +211,37 @@ def _check_header(names: list[str], required: Sequence[str], path) -> None:
         found = f"no column {', '.join(missing)} in {shown!r}"
         if len(names) == 1 and (separator := next((one for one in _SEPARATORS if one in names[0]), None)):
             found += f", which is separated by {_SEPARATORS[separator]}"
-        raise InputError(f"{path}:1", found, f"a header with {','.join(required)}", "name the columns so, with commas")
+        raise InputError(f"{path}:1", found, f"a header with {','.join(required)}", "rename the columns, use commas")
     if any(names.count(name) > 1 for name in required):
-        raise InputError(f"{path}:1", "a column twice", "each column once")
+        raise InputError(f"{path}:1", "a column is repeated", "each column once")
 
 
 def parse_column(rows, name: str, blank: bool = False) -> np.ndarray:
+    """Parse a column of numbers.
+
+    Args:
+        rows: (place, row) from `read_rows`.
+        name: the column.
+        blank: whether blank cells are allowed.
+    Returns:
+        (N,), NaN for blank cells.
+    Raises:
+        InputError: with the line, if a cell is invalid.
+    """
     return np.array([number(row[name], name, place, blank) for place, row in rows], dtype=float)
 
 
 def parse_flags(rows, name: str) -> np.ndarray:
-    """(N,) bool: a column of 0 and 1 of rows as `read_rows` yields them. InputError for any other cell."""
+    """Parse a column of 0 and 1.
+
+    Args:
+        rows: (place, row) from `read_rows`.
+        name: the column.
+    Returns:
+        (N,) bool.
+    Raises:
+        InputError: with the line, for any other cell.
+    """
     for place, row in rows:
         if row[name] not in ("0", "1"):
             raise InputError(place, f"{name} {row[name]!r}", "0 or 1")
@@ -185,6 +253,14 @@ def _metres(value: float) -> str:
 
 
 def format_csv(header: Sequence[str], rows: Iterable[Sequence]) -> str:
+    """Format a table as CSV.
+
+    Args:
+        header: names of the columns.
+        rows: the cells of each row.
+    Returns:
+        The text.
+    """
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow(header)

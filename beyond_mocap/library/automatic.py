@@ -1,8 +1,7 @@
-"""Automatic locomotion: which clip stands for which gait, where the user has chosen (Faustino §3.1.1), and what a
-library's gaits are called in the direction in which a body goes.
+"""Automatic locomotion: which clip defines which gait, if the user has chosen, and a gait's labels in a direction.
 
-Faustino's automatic locomotion begins with "specifying which mocap to use for which locomotion"; all other clips must
-not carry that word, so that one word has one speed. Without a choice every annotated clip counts
+Faustino's automatic locomotion begins with "specifying which mocap to use for which locomotion" (§3.1.1); no other clip
+may carry that label, so that one label has one speed. Without a choice every annotated clip counts
 (`library.measure_gaits`).
 """
 
@@ -22,12 +21,23 @@ from ..motion.track import SampledTrack
 from .clip import Clip
 from .library import Library, gait_word
 
-_WHERE = "--gait"
+_WHERE = "chosen gaits"
 
 
 def automatic_words(library: Library, gait: np.ndarray, track: SampledTrack) -> list[tuple[str, ...]]:
-    """(T,) the words of each frame's gait, index (T,) into the library's; where the library also has it in the
-    direction in which a body that faces the ball would go (`annotation.gaits`), in that direction."""
+    """Build the labels of each frame's gait.
+
+    Where the library has the gait in the direction in which a body that faces the ball would move (`annotation.gaits`),
+    the
+    labels have that direction.
+
+    Args:
+        library: the library.
+        gait: (T,) index into the library's gaits.
+        track: T frames.
+    Returns:
+        T tuples of labels.
+    """
     recorded = {row.words for clip in library.clips for row in clip.annotations}
     words: list[tuple[str, ...]] = []
     for number, direction in zip(gait, direction_words(wanted_offset(track), track.fps)):
@@ -38,11 +48,20 @@ def automatic_words(library: Library, gait: np.ndarray, track: SampledTrack) -> 
 
 
 def with_chosen_gaits(library: Library, chosen: Mapping[str, str]) -> Library:
-    """The library with `chosen` (gait word -> clip's path below the folder): its rows of that word
-    alone say how fast the gait is, and no other clip's locomotion carries it. Actions of other clips keep their words.
+    """Apply the user's choice of clips for gaits.
 
-    InputError for a word that is no gait, a clip that the library has not, one whose rows do not carry the word, and
-    for clips that are not slower than the next faster gait's."""
+    The rows of that label in the chosen clip alone define the gait's speed, and no other clip's locomotion carries the
+    label. Actions of other clips keep their labels.
+
+    Args:
+        library: the library.
+        chosen: gait label -> clip's path below the folder.
+    Returns:
+        The library with that choice.
+    Raises:
+        InputError: for a label that is no gait, a clip that the library does not have, one whose rows do not carry the
+            label, and for clips that are not slower than the next faster gait's.
+    """
     if not chosen:
         return library
     for word, path in chosen.items():
@@ -60,6 +79,7 @@ def with_chosen_gaits(library: Library, chosen: Mapping[str, str]) -> Library:
 
 
 def _check(library: Library, word: str, path: str) -> None:
+    """Check one choice: a gait, a clip of the library, and a row of that gait alone."""
     if word not in LOCOMOTION:
         raise InputError(_WHERE, f"{word!r} as a gait", f"one of {', '.join(LOCOMOTION)}")
     clips = {clip.path: clip for clip in library.clips if not clip.made}
@@ -69,9 +89,9 @@ def _check(library: Library, word: str, path: str) -> None:
     if not _shows(clips[path], word):
         others = [other for other, clip in clips.items() if _shows(clip, word)][:3]
         raise InputError(
-            _WHERE, f"{path} has no row of {word!r} alone",
-            f"a clip that has, such as {', '.join(others)}" if others else "a clip that has",
-            "or write the word into its annotations",
+            _WHERE, f"{path} has no row with only the label {word!r}",
+            f"a clip that has one, such as {', '.join(others)}" if others else "a clip that has one",
+            "or add the label to its annotations",
         )
 
 
@@ -80,10 +100,10 @@ def _shows(clip: Clip, word: str) -> bool:
 
 
 def _check_order(library: Library) -> None:
-    """Thresholds between gaits need speeds in the gaits' own order."""
+    """Check that the chosen clips' speeds are in the gaits' own order, which thresholds need."""
     speeds = {gait.word: gait.speed for gait in library.gaits}
     lost = [word for word, _ in library.chosen if word not in speeds]
     if lost:
         told = ", ".join(f"{word} {speed:.1f} m/s" for word, speed in speeds.items())
         what = f"the clip for {lost[0]} is not faster than a slower gait ({told})"
-        raise InputError(_WHERE, what, "another clip for one")
+        raise InputError(_WHERE, what, "another clip for one of them")

@@ -26,14 +26,27 @@ def build(
     skeleton: str | Path | None = None, unit: float | None = None, seed: int = 0, threads: int = 1,
     progress: Progress | None = None, cancelled: Callable[[], bool] | None = None,
 ) -> Library:
-    """The library of all recordings below `folder`, from its cache where nothing has changed.
+    """Build the library of all recordings below a folder, or load it from its cache where nothing has changed.
 
-    rebuild: ignore the cache. cache_dir: where to keep it (default: the folder itself, else the user's cache folder).
-    skeleton: a BVH file whose skeleton it is (default: the one with most frames, ties by name). unit: metres per file
-    unit (default: guessed per file). seed: of the clustering. threads: how many files are read at once, which
-    changes no bit of what comes out.
-    Clips of other skeletons are brought to this one and all are mended (`one_skeleton`, `repair`); notes say how.
-    Raises InputError for unreadable files, a folder without clips, or clips without legs; Cancelled."""
+    Clips of other skeletons are retargeted to this one and all are repaired (`common_skeleton`, `repair`); notes say
+    how.
+
+    Args:
+        folder: where the recordings are.
+        rebuild: ignore the cache.
+        cache_dir: where to save it (default: the folder itself, else the user's cache folder).
+        skeleton: a BVH file with the library's skeleton (default: the one with most frames, ties by name).
+        unit: metres per file unit (default: guessed per file).
+        seed: of the clustering.
+        threads: number of files read at once; changes no bit of the result.
+        progress: called with a fraction and a text.
+        cancelled: called often; True stops the work.
+    Returns:
+        The library.
+    Raises:
+        InputError: for unreadable files, a folder without clips, or clips without legs.
+        Cancelled: if `cancelled` returns True.
+    """
     folder = Path(folder)
     report = progress or (lambda fraction, text: None)
     place, where = cache.place(folder, cache_dir)
@@ -56,8 +69,8 @@ def build(
     write_synthetic_clips(place, _completed(built.clips))
     if not cache.save(place, key, built):
         told = (
-            f"{place} cannot be written: the library is worked out anew each time; give --cache "
-            "(in Blender: Cache Folder in the preferences) a folder of yours"
+            f"{place} cannot be written: the library is rebuilt each time; "
+            "choose a cache folder that you can write to"
         )
         built = replace(built, notes=(*built.notes, told))
     report(1.0, "Library ready")
@@ -65,12 +78,12 @@ def build(
 
 
 def _completed(clips: Iterable[Clip]) -> list[Clip]:
-    """Those that go on behind their recording's end."""
+    """List the clips that continue after their recording's end."""
     return [clip for clip in clips if clip.recorded is not None]
 
 
 def _read_clips(folder, paths, files, annotations, chosen, unit, threads, notes, report, cancelled) -> tuple[Clip, ...]:
-    """Reads all recordings, mends them, brings them to one skeleton, sets each on the floor, and adds the twins."""
+    """Read all recordings, repair them, bring them to one skeleton, put each on the floor, and add the twins."""
     read, unpopped, level = zip(*_read_files(paths, files, unit, threads=threads, report=report, cancelled=cancelled))
     notes += _unit_notes(read)
     example = bvh.read(chosen, unit).motion if chosen is not None else None
@@ -78,7 +91,7 @@ def _read_clips(folder, paths, files, annotations, chosen, unit, threads, notes,
     mended, rows = [], []
     for number, (path, (motion, standing, moved)) in enumerate(zip(paths, carried)):
         _check(cancelled)
-        report(0.4 + 0.3 * number / len(paths), f"Mending and mirroring {path.name}")
+        report(0.4 + 0.3 * number / len(paths), f"Repairing and mirroring {path.name}")
         one = repair.grounded(motion, standing, moved)
         mended.append(replace(one, drift=one.drift + level[number][1]))
         rows.append(_rows(path, annotations.of(path, motion.fps), len(motion)))
@@ -90,14 +103,16 @@ def _read_clips(folder, paths, files, annotations, chosen, unit, threads, notes,
     if not any(clip.annotations for clip in clips):
         raise InputError(
             folder, "no annotation for any clip", "NAME.txt beside NAME.bvh or an annotations.csv",
-            "write which frames are standing, walking, jogging, running, kick ...",
+            "label frames as standing, walking, jogging, running, kick ...",
         )
     return tuple(clips)
 
 
 def _read_files(paths, files, unit, threads, report, cancelled) -> list[tuple]:
-    """Each file as read, without pops (and their number), and without drift (and its metres); some at once. files: what
-    to read for each of `paths` (`scan.Conversions`); the unit is that of the user's own files."""
+    """Read files, several at once: each as read, without pops (and their number), and without drift (and its metres).
+
+    files: what to read for each of `paths` (`scan.Conversions`); the unit applies to the user's own files only.
+    """
 
     def read_one(path: Path, file: Path):
         source = bvh.read(file, unit if file == path else None)
@@ -118,7 +133,7 @@ def _read_files(paths, files, unit, threads, report, cancelled) -> list[tuple]:
 
 
 def _landed(names: list[str], mended: list[repair.Repaired], rows, notes: list[str]) -> list[Clip]:
-    """The clips, those that end in flight with landing and getting up behind them."""
+    """Build the clips; those that end in flight get a landing and getting up."""
     flying = [ends_in_flight(one.motion) for one in mended]
     ways = landings.ways_up([(one.motion, own, one.standing) for one, own in zip(mended, rows)]) if any(flying) else []
     clips, ends = [], []
@@ -134,27 +149,29 @@ def _landed(names: list[str], mended: list[repair.Repaired], rows, notes: list[s
 
 
 def _rows(path: Path, rows: tuple[ClipAnnotation, ...], count: int) -> tuple[ClipAnnotation, ...]:
-    """Rows cut to the clip; InputError for one that begins, or has its key moment, after the clip's end."""
+    """Cut rows to the clip; InputError for one that starts, or has its key moment, after the clip's end."""
     for row in rows:
         if row.start >= count:
-            what = f"a row that begins at frame {row.start:g}"
-            raise InputError(path, what, f"frames 0 to {count - 1}", "mend the row")
+            what = f"a row that starts at frame {row.start:g}"
+            raise InputError(path, what, f"frames 0 to {count - 1}", "correct the row")
         if row.key is not None and row.key >= count:
-            raise InputError(path, f"a key moment at frame {row.key:g}", f"frames 0 to {count - 1}", "mend the row")
+            raise InputError(path, f"a key moment at frame {row.key:g}", f"frames 0 to {count - 1}", "correct the row")
     return tuple(replace(row, end=min(row.end, count - 1)) for row in rows)
 
 
 def _unit_notes(read) -> list[str]:
-    """What the reader decided: each kind of sentence once (numbers apart), with the number of clips it holds for."""
+    """Collect the reader's notes: each kind of sentence once (numbers aside), with the number of clips that it applies
+    to.
+    """
     kinds: dict[str, list[str]] = {}
     for source in read:
         for note in source.notes:
             kinds.setdefault(re.sub(r"(?<=hips )[\d.]+", "", note), []).append(note)
-    return [f"{told[0]} (so, or nearly so, {len(told)} clips)" if len(told) > 1 else told[0] for told in kinds.values()]
+    return [f"{told[0]} (similar in {len(told)} clips)" if len(told) > 1 else told[0] for told in kinds.values()]
 
 
 def _index(folder: str, clips, notes, seed, report, cancelled) -> Library:
-    """Features, words and clusters of `clips`."""
+    """Index the clips: features, labels and clusters."""
     _check(cancelled)
     report(0.7, "Describing frames")
     frames = describe_clips(clips)
@@ -168,5 +185,6 @@ def _index(folder: str, clips, notes, seed, report, cancelled) -> Library:
 
 
 def _check(cancelled) -> None:
+    """Raise Cancelled if the work was cancelled."""
     if cancelled is not None and cancelled():
         raise Cancelled("library: cancelled")

@@ -1,7 +1,8 @@
-"""What building a library worked out, kept in one `.npz` (never pickled) that depends on the content of every file
-read; and the synthetic clips beside it, as BVH.
+"""The results of building a library, saved in one `.npz` (never pickled) that depends on the content of every file
+read;
+and the synthetic clips beside it, as BVH.
 
-A damaged or stale cache is simply not used and written again; the file is written beside its place and renamed, so two
+A damaged or stale cache is not used but written again. The file is written under another name and renamed, so two
 processes that build at once do no harm: the later one wins with the same content.
 """
 
@@ -34,7 +35,7 @@ _FRAME_ARRAYS = tuple(field.name for field in fields(Frames) if field.name != "v
 
 
 def fingerprint(folder: Path, clips, sources, skeleton: Path | None, **options) -> str:
-    """A hash of names and contents of all files that a build reads, the options, and this file's VERSION."""
+    """Compute a hash of names and contents of all files that a build reads, the options, and this module's VERSION."""
     parts: list[str | bytes] = [json.dumps([VERSION, str(np.__version__), options], sort_keys=True)]
     for path in [*clips, *sources, *([skeleton] if skeleton else [])]:
         parts.append(os.fsencode(os.path.relpath(path, folder)) + b"\0")
@@ -46,26 +47,35 @@ def fingerprint(folder: Path, clips, sources, skeleton: Path | None, **options) 
 
 
 def place(folder: Path, cache_dir: str | Path | None) -> tuple[Path, str]:
-    """Where the cache is kept, and a note for the user where that is not beside the recordings."""
+    """Find the folder of the cache, and a note for the user where that is not beside the recordings.
+
+    Args:
+        folder: the library's.
+        cache_dir: the user's choice; None uses `folder`, or the user's cache folder where it cannot be written.
+    Returns:
+        The folder, and a note or "".
+    Raises:
+        InputError: if `cache_dir` is a file.
+    """
     if cache_dir is not None:
         if Path(cache_dir).exists() and not Path(cache_dir).is_dir():
-            raise InputError(cache_dir, "is not a folder", "a folder for the cache", "give another one with --cache")
+            raise InputError(cache_dir, "is not a folder", "a folder for the cache", "choose another cache folder")
         return Path(cache_dir), ""
     beside = folder / CACHE_FOLDER
     if os.access(beside if beside.is_dir() else folder, os.W_OK):
         return beside, ""
     base = os.environ.get("LOCALAPPDATA") or os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
     elsewhere = own_folder(Path(base) / "beyond_mocap", folder)
-    return elsewhere, f"{folder} cannot be written: its cache is kept in {elsewhere}"
+    return elsewhere, f"{folder} cannot be written: its cache is in {elsewhere}"
 
 
 def own_folder(base: Path, folder: Path) -> Path:
-    """The folder below `base` in which the library of `folder` is kept apart from all others."""
+    """Return the folder below `base` that belongs to the library of `folder` alone."""
     return base / byte_digest(str(folder.absolute()), size=64).hex()[:16]
 
 
 def save(place: Path, key: str, library, name: str = "library") -> bool:
-    """Writes `library` as `place`/`name`.npz and says whether it could; a place that it cannot write is left alone."""
+    """Save `library` as `place`/`name`.npz; returns False if the folder cannot be written."""
     arrays = {f"frames.{part}": getattr(library.frames, part) for part in _FRAME_ARRAYS}
     for length, clusters in library.clusters.items():
         for part in ("start", "label", "medoid"):
@@ -91,6 +101,7 @@ def save(place: Path, key: str, library, name: str = "library") -> bool:
 
 
 def _header(key: str, library) -> dict:
+    """Build the header: everything that is not an array."""
     skeleton = library.skeleton
     return {
         "key": key, "names": skeleton.names, "parents": skeleton.parents, "end_parents": skeleton.end_parents,
@@ -104,13 +115,12 @@ def _header(key: str, library) -> dict:
 
 
 def load(place: Path, key: str, name: str = "library") -> dict | None:
-    """Reads the fields of a cached library.
+    """Load the fields of a cached library.
 
     Args:
         place: the cache's folder.
         key: fingerprint of the content that it must belong to.
         name: of the file, without its ending.
-
     Returns:
         The fields of a `Library` but its folder, or None where the cache is missing, damaged or of other content.
     """
@@ -120,12 +130,12 @@ def load(place: Path, key: str, name: str = "library") -> dict | None:
             if header["key"] != key:
                 return None
             return _restore(header, {part: arrays[part] for part in arrays.files})
-    except Exception:  # a damaged file can fail in any of zipfile's, numpy's, json's and our own ways
+    except Exception:  # a damaged file can raise any of zipfile's, numpy's, json's and our own exceptions
         return None
 
 
 def _restore(header: dict, arrays: dict) -> dict:
-    """The fields of a library but its folder."""
+    """Restore the fields of a library but its folder."""
     names, parents, ends = (header[part] for part in ("names", "parents", "end_parents"))
     skeleton = Skeleton(names, parents, arrays["offsets"], ends, arrays["end_offsets"])
     clips, start = [], 0
@@ -151,8 +161,15 @@ def _restore(header: dict, arrays: dict) -> dict:
 
 
 def write_synthetic_clips(place: Path, made: Iterable[Clip], missing_only: bool = False) -> None:
-    """Writes clips that are made, or end so, as BVH beside the cache, so that whoever follows a take's provenance finds
-    them; a place that cannot be written is left alone. missing_only: those that are not there."""
+    """Write synthetic clips, and recordings with a synthetic end, as BVH beside the cache.
+
+    Readers of a take's provenance find them there. A folder that cannot be written is left alone.
+
+    Args:
+        place: the cache's folder.
+        clips: the clips.
+        missing_only: write only files that do not exist.
+    """
     try:
         for clip in made:
             file = place / Path(clip.source_at(len(clip.motion) - 1)).relative_to(CACHE_FOLDER)

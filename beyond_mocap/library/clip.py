@@ -18,11 +18,17 @@ from .made import MADE_FOLDER
 class Clip:
     """One recording or its mirrored twin.
 
-    path: below the library's folder, with slashes. motion: at its own rate, metres, the floor (2nd percentile of its
-    toe heights, ../shared/metrics.md) at height 0. annotations: frames of its own rate, sides swapped on the twin.
-    standing: (T, 2, 2) bool, left and right foot, whether heel and toe stand on the ground. recorded: number of frames
-    that are recorded, where landing and getting up were made behind them (`library.landings`); None: all. mended: what
-    the repair found and left; None of made clips."""
+    Attributes:
+        path: below the library's folder, with slashes.
+        mirrored: whether it is the twin.
+        motion: at its own rate, metres, the floor (2nd percentile of its toe heights, ../shared/metrics.md) at height
+            0.
+        annotations: in frames of its own rate, sides swapped on the twin.
+        heel_toe_contacts: (T, 2, 2) bool, left and right foot, heel and toe in contact with the ground.
+        recorded_count: number of recorded frames, where a synthetic landing and getting up follow (`library.landings`);
+            None: all.
+        repair_figures: what the repair found and left; None for synthetic clips.
+    """
 
     path: str
     mirrored: bool
@@ -34,17 +40,19 @@ class Clip:
 
     @property
     def made(self) -> bool:
-        """Whether it is made (`library.made`) and no recording."""
+        """Whether the clip is synthetic (`library.synthetic_clips`) and not a recording."""
         return self.path.startswith(MADE_FOLDER)
 
     @property
     def recording(self) -> Motion:
-        """What of it was recorded."""
+        """The recorded part of the motion."""
         return self.motion if self.recorded is None else self.motion.frames(0, self.recorded)
 
     def source_at(self, frame: float) -> str:
-        """The file that shows `frame` (the clip's own rate), as a path below the library: the recording, or behind its
-        end the file of the same frames that was made."""
+        """Return the file that contains `frame` (the clip's own rate), as a path below the library.
+
+        It is the recording, or for frames after its end the synthetic file with the same frames.
+        """
         made = self.recorded is not None and frame > self.recorded - 1
         if not made:
             return self.path
@@ -56,11 +64,11 @@ class Clip:
         return self.standing.all(axis=2)
 
     def words_at(self, frame: float) -> frozenset[str]:
-        """Words of every row that covers `frame` (the clip's own rate)."""
+        """Return the labels of every row that covers `frame` (the clip's own rate)."""
         return frozenset(word for row in self.annotations if row.start <= frame <= row.end for word in row.words)
 
     def twin(self) -> "Clip":
-        """The same clip with left and right exchanged (Faustino §3.1.2), words too."""
+        """Build the same clip with left and right exchanged, labels too (Faustino §3.1.2)."""
         rows = tuple(replace(row, words=tuple(swap_sides(row.words))) for row in self.annotations)
         standing = self.standing[:, ::-1]
         return Clip(path=self.path, mirrored=not self.mirrored, motion=mirror(self.motion), annotations=rows,

@@ -1,10 +1,9 @@
-"""Blocks of frames grouped into clusters, so that the first search looks at a hundred things and not at all (Faustino
-§3.2).
+"""Blocks of frames grouped into clusters, so that a search first compares a hundred representatives (Faustino §3.2).
 
-A block of B frames starts at every frame of a clip that has B frames left. Its place is the augmented feature vector:
-the frames' features, one after the other. We take eight frames of each block (every fourth of 32, every second of 16,
-all of 8) and the principal components that hold 98 % of the blocks' variance before k-means: neighbouring frames say
-the same, and the clusters come out within a percent of those in all dimensions in a tenth of the time
+A block of B frames starts at every frame of a clip that has B frames left. Its position is the augmented feature
+vector: the frames' features, one after the other. Eight frames of each block (every fourth of 32, every second of 16,
+all of 8) and the principal components with 98 % of the blocks' variance go into k-means: neighbouring frames carry the
+same information, and the clusters come out within a percent of those in all dimensions in a tenth of the time
 (../shared/perf.md §3).
 """
 
@@ -20,13 +19,20 @@ from .features import Frames, principal_components
 BLOCK_LENGTHS = (32, 16, 8)
 CLUSTERS = 100
 SAMPLES_PER_BLOCK = 8
-MOST_FITTED = 20000
+MOST_FITTED = 20000  # blocks that k-means is fitted to; the others are only assigned
 
 
 @dataclass(frozen=True, eq=False)
 class Clusters:
-    """Blocks of one length: start (M,) first frame of each; label (M,) its cluster; medoid (K,) the block (index into
-    `start`) nearest to each cluster's centre, which stands for the cluster (the paper's representative frame block)."""
+    """Clusters of the blocks of one length.
+
+    Attributes:
+        length: frames of a block.
+        start: (M,) first frame of each block.
+        label: (M,) its cluster.
+        medoid: (K,) the block (index into `start`) nearest to each cluster's centre, which represents the cluster (the
+            paper's representative frame block).
+    """
 
     length: int
     start: np.ndarray
@@ -34,22 +40,31 @@ class Clusters:
     medoid: np.ndarray
 
     def members(self, cluster: int) -> np.ndarray:
-        """First frames of the blocks in `cluster`."""
+        """List the first frames of the blocks in `cluster`."""
         return self.start[self.label == cluster]
 
     def label_at(self, frame: int) -> int:
-        """Cluster of the block that starts at `frame`, or -1 where none starts."""
+        """Return the cluster of the block that starts at `frame`, or -1 where none starts."""
         place = int(np.searchsorted(self.start, frame))
         return int(self.label[place]) if place < len(self.start) and self.start[place] == frame else -1
 
 
 def block_starts(frames: Frames, length: int) -> np.ndarray:
-    """First frames of all blocks of `length` frames that lie within one clip."""
+    """Find the first frames of all blocks of `length` frames that lie within one clip."""
     return np.flatnonzero(frames.left_in_clip >= length - 1)
 
 
 def cluster_blocks(frames: Frames, length: int, seed: int = 0) -> Clusters:
-    """k-means of all blocks of one length into 100 clusters (fewer of fewer blocks); empty where none fits."""
+    """Cluster all blocks of one length by k-means.
+
+    Args:
+        frames: of the library.
+        length: frames of a block.
+        seed: of k-means.
+    Returns:
+        100 clusters (fewer of fewer blocks); empty where no block fits.
+    Source: Faustino 2024, section 3.2.
+    """
     start = block_starts(frames, length)
     if not len(start):
         nothing = np.zeros(0, int)
@@ -63,20 +78,22 @@ def cluster_blocks(frames: Frames, length: int, seed: int = 0) -> Clusters:
 
 
 def _kmeans(points: np.ndarray, count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
-    """Labels (M,) and the point nearest to each centre (count,); empty clusters are dropped.
+    """Run k-means: labels (M,) and the point nearest to each centre (count,); empty clusters are dropped.
 
-    One thread only: with more, scikit-learn adds partial sums in the order threads finish, and the bits differ."""
+    One thread only: with more, scikit-learn adds partial sums in the order threads finish, and the bits differ.
+    """
     from sklearn.cluster import KMeans
     from sklearn.exceptions import ConvergenceWarning
     from threadpoolctl import threadpool_limits
 
     step = -(-len(points) // MOST_FITTED)
     with threadpool_limits(limits=1), warnings.catch_warnings():
-        warnings.simplefilter("ignore", ConvergenceWarning)  # fewer different blocks than clusters: fewer clusters then
+        warnings.simplefilter("ignore", ConvergenceWarning)  # fewer different blocks than clusters give fewer clusters
         fit = KMeans(min(count, len(points[::step])), n_init=1, max_iter=60, tol=1e-3, random_state=seed)
         fit.fit(points[::step])
         label = fit.labels_ if step == 1 else fit.predict(points)
     distance = np.sum((points - fit.cluster_centers_[label]) ** 2, axis=1)
+    # sorted by label, then distance: the first of each label is its medoid
     order = np.lexsort((distance, label))
     used, first = np.unique(label[order], return_index=True)
     return np.searchsorted(used, label), order[first]

@@ -1,10 +1,10 @@
 """Every frame of the library as a few numbers: joint positions, velocities and accelerations, reduced by PCA.
 
 Faustino §3.2 takes position, velocity and acceleration of all joints relative to the root, and §3.2.1 reduces them to
-the principal components that hold 98 % of the energy. It says neither in which frame nor in which scale. We take the
-root's heading frame (a walk north equals a walk east) and weigh velocity by 0.12 s and acceleration by half of 0.12 s
-squared: a distance between features is then in metres, about how far the joints will be apart an eighth of a second
-later. Faustino drops each motion's first two frames, which lack derivatives; central differences lose none.
+the principal components that hold 98 % of the energy. It says neither in which frame nor in which scale. Here they are
+in the root's heading frame (a walk north equals a walk east), velocity weighted by 0.12 s and acceleration by half of
+0.12 s squared: a distance between features is then in metres, about how far the joints will be apart an eighth of a
+second later. Faustino drops each motion's first two frames, which lack derivatives; central differences lose none.
 """
 
 from __future__ import annotations
@@ -20,23 +20,31 @@ from ..motion.motion import at_frames, pose_kinematics
 from ..motion.skeleton import Skeleton
 from ..motion.track import zero_phase_hann
 
-FPS = 30.0  # of every library
-HORIZON = 0.12  # s: weighs m/s and m/s^2 against metres
+FPS = 30.0  # frames per second of every library
+HORIZON = 0.12  # seconds: weighs m/s and m/s^2 against metres
 ENERGY = 0.98  # share of the variance that the principal components keep
-SMOOTH_SECONDS = 0.7  # Hann window that takes the sway out of the root's path
+SMOOTH_SECONDS = 0.7  # Hann window that removes the sway from the root's path
 
 
 @dataclass(frozen=True, eq=False)
 class Frames:
     """All clips of a library, one after the other, at the library's rate: N frames.
 
-    clip (N,) clip index; source (N,) fractional frame in the clip's own rate; first, count (C,) each clip's place.
-    root (N, 3) metres; heading (N,) facing, radians, unwrapped within a clip; path (N, 2) the root on the ground
-    without its sway (zero-phase Hann of 0.7 s); velocity (N, 2) of that path, m/s, in the facing frame
-    (x forward, y left). feet (N, 4) m: where the left and the right toe (ankle where there is none) lie on the ground,
-    from the path, in the facing frame. jerk (N,) m/s^3 of the joint that has most, from the third difference around
-    each frame. features (N, D) float32, metres; mean (K,) and basis (K, D) with which they come from raw ones. words
-    (N, V) bool, one column per word of `vocabulary`."""
+    Attributes:
+        clip: (N,) clip index.
+        source: (N,) fractional frame in the clip's own rate.
+        first, count: (C,) each clip's first frame and number of frames.
+        root: (N, 3) metres.
+        heading: (N,) radians, unwrapped within a clip.
+        path: (N, 2) metres, the root on the ground without its sway (zero-phase Hann of 0.7 s).
+        velocity: (N, 2) of that path, m/s, in the heading frame (x forward, y left).
+        feet: (N, 4) metres from the path to the left and the right toe (ankle where there is none), heading frame.
+        jerk: (N,) m/s^3 of the joint that has most, from the third difference around each frame.
+        features: (N, D) float32, metres.
+        mean, basis: (K,) and (K, D), which convert raw features.
+        words: (N, V) bool, one column per label of `vocabulary`.
+        vocabulary: V labels.
+    """
 
     clip: np.ndarray
     source: np.ndarray
@@ -69,7 +77,9 @@ class Frames:
 
 
 def feature_joints(skeleton: Skeleton) -> np.ndarray:
-    """Joints that take part: all but those that coincide with their parent and the fingers beyond the hands."""
+    """Select the joints of the features: all but those that coincide with their parent and the fingers beyond the
+    hands.
+    """
     body = identify(skeleton)
     hands = {limb.hand for limb in (body.left, body.right) if limb.hand is not None}
     fingers: set[int] = set()
@@ -81,10 +91,19 @@ def feature_joints(skeleton: Skeleton) -> np.ndarray:
 
 
 def raw_features(positions: np.ndarray, heading: np.ndarray, fps: float) -> np.ndarray:
-    """One clip's features before PCA: joint positions (T, K, 3) m with the root first, heading (T,) -> (T, 9 K - 2).
+    """Compute one clip's features before PCA.
 
     The root's own position is left out except for its height (Faustino: "the position being the world center"). Divided
-    by the root of K, so that a distance is the root mean square over joints."""
+    by
+    the square root of K, so that a distance is the root mean square over joints.
+
+    Args:
+        positions: (T, K, 3) joint positions, metres, world, the root first.
+        heading: (T,) radians.
+        fps: frames per second.
+    Returns:
+        (T, 9 K - 2), metres.
+    """
     velocity = time_derivative(positions, fps)
     acceleration = time_derivative(velocity, fps)
     relative = positions.copy()
@@ -100,7 +119,14 @@ def raw_features(positions: np.ndarray, heading: np.ndarray, fps: float) -> np.n
 
 
 def principal_components(values: np.ndarray, energy: float = ENERGY) -> tuple[np.ndarray, np.ndarray]:
-    """Mean (K,) and basis (K, D) of the fewest components that hold `energy` of the variance of `values` (N, K)."""
+    """Compute the fewest principal components that hold a share of the variance.
+
+    Args:
+        values: (N, K).
+        energy: the share.
+    Returns:
+        Mean (K,) and basis (K, D).
+    """
     mean = values.mean(axis=0)
     centred = values - mean
     covariance = centred.T @ centred
@@ -111,15 +137,22 @@ def principal_components(values: np.ndarray, energy: float = ENERGY) -> tuple[np
 
 
 def describe_clips(clips, like: Frames | None = None) -> Frames:
-    """Frames of `clips` (`library.clip`) at FPS with all words that they carry. like: frames whose components are used,
-    so that features of both can be compared; else those of the clips themselves."""
+    """Build the frames of clips at FPS with all labels that they carry.
+
+    Args:
+        clips: of one skeleton (`library.clip`).
+        reference: frames whose components are used, so that features of both can be compared; None uses the clips' own.
+    Returns:
+        The frames.
+    """
     from threadpoolctl import threadpool_limits
 
-    with threadpool_limits(limits=1):  # with more, sums of products come out in another order
+    with threadpool_limits(limits=1):  # with more threads, sums of products have another order and other bits
         return _describe(clips, like)
 
 
 def _describe(clips, like: Frames | None) -> Frames:
+    """Build the columns of all clips and reduce their features."""
     skeleton = clips[0].motion.skeleton
     vocabulary = tuple(sorted({word for clip in clips for row in clip.annotations for word in row.words}))
     joints, body = feature_joints(skeleton), identify(skeleton)
@@ -149,7 +182,9 @@ def _describe(clips, like: Frames | None) -> Frames:
 
 
 def words_matrix(clip, source: np.ndarray, vocabulary: tuple[str, ...]) -> np.ndarray:
-    """(T, V) bool: which words of `vocabulary` a clip carries at fractional frames `source` (T,) of its own rate."""
+    """Mark which labels of `vocabulary` a clip carries: (T, V) bool, at fractional frames `source` (T,) of its own
+    rate.
+    """
     column = {word: i for i, word in enumerate(vocabulary)}
     out = np.zeros((len(source), len(vocabulary)), bool)
     for row in clip.annotations:
@@ -160,7 +195,7 @@ def words_matrix(clip, source: np.ndarray, vocabulary: tuple[str, ...]) -> np.nd
 
 
 def joined(a: Frames, b: Frames) -> Frames:
-    """The frames of `a`, then those of `b`, which was described like `a`; clip numbers of `b` go on from `a`'s."""
+    """Join the frames of `a` and `b`, which has the components of `a`; clip numbers of `b` continue those of `a`."""
     vocabulary = tuple(sorted({*a.vocabulary, *b.vocabulary}))
     words = np.zeros((len(a) + len(b), len(vocabulary)), bool)
     for frames, rows in ((a, slice(0, len(a))), (b, slice(len(a), None))):
@@ -177,14 +212,22 @@ _COLUMNS = ("clip", "source", "root", "heading", "path", "velocity", "feet", "je
 
 
 def _feet(positions: np.ndarray, toes: list[int], path: np.ndarray, facing: np.ndarray) -> np.ndarray:
-    """(T, 4) m of `Frames.feet`: positions (T, J, 3) m, path (T, 2) m, facing (T,) radians."""
+    """Compute `Frames.feet` (T, 4) m from positions (T, J, 3) m, path (T, 2) m and facing (T,) radians."""
     away = (quaternion.turned_level(positions[:, toe, :2] - path, -facing) for toe in toes)
     return np.concatenate(list(away), axis=1).astype(np.float32)
 
 
 def most_jerk(positions: np.ndarray, fps: float) -> np.ndarray:
-    """(T,) m/s^3 of the joint that jerks most, positions (T, J, 3) m: the third difference from one frame before to two
-    after, held at the ends."""
+    """Compute the jerk (T,) m/s^3 of the joint that jerks most.
+
+    It is the third difference from one frame before to two after, constant at the ends.
+
+    Args:
+        positions: (T, J, 3) metres, world.
+        fps: frames per second.
+    Returns:
+        (T,).
+    """
     if len(positions) < 4:
         return np.zeros(len(positions))
     third = np.diff(positions, 3, axis=0)
@@ -192,7 +235,7 @@ def most_jerk(positions: np.ndarray, fps: float) -> np.ndarray:
 
 
 def sampled_positions(motion, fps: float) -> tuple[np.ndarray, np.ndarray]:
-    """Fractional frames (T,) of `motion` at `fps`, and all joints' world positions (T, J, 3) there."""
+    """Sample a motion at `fps`: fractional frames (T,) of its own rate, and joint positions (T, J, 3) m, world."""
     count = int(np.floor(motion.duration * fps + 1e-6)) + 1
     source = np.arange(count) * (motion.fps / fps)
     root, rotations = at_frames(motion, source)

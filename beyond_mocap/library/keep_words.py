@@ -1,8 +1,9 @@
-"""What is written into a library's folder: clips, and words where it reads them: `NAME.txt` beside the clip, or the
-rows of an `annotations.csv`.
+"""Writing into a library's folder: clips, and labels where the library reads them: `NAME.txt` beside the clip, or the
+rows
+of an `annotations.csv`.
 
-Files are written beside their place and renamed, so that none is ever found half-written. Nothing that is there is
-replaced unless the caller says so.
+Files are written under another name and renamed, so that none is ever half-written. Existing files are replaced only
+at the caller's request.
 """
 
 from __future__ import annotations
@@ -28,8 +29,10 @@ TEXT, TABLE = "TEXT", "TABLE"
 
 
 def as_timeline(rows: Sequence[ClipAnnotation], fps: float) -> Timeline:
-    """A clip's rows in the form in which words are edited: seconds from its first frame. A row of one frame that is a
-    key moment is that moment alone."""
+    """Convert a clip's rows to the form in which labels are edited: seconds from its first frame.
+
+    A row of one frame that is a key moment becomes that moment alone.
+    """
     spans = [
         Span(row.start / fps, max(row.end, row.start + 0.5) / fps, row.words)
         for row in rows if row.key is None or row.end > row.start
@@ -38,7 +41,7 @@ def as_timeline(rows: Sequence[ClipAnnotation], fps: float) -> Timeline:
 
 
 def within(rows: Sequence[ClipAnnotation], count: int) -> tuple[ClipAnnotation, ...]:
-    """Rows cut to a clip of `count` frames; those that lie outside are left out."""
+    """Cut rows to a clip of `count` frames; those that lie outside are left out."""
     out = []
     for row in rows:
         start, end = max(0, row.start), min(count - 1, row.end)
@@ -48,12 +51,12 @@ def within(rows: Sequence[ClipAnnotation], count: int) -> tuple[ClipAnnotation, 
 
 
 def read_words(clip: Path, folder: Path, fps: float) -> tuple[ClipAnnotation, ...]:
-    """What a library in `folder` reads about one clip; InputError where that is broken."""
+    """Read a clip's rows as a library in `folder` does; InputError where a file is broken."""
     return Annotations(folder, [clip]).of(clip, fps)
 
 
 def read_sources(clip: Path, folder: Path, rows: tuple[ClipAnnotation, ...], fps: float) -> Sources:
-    """Who said the rows that `read_words` gave; those that a person has written have no source."""
+    """Read the sources of the rows from `read_labels`; rows that a person wrote have none."""
     form, target = place(clip, folder)
     if not target.is_file():
         return {}
@@ -63,8 +66,16 @@ def read_sources(clip: Path, folder: Path, rows: tuple[ClipAnnotation, ...], fps
 
 
 def place(clip: Path, folder: Path) -> tuple[str, Path]:
-    """Where the words of a clip belong: TEXT and `NAME.txt`, or TABLE and the table that speaks of it. A text that is
-    there counts most, then a table with rows for it, then one that stands in its folder."""
+    """Find where the labels of a clip belong.
+
+    An existing text has priority, then a table with rows for the clip, then a table in the clip's folder.
+
+    Args:
+        clip: the BVH file.
+        folder: the library's.
+    Returns:
+        TEXT and `NAME.txt`, or TABLE and the table.
+    """
     beside = clip.with_suffix(".txt")
     if beside.is_file():
         return TEXT, beside
@@ -77,7 +88,7 @@ def place(clip: Path, folder: Path) -> tuple[str, Path]:
 
 
 def text_of(rows: Sequence[ClipAnnotation], sources: Sources | None = None) -> str:
-    """The rows in the text form, in frames of the clip; behind those of `sources` who said it."""
+    """Format rows as text, in frames of the clip, with a comment behind those in `sources`."""
     lines = []
     for row in rows:
         words = " ".join(row.words) + comment(row, sources or {})
@@ -92,13 +103,24 @@ def keep(
     clip: Path, folder: Path, rows: Sequence[ClipAnnotation], fps: float, overwrite: bool = False,
     sources: Sources | None = None,
 ) -> Path:
-    """Write a clip's rows where they belong (`place`); returns the file. sources: who said those that no person did.
+    """Write a clip's rows where they belong (`find_label_file`).
 
-    InputError where words that differ are there and `overwrite` is not set, or where the file cannot be written."""
+    Args:
+        clip: the BVH file.
+        folder: the library's.
+        rows: the annotations.
+        fps: of the clip.
+        overwrite: replace different labels.
+        sources: of the rows that no person wrote.
+    Returns:
+        The file.
+    Raises:
+        InputError: if there are different labels and `overwrite` is not set, or if the file cannot be written.
+    """
     form, target = place(clip, folder)
     if has_words(clip, folder, fps) and not overwrite:
-        what = "has other words for this clip already"
-        raise InputError(target, what, "a clip without words", "say that they may be overwritten")
+        what = "already has other labels for this clip"
+        raise InputError(target, what, "a clip without labels", "allow overwriting")
     if form == TEXT:
         atomic_write(target, text_of(rows, sources))
     else:
@@ -107,12 +129,12 @@ def keep(
 
 
 def _name_in(table: Path, clip: Path) -> str:
-    """How a table's column `file` spells a clip."""
+    """Build the clip's name as a table's column `file` spells it."""
     return Path(os.path.normpath(clip.absolute())).relative_to(table.parent).as_posix()
 
 
 def has_words(clip: Path, folder: Path, fps: float) -> bool:
-    """Whether anything is written about a clip where its words belong; a text that cannot be read counts too."""
+    """Whether anything is written about a clip where its labels belong; a text that cannot be read counts too."""
     form, target = place(clip, folder)
     if form == TEXT:
         return target.is_file() and bool(target.read_bytes().strip())
@@ -120,8 +142,8 @@ def has_words(clip: Path, folder: Path, fps: float) -> bool:
 
 
 def _table(table: Path, name: str, rows: Sequence[ClipAnnotation], fps: float, sources: Sources) -> str:
-    """The table's text with these rows in place of those of the clip; other rows and columns stay as they are."""
-    read_annotation_csv(table)  # one that is broken is told, not made worse
+    """Format the table with these rows in place of those of the clip; other rows and columns stay as they are."""
+    read_annotation_csv(table)  # raises InputError for a broken table instead of damaging it further
     text = read_text(table)
     reader = csv.DictReader(io.StringIO(text, newline=""))
     out = io.StringIO(newline="")
@@ -140,41 +162,50 @@ def _table(table: Path, name: str, rows: Sequence[ClipAnnotation], fps: float, s
 
 
 def plain_words(words: Sequence[str]) -> tuple[str, ...]:
-    """The words of an annotation as they are written, also of several in one text. InputError for one that is none."""
+    """Parse the labels of an annotation, also of several in one text. InputError for an invalid one."""
     return checked_words(" ".join(words).split(), "words")
 
 
 def free_place(folder: Path, name: str) -> Path:
-    """Where a clip of that name goes. InputError where the folder is none, the name is none, or it is taken."""
+    """Find the file for a new clip. InputError if the folder is missing, or the name is invalid or taken."""
     if not folder.is_dir():
-        raise InputError(folder, "is not a folder", "a library's folder", "make the folder first")
+        raise InputError(folder, "is not a folder", "a library's folder", "create the folder first")
     if not name.strip() or Path(name).name != name:
-        raise InputError(repr(name), "is no name for a clip", "a file name without a folder", "choose another name")
+        raise InputError(repr(name), "is not a valid clip name", "a file name without a folder", "choose another name")
     clip = folder / f"{name}.bvh"
     if clip.exists():
-        raise InputError(clip, "is there already", "a name that is free", "rename the trial or the clip")
+        raise InputError(clip, "already exists", "a new name", "rename the trial or the clip")
     return clip
 
 
 def add_clip(
     folder: Path, name: str, motion: Motion, words: Sequence[str] = (), key_seconds: float | None = None
 ) -> list[str]:
-    """Writes NAME.bvh into a library's folder and, where there are words, NAME.txt; returns lines for people.
+    """Write NAME.bvh into a library's folder and, if there are labels, NAME.txt. Nothing is replaced.
 
-    words: of the annotation; with key_seconds, from the motion's first frame, they name that moment, else the whole
-    motion. Nothing that is there is replaced. InputError where it cannot be written, for no word, or a key outside."""
+    Args:
+        folder: the library's.
+        name: of the clip.
+        motion: its motion.
+        words: labels of the annotation.
+        key_seconds: seconds from the first frame of the key moment that they name; None labels the whole motion.
+    Returns:
+        Lines for people.
+    Raises:
+        InputError: if a file cannot be written, for an invalid label, or a key outside the motion.
+    """
     clip, words = free_place(folder, name), plain_words(words)
     key = None if key_seconds is None else round(key_seconds * motion.fps)
     if key is not None and not 0 <= key < len(motion):
-        raise InputError(clip, f"its key lies at {key_seconds:.3f} s", f"0 to {motion.duration:.3f} s")
+        raise InputError(clip, f"a key moment at {key_seconds:.3f} s", f"0 to {motion.duration:.3f} s")
     rows = [ClipAnnotation(key, key, key, words)] if key is not None else []
     if words and key is None:
         rows = [ClipAnnotation(0, len(motion) - 1, None, words)]
     if words and has_words(clip, folder, motion.fps):
-        raise InputError(clip.with_suffix(".txt"), "has words already", "a name that is free", "rename the clip")
+        raise InputError(clip.with_suffix(".txt"), "already has labels", "a new name", "rename the clip")
     bvh.write(clip, motion)
     if words:
         keep(clip, folder, rows, motion.fps)
     strangers = sorted(set(words) - vocabulary_words())
-    told = [f"{clip}: {' '.join(words) or 'without words'}"]
-    return [*told, *(f"{word}: a word of this library's own" for word in strangers)]
+    told = [f"{clip}: {' '.join(words) or 'no labels'}"]
+    return [*told, *(f"{word}: a label of this library only" for word in strangers)]

@@ -1,7 +1,7 @@
-"""Key moments: which clips carry the asked words at their key frame, and what is nearest where none does.
+"""Key moments: which clips carry the requested labels at their key frame, and which are nearest where none does.
 
 "The library has a key moment when one clip's key frame, or its mirror's, carries all of its words"
-(../shared/contract.md); words of a branch of the vocabulary may be left out, so carrying is being a subset.
+(../shared/contract.md); labels of a branch of the vocabulary may be left out, so carrying means being a superset.
 """
 
 from __future__ import annotations
@@ -14,15 +14,21 @@ from ..annotation.ball_contact import shows_foot_on_ball
 from ..annotation.labels import list_labels
 from ..annotation.vocabulary import SIDES
 
-# words below several actions of App. A that name what the body does: a dive shows a dive, be it to catch or to punch
+# labels of App. A below several actions that name what the body does: a dive is a dive, whether to catch or to punch
 _SAME_MOVE = frozenset(list_labels(in_flight=True))
 _SIDES = frozenset(SIDES)
 
 
 @dataclass(frozen=True)
 class Key:
-    """A key moment of a clip: clip index, frame in the clip's own rate, first and last frame of its annotated row (the
-    entry and exit it needs), and the words that the frame carries."""
+    """A key moment of a clip.
+
+    Attributes:
+        clip: clip index.
+        frame: in the clip's own rate.
+        start, end: first and last frame of its annotated row (the entry and exit that it needs).
+        labels: labels that the frame carries.
+    """
 
     clip: int
     frame: float
@@ -32,8 +38,12 @@ class Key:
 
 
 def keys_of(clips) -> tuple[Key, ...]:
-    """Key moments of all clips, in their order. A key's words are its row's and those of every other row that covers
-    its frame, but for their sides: a kick with the right foot while the body turns left is no kick left."""
+    """Collect the key moments of all clips, in their order.
+
+    A key's labels are its row's and those of every other row that covers its frame, except for their sides: a kick with
+    the
+    right foot while the body turns left is no left kick.
+    """
     found = []
     for index, clip in enumerate(clips):
         for row in clip.annotations:
@@ -43,13 +53,22 @@ def keys_of(clips) -> tuple[Key, ...]:
 
 
 def _key_words(clip, row) -> frozenset[str]:
+    """Collect the labels of a clip at the key frame of a row."""
     others = (other.words for other in clip.annotations if other is not row and other.start <= row.key <= other.end)
     return frozenset(row.words) | (frozenset(word for words in others for word in words) - _SIDES)
 
 
 def serving(keys: Iterable[Key], words) -> tuple[Key, ...]:
-    """The keys that carry all of `words`; of these the ones that show the fewest other actions beside: a dive is also a
-    jump, but who asks for a jump wants no dive where there is another."""
+    """Select the keys that carry all requested labels, and of these the ones with the fewest other actions.
+
+    A dive is also a jump, but a requested jump should be no dive where there is another.
+
+    Args:
+        keys: of the library.
+        words: requested labels.
+    Returns:
+        The keys; empty where none serves.
+    """
     wanted = frozenset(words)
     found = [key for key in keys if wanted <= key.words]
     others = [len((key.words & (DISCRETE | _SAME_MOVE)) - wanted) for key in found]
@@ -57,9 +76,18 @@ def serving(keys: Iterable[Key], words) -> tuple[Key, ...]:
 
 
 def nearest_serving(keys: tuple[Key, ...], words) -> tuple[Key, ...]:
-    """The keys whose words come nearest to `words`: most shared words, then fewest extra; none where the action
-    itself is not shared (a kick is no answer to a slide, and a right kick none to a right header), except that a foot
-    on the ball stands for a foot on the ball, and a dive for a dive."""
+    """Select the keys whose labels are nearest to the requested ones: most shared labels, then fewest extra ones.
+
+    None where the action itself is not shared (a kick is no answer to a slide, and a right kick none to a right
+    header),
+    except that any foot on the ball can replace a foot on the ball, and a dive a dive.
+
+    Args:
+        keys: of the library.
+        words: requested labels.
+    Returns:
+        The keys; empty where none is near.
+    """
     wanted = frozenset(words)
     actions = _actions(wanted) | (wanted & _SAME_MOVE)
     near = [key for key in keys if actions & key.words or _same_contact(wanted, key.words)]
@@ -68,18 +96,27 @@ def nearest_serving(keys: tuple[Key, ...], words) -> tuple[Key, ...]:
 
 
 def _actions(words: frozenset[str]) -> frozenset[str]:
-    """The words that say what is done, not which side, at which pace: roots of App. A, else all but mere colour."""
+    """Select the labels of what is done, not which side or pace: roots of App. A, else all but modifiers."""
     return words & DISCRETE or words - CONTINUOUS - VOCABULARY["modifier"].keys() or words
 
 
 def _same_contact(a: frozenset[str], b: frozenset[str]) -> float:
-    """Where a foot on the ball is lacking, another shows at least the same contact."""
+    """Score half a label if both show a foot on the ball."""
     return 0.5 if shows_foot_on_ball(a) and shows_foot_on_ball(b) else 0.0
 
 
 def standing_in(choices: tuple[Key, ...], made: tuple[Key, ...], words) -> tuple[Key, ...]:
-    """The made key moments that may stand in for `choices`, recorded ones that answer to `words`: the same act of the
-    same side, with all of the words by which a recorded one answers."""
+    """Select the synthetic key moments that may substitute for recorded ones.
+
+    They show the same act of the same side, with all of the requested labels that a recorded one carries.
+
+    Args:
+        choices: recorded keys that answer to `words`.
+        synthetic: synthetic keys.
+        words: requested labels.
+    Returns:
+        The substitutes.
+    """
     wanted = frozenset(words)
     met = {(_act(one), wanted & one.words) for one in choices}
     return tuple(key for key in made if any(act == _act(key) and asked <= key.words for act, asked in met))
@@ -90,6 +127,6 @@ def _act(key: Key) -> frozenset[str]:
 
 
 def nearest_words(keys: tuple[Key, ...], words, count: int = 3) -> tuple[str, ...]:
-    """Word combinations of the library's key moments nearest to `words`, as text, best first."""
+    """List the label combinations of the library's key moments nearest to `words`, as text, best first."""
     choices = sorted({spoken(key.words) for key in keys})
     return tuple(" ".join(choice) for choice in nearest(tuple(words), choices, count))

@@ -1,7 +1,7 @@
-"""Recordings that end in flight are completed on entry: fall, landing and getting up are made behind them.
+"""Completes recordings that end in flight: a synthetic fall, landing and getting up follow.
 
-A dive that is cut where it leaves the ground would be held in the air when it is played to its end. What is made is
-kept apart by name: frames behind a clip's recorded ones are told as those of a file of the same frames in the cache's
+A dive that is cut where it leaves the ground would stop in the air when it is played to its end. The synthetic part has
+its own file name: frames after a clip's recorded ones are attributed to a file with the same frames in the cache's
 folder (`LANDING_FOLDER`), which readers of a take's provenance can read.
 """
 
@@ -20,12 +20,19 @@ from .scan import CACHE_FOLDER
 
 LANDING_FOLDER = f"{CACHE_FOLDER}/made-landing/"
 _UPRIGHT, _MADE_FPS = frozenset(LOCOMOTION[:2]), 60.0
-_FEET_DOWN = 0.35  # seconds of a way up in which the body still turns over: no foot stands
+_FEET_DOWN = 0.35  # seconds at the start of getting up in which the body still turns over: no foot is in contact
 
 
 @dataclass(frozen=True, eq=False)
 class WayUp:
-    """From lying to standing: motion, standing (T, 2, 2) bool of heels and toes, its words, and whether it is made."""
+    """A movement from lying to standing.
+
+    Attributes:
+        motion: T frames.
+        heel_toe_contacts: (T, 2, 2) bool, left and right, heel and toe in contact.
+        labels: its labels.
+        is_synthetic: whether it is synthetic.
+    """
 
     motion: Motion
     standing: np.ndarray
@@ -35,7 +42,14 @@ class WayUp:
 
 @dataclass(frozen=True, eq=False)
 class Completed:
-    """A clip with its end: motion, rows and standing (T, 2, 2) of all its frames, and how many of them are recorded."""
+    """A clip with its synthetic end.
+
+    Attributes:
+        motion: all frames.
+        rows: its annotations.
+        heel_toe_contacts: (T, 2, 2) bool, left and right, heel and toe in contact.
+        recorded_count: number of recorded frames.
+    """
 
     motion: Motion
     rows: tuple[ClipAnnotation, ...]
@@ -44,7 +58,10 @@ class Completed:
 
 
 def ways_up(clips: Sequence[tuple[Motion, tuple[ClipAnnotation, ...], np.ndarray]]) -> list[WayUp]:
-    """Every way of getting up among clips (motion, rows, standing) of one skeleton; a made one where they show none."""
+    """Collect every movement of getting up among clips (motion, rows, contacts) of one skeleton.
+
+    A synthetic one is returned where they show none.
+    """
     found = [
         WayUp(motion.frames(int(row.start), int(row.end) + 1), standing[int(row.start) : int(row.end) + 1], row.words)
         for motion, rows, standing in clips for row in rows
@@ -54,8 +71,10 @@ def ways_up(clips: Sequence[tuple[Motion, tuple[ClipAnnotation, ...], np.ndarray
 
 
 def _made_way(clips) -> WayUp:
-    """A made getting up for the skeleton of clips (motion, rows), whose upright stance the longest stretch of slow
-    locomotion shows: keepers in wait, like runners, lean."""
+    """Build a synthetic getting up for the skeleton of clips (motion, rows).
+
+    Its upright stance is that of the longest stretch of slow locomotion: waiting goalkeepers, like runners, lean.
+    """
     upright = [motion.frames(row.start, row.end + 1) for motion, rows in clips for row in rows
                if row.key is None and _UPRIGHT & set(row.words)]  # fmt: skip
     example = max(upright, key=lambda motion: motion.duration, default=clips[0][0])
@@ -64,7 +83,16 @@ def _made_way(clips) -> WayUp:
 
 
 def completed(motion: Motion, rows, standing: np.ndarray, ways: Sequence[WayUp]) -> Completed:
-    """The clip, which ends in flight, with landing and getting up behind it."""
+    """Complete a clip that ends in flight with landing and getting up.
+
+    Args:
+        motion: T frames that end in flight.
+        rows: its annotations.
+        heel_toe_contacts: (T, 2, 2) bool, left and right, heel and toe in contact.
+        getting_ups: movements of getting up; the best fitting one is used.
+    Returns:
+        The completed clip.
+    """
     whole = landed(motion, [way.motion for way in ways])
     way = ways[whole.way]
     down = np.zeros((len(whole.motion), 2, 2), bool)
@@ -82,7 +110,7 @@ def completed(motion: Motion, rows, standing: np.ndarray, ways: Sequence[WayUp])
 
 
 def _longer(row: ClipAnnotation, recorded: int, last: int) -> ClipAnnotation:
-    """A row of a key moment that reaches the recording's end needs what is made behind it as its exit."""
+    """Extend the row of a key moment that reaches the recording's end over the synthetic part, which is its exit."""
     if row.end < recorded - 1:
         return row
     key = None if row.key is None else min(row.key, recorded - 1)
@@ -90,10 +118,10 @@ def _longer(row: ClipAnnotation, recorded: int, last: int) -> ClipAnnotation:
 
 
 def describe_landings(completed_clips: Sequence[Completed], ways: Sequence[WayUp]) -> list[str]:
-    """What was done, in one line, where anything was."""
+    """Describe the completed clips in one line; no line where there are none."""
     if not completed_clips:
         return []
     seconds = np.median([(len(one.motion) - one.recorded) / one.motion.fps for one in completed_clips])
-    by = "by a made getting up, since no clip shows one" if ways[0].made else "as the library's own clips get up"
-    what = f"landing and getting up ({by}) made behind them, {seconds:.1f} s each"
+    by = "synthetic, since no clip shows it" if ways[0].made else "from the library's own clips"
+    what = f"landing and getting up ({by}) added, {seconds:.1f} s each"
     return [f"{len(completed_clips)} clips end in flight: {what}"]

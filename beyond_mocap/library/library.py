@@ -1,6 +1,6 @@
-"""A library: the clips of a folder, a mirrored twin of each, their words, features, clusters and key moments.
+"""A library: the clips of a folder, a mirrored twin of each, their labels, features, clusters and key moments.
 
-`build` reads a folder once and keeps what it worked out in a cache (`library.cache`); the next call is quick.
+`build_library` reads a folder once and saves the results in a cache (`library.cache`); the next call is quick.
 """
 
 from __future__ import annotations
@@ -31,7 +31,13 @@ Progress = Callable[[float, str], None]
 
 @dataclass(frozen=True)
 class Gait:
-    """A kind of locomotion of the library: its word, all words of its most common row, and mean speed in m/s."""
+    """A kind of locomotion in the library.
+
+    Attributes:
+        label: its label.
+        labels: all labels of its most common row.
+        speed: mean, m/s.
+    """
 
     word: str
     words: tuple[str, ...]
@@ -40,9 +46,19 @@ class Gait:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Library:
-    """Everything a search needs. `frames`: all clips at `fps` (30); `clusters` by block length; notes: what was
-    decided; kept: where its cache is and under which key, for what is worked out later; chosen: which clip stands for
-    which gait, (word, path) pairs (`library.automatic`)."""
+    """Everything that a search needs.
+
+    Attributes:
+        folder: where the recordings are.
+        skeleton: of all clips.
+        clips: recordings and their twins.
+        frames: all clips at `fps`.
+        clusters: by block length.
+        fps: 30.
+        notes: decisions made while building, for people.
+        cache_location: the cache's folder and key, for results that are computed later.
+        chosen_gaits: (gait label, clip path) pairs: the clip that defines a gait (`library.automatic_locomotion`).
+    """
 
     folder: str
     skeleton: Skeleton
@@ -61,7 +77,7 @@ class Library:
 
     @cached_property
     def words(self) -> frozenset[str]:
-        """Every word that a clip carries."""
+        """Every label that a clip carries."""
         return frozenset(word for clip in self.clips for row in clip.annotations for word in row.words)
 
     @cached_property
@@ -71,7 +87,7 @@ class Library:
 
     @cached_property
     def gait_thresholds(self) -> np.ndarray:
-        """(G-1,) m/s: where the clips' own annotations change from each gait to the next faster one."""
+        """(G-1,) m/s: the speeds at which the clips' own annotations change from each gait to the next faster one."""
         frames, gaits = self.frames, self.gaits
         column = {word: i for i, word in enumerate(frames.vocabulary)}
         labelled = np.full(len(frames), -1)
@@ -81,8 +97,10 @@ class Library:
 
     @cached_property
     def stance_seconds(self) -> np.ndarray:
-        """(N,) seconds that the foot which leaves the ground sooner stands there in all at each frame; 0 while one is
-        in the air. Whoever plays it faster or slower than the track drags that foot as long."""
+        """(N,) duration in seconds of the shorter current stance of both feet; 0 while a foot is in the air.
+
+        A body that is played faster or slower than the track drags that foot for as long.
+        """
         return np.concatenate([_stance_seconds(clip, self._own_frames(i)) for i, clip in enumerate(self.clips)])
 
     @cached_property
@@ -97,10 +115,13 @@ class Library:
 
     @cached_property
     def extended(self) -> "Library":
-        """The recordings and, behind them, what `library.made` makes of them: the speeds between and above them, and
-        kicks and taken balls on the run; made on first use and kept beside the cache. It has no clusters. InputError
-        where no recording shows locomotion."""
-        measure_gaits(self)  # a library without locomotion stays an error
+        """The recordings followed by the synthetic clips of `library.synthetic_clips`.
+
+        These add the speeds between and above the recordings, and kicks and received balls on the run. They are
+        generated on
+        first use and cached. The result has no clusters. InputError where no recording shows locomotion.
+        """
+        measure_gaits(self)  # a library without locomotion raises InputError
         found = cache.load(*self.kept, "made") if self.kept else None
         made = Library(folder="", **found) if found else None
         if made is None:
@@ -121,9 +142,19 @@ class Library:
         return gaps(self.frames.speed[locomotion(self.frames, self.clips)], self.fps)
 
     def lacks(self, speed: np.ndarray, at_keys: np.ndarray, takes: np.ndarray) -> bool:
-        """Whether a track at `speed` (T,) m/s, at the library's rate, stays in a gap for a fifth of a second or more,
-        or has key moments, at `at_keys` (K,) m/s, that are faster than any recorded kick, or, where one `takes` (K,)
-        bool the ball, any recorded taking of a ball with the foot, can be played without sliding."""
+        """Whether a track needs the synthetic clips.
+
+        It does if it stays in a speed gap for a fifth of a second or more, or has key moments that are faster than any
+        recorded
+        kick or, for received balls, any recorded receiving with the foot can be played without sliding.
+
+        Args:
+            speed: (T,) m/s of the track at the library's rate.
+            key_speeds: (K,) m/s at its key moments.
+            takes: (K,) bool, the key moment receives the ball.
+        Returns:
+            True if it does.
+        """
         inside = sum(int(np.sum((speed > low) & (speed < high))) for low, high in self.gaps)
         kick, take = (touch_speed(self.frames, self.clips, self.keys, act) for act in (KICK, TAKE))
         too_fast = 1.3 * np.where(takes & np.isfinite(take), max(take, TAKES_FROM), kick)
@@ -131,7 +162,7 @@ class Library:
 
     @cached_property
     def fastest(self) -> float:
-        """m/s: the highest speed that a clip reaches."""
+        """The highest speed that a clip reaches, m/s."""
         return float(self.frames.speed.max())
 
     @property
@@ -141,7 +172,7 @@ class Library:
 
 
 def _made(library: Library) -> Library:
-    """What the recordings lack (`library.made`), described like them."""
+    """Build the clips that the recordings lack (`library.synthetic_clips`), described like them."""
     speeds = {gait.word: gait.speed for gait in library.gaits if gait.word != STANDING}
     clips = []
     for made in made_clips(library.clips, library.frames, library.fps, speeds, library.keys):
@@ -154,30 +185,40 @@ def _made(library: Library) -> Library:
 
 
 def _stance_seconds(clip: Clip, source: np.ndarray) -> np.ndarray:
-    """(T,) of one clip at its frames `source` (T,)."""
+    """Measure the stance durations (T,) of one clip at its frames `source` (T,)."""
     stands = clip.standing.any(axis=2)
     length = np.stack([_run_lengths(stands[:, side]) for side in (0, 1)], axis=1).min(axis=1) / clip.motion.fps
     return length[_nearest(clip, source)]
 
 
 def _nearest(clip: Clip, source: np.ndarray) -> np.ndarray:
-    """(T,) the clip's whole frames nearest to `source` (T,)."""
+    """Round to the clip's whole frames nearest to `source` (T,)."""
     return np.clip(np.round(source).astype(int), 0, len(clip.standing) - 1)
 
 
 def _run_lengths(flags: np.ndarray) -> np.ndarray:
-    """(T,) length of the run of True that each frame lies in, 0 for False."""
+    """Measure the length of the run of True that each frame (T,) lies in, 0 for False."""
     edges = np.flatnonzero(np.diff(flags, prepend=not flags[0], append=not flags[-1]))
     lengths = np.diff(edges)
     return np.repeat(lengths, lengths) * flags
 
 
 def measure_gaits(library: Library) -> tuple[Gait, ...]:
-    """Speeds of the library's locomotion (Faustino §3.1.1): per gait word, distance over time of its most common rows.
+    """Measure the speeds of the library's locomotion: per gait, distance over time of its most common rows.
 
-    A gait without a direction in its words counts as well as one with; rows of key moments and dribbles do not count,
-    nor do made clips of a gait that is recorded, nor other clips than the chosen one, nor rows that a slower one would
-    overtake in the mean (then the word is dropped, since thresholds need an order)."""
+    A gait without a direction in its labels counts like one with. Rows of key moments and dribbles do not count, nor do
+    synthetic clips of a gait that is recorded, nor clips other than the chosen one. A gait whose mean speed is not
+    above
+    that of every slower gait is dropped, since thresholds need an order.
+
+    Args:
+        library: the library.
+    Returns:
+        The gaits from slow to fast.
+    Raises:
+        InputError: if no clip shows locomotion.
+    Source: Faustino 2024, section 3.1.1.
+    """
     seconds: dict[str, Any] = {word: Counter() for word in LOCOMOTION}
     metres: dict[str, Any] = {word: Counter() for word in LOCOMOTION}
     frames = library.frames
@@ -201,14 +242,16 @@ def measure_gaits(library: Library) -> tuple[Gait, ...]:
     if not any(gait.word != STANDING for gait in found):
         raise InputError(
             library.folder, "no locomotion clip", "clips annotated walking, jogging, running or sprinting",
-            "annotate which clips are locomotion",
+            "label the clips that show locomotion",
         )
     ordered = [gait for i, gait in enumerate(found) if all(gait.speed > other.speed for other in found[:i])]
     return tuple(ordered)
 
 
 def gait_word(row: ClipAnnotation) -> str | None:
-    """The gait that a row shows and nothing else, but for a direction; None of a key moment, an action or a dribble."""
+    """Return the gait of a row that shows a gait and at most a direction; None for a key moment, an action or a
+    dribble.
+    """
     words = [word for word in row.words if word in LOCOMOTION]
     alone = row.key is None and len(words) == 1 and not set(row.words) - {words[0], *DIRECTIONS}
     return words[0] if alone else None

@@ -1,21 +1,21 @@
-"""What the recordings lack, made from them: speeds between and above them, kicks and taken balls on the run.
+"""Synthetic clips that complete the recordings: speeds between and above them, kicks and received balls on the run.
 
-Tracked players go at any speed up to 9 m/s; recordings leave gaps (../shared/data/README.md). A clip played at 0.875
-to 1.125 of its rate covers some speeds around its own; where too few seconds reach a speed that way is a gap.
+Tracked players move at any speed up to 9 m/s; recordings leave gaps (../shared/data/README.md). A clip played at 0.875
+to 1.125 of its rate covers some speeds around its own; a speed that too few seconds reach that way is in a gap.
 
-Between two recordings a gap is filled by blending both in phase (`motion.phase_blend`, Faustino §6.2). Between a walk
-and a run, too: judged by eye and figure, such a mixture at 1.7 to 2.3 m/s is a brisk walk with a spring, then a
-shuffling jog, with flight coming in gradually (7 % at 1.7 m/s, 32 % at 2.3 m/s), in the actors' own style, and closer
-to their poses than a made walk or jog.
+Between two recordings a gap is filled by blending both in phase (`motion.phase_blend`, Faustino §6.2). This holds
+between a walk and a run, too: judged by eye and figures, such a mixture at 1.7 to 2.3 m/s is a brisk walk with a
+spring, then a shuffling jog, with flight coming in gradually (7 % at 1.7 m/s, 32 % at 2.3 m/s), in the actors' own
+style, and closer to their poses than a synthetic walk or jog.
 
-Above the recordings `synthetic.gait` makes running at any speed from published figures, with the skeleton's own upright
-stance and the recorded runners' elbows and lean: long runs that slowly gain and lose speed, so that few cuts are
-needed, quick ones, and weaving ones. The fastest recording played faster with stretched strides would keep the
+Above the recordings `synthetic.gait` generates running at any speed from published figures, with the skeleton's own
+upright stance and the recorded runners' elbows and lean: long runs that slowly gain and lose speed, so that few cuts
+are needed, quick ones, and weaving ones. The fastest recording played faster with stretched strides would keep the
 figures and lose the look: knees pop, the body floats.
 
-Recorded kicks are seldom faster than a jog, and who takes a ball with his foot in a recording all but stands; carried
-along at 8 m/s their standing foot slides by metres. `synthetic.gestures` makes both on the run at the speeds they lack;
-they stand in for recorded ones wherever they carry the words by which those answer.
+Recorded kicks are seldom faster than a jog, and players who receive a ball with the foot in a recording hardly move;
+moved along at 8 m/s their supporting foot slides by metres. `synthetic.gestures` generates both on the run at the
+missing speeds; they substitute for recorded ones wherever they carry the labels by which those answer.
 """
 
 from __future__ import annotations
@@ -40,33 +40,40 @@ from .features import Frames
 from .scan import CACHE_FOLDER
 
 MADE_FOLDER = f"{CACHE_FOLDER}/made-gait/"
-# how names of blends, of kicks and of taken balls begin, below it
+# how the file names of blends, of kicks and of received balls begin, in that folder
 BLENDED, KICKED, TAKEN = "blend_", "kick_", "receive_"
 KICK, TAKE = frozenset({"kick"}), frozenset({"receive", "foot"})
 FPS = 60.0  # of synthetic clips
 FASTEST = 9.4  # m/s
-# made running begins here, m/s: slower it is left to blends; and taking a ball on the run
+# m/s: lowest speed of synthetic running (blends cover slower speeds), and of receiving a ball on the run
 _RUNS_FROM, TAKES_FROM = 2.4, 1.7
-# how far from its own speed a clip is played, and the seconds that have to reach a speed for it not to be a gap
+# range of playback rates of a clip
 _WARP = (0.875, 1.125)
-_ENOUGH_SECONDS = 1.5  # of recording at a speed, above which nothing is added there
+_ENOUGH_SECONDS = 1.5  # seconds of recording at a speed from which on it is no gap
 _GRID = 1.03  # ratio of neighbouring speeds
-# speeds of blends and of touches lie so far apart
+# ratios of neighbouring speeds of blends and of touches
 _BLEND_STEP, _TOUCH_STEP = 1.06, 1.4
-_PAIRS = 3  # of recordings mixed into each gap at most
-_STEADY = 0.15
+_PAIRS = 3  # pairs of recordings blended into each gap, at most
+_STEADY = 0.15  # standard deviation of a steady stretch's speed, share of its mean
 _GAITS = LOCOMOTION[1:]
-# m/s of gaits that no recording shows
+# m/s of gaits without a recording
 _USUAL = {"running": 4.6, "sprinting": 7.3}
-# radians by which a runner's style differs from the usual at most
+# radians by which a runner's elbow and lean differ from the default, at most
 _STYLE = np.array([0.35, 0.10])
-# m/s within which a point of a foot stands still
+# m/s below which a point of a foot is still
 _STILL = 0.18
 
 
 @dataclass(frozen=True, eq=False)
 class Made:
-    """A made clip. name: its path below the library's folder; standing (T, 2, 2): left and right, heel and toe."""
+    """A synthetic clip.
+
+    Attributes:
+        name: its path below the library's folder.
+        motion: T frames.
+        rows: its annotations.
+        heel_toe_contacts: (T, 2, 2) bool, left and right, heel and toe in contact.
+    """
 
     name: str
     motion: Motion
@@ -75,8 +82,14 @@ class Made:
 
 
 def gaps(speed: np.ndarray, fps: float) -> tuple[tuple[float, float], ...]:
-    """(from, to) m/s of all ranges of speed, from the slowest recording's to a sprint, that too few seconds of recorded
-    locomotion reach within the time warp. speed (N,): of frames of locomotion, at `fps`."""
+    """Find the ranges of speed that too few seconds of recorded locomotion reach within the time warp.
+
+    Args:
+        speed: (N,) m/s of frames of locomotion.
+        fps: of those frames.
+    Returns:
+        (from, to) m/s of all gaps, from the slowest recording's speed to a sprint.
+    """
     grid = np.exp(np.arange(np.log(0.6), np.log(FASTEST), np.log(_GRID)))
     ordered = np.sort(speed)
     reached = np.searchsorted(ordered, grid / _WARP[0]) - np.searchsorted(ordered, grid / _WARP[1])
@@ -89,7 +102,7 @@ def gaps(speed: np.ndarray, fps: float) -> tuple[tuple[float, float], ...]:
 
 
 def locomotion(frames: Frames, clips: Sequence) -> np.ndarray:
-    """(N,) bool: frames of recordings, twins left out, that show locomotion and no action."""
+    """Select the frames (N,) bool of recordings, twins left out, that show locomotion and no action."""
     named = {word: frames.words[:, column] for column, word in enumerate(frames.vocabulary)}
     none = np.zeros(len(frames), bool)
     moves = np.any([named.get(word, none) for word in _GAITS], axis=0)
@@ -99,8 +112,17 @@ def locomotion(frames: Frames, clips: Sequence) -> np.ndarray:
 
 
 def touch_speed(frames: Frames, clips: Sequence, keys: Sequence, act: frozenset[str]) -> float:
-    """m/s of the fastest approach of a touch among `keys` that carries the words `act`; infinite without any."""
-    speed = frames.speed  # worked out over all frames each time it is asked for
+    """Measure the fastest approach of a touch.
+
+    Args:
+        frames: of the library.
+        clips: of the library.
+        keys: its key moments.
+        act: labels that the touch carries.
+    Returns:
+        m/s; infinite without any touch.
+    """
+    speed = frames.speed  # computed over all frames at every access
     found = [
         speed[frames.first[key.clip] + int(key.frame / clips[key.clip].motion.fps * 30.0 + 0.5)]
         for key in keys if act <= key.words and not clips[key.clip].made
@@ -111,9 +133,17 @@ def touch_speed(frames: Frames, clips: Sequence, keys: Sequence, act: frozenset[
 def made_clips(
     clips: Sequence, frames: Frames, fps: float, gait_speeds: dict[str, float], keys: Sequence
 ) -> Iterator[Made]:
-    """All made clips of a library whose recordings are `clips`, described by `frames` at `fps`, with `keys`.
+    """Iterate over all synthetic clips of a library.
 
-    gait_speeds: m/s of the recorded gaits. Names begin with MADE_FOLDER: they are kept beside the cache."""
+    Args:
+        clips: its recordings.
+        frames: their description.
+        fps: of the frames.
+        gait_speeds: m/s of the recorded gaits.
+        keys: the recordings' key moments.
+    Yields:
+        Clips whose names begin with SYNTHETIC_FOLDER: they are stored beside the cache.
+    """
     speeds = {**{word: v for word, v in _USUAL.items() if v > max(gait_speeds.values())}, **gait_speeds}
     example = upright_example(clips)
     style = runner_style(clips, frames, example)
@@ -128,8 +158,11 @@ def made_clips(
 
 
 def upright_example(clips: Sequence) -> Motion:
-    """Frames of all recordings, one a second: `motion.retargeting.neutral` takes the most upright of them for the way
-    this skeleton stands. A single recording of a run leans, and made running would lean twice."""
+    """Sample all recordings, one frame a second, as an example of how this skeleton stands.
+
+    `motion.retargeting.neutral` uses the most upright of them. A single recording of a run leans, and synthetic running
+    would lean twice.
+    """
     parts = [
         at_frames(clip.motion, np.arange(0.0, len(clip.motion), clip.motion.fps)) for clip in clips if not clip.mirrored
     ]
@@ -138,8 +171,12 @@ def upright_example(clips: Sequence) -> Motion:
 
 
 def runner_style(clips: Sequence, frames: Frames, example: Motion) -> GaitStyle:
-    """How far the recorded runners bend their elbows and lean, against a made one at their mean speed; the usual style
-    where nobody runs."""
+    """Estimate how far the recorded runners bend their elbows and lean, compared with a synthetic one at their mean
+    speed.
+
+    Returns:
+        The style; the default one where no clip runs.
+    """
     rows = np.flatnonzero(locomotion(frames, clips) & (frames.speed > _RUNS_FROM))
     if len(rows) < _ENOUGH_SECONDS * 30.0:
         return GaitStyle()
@@ -153,7 +190,7 @@ def runner_style(clips: Sequence, frames: Frames, example: Motion) -> GaitStyle:
 
 
 def _elbow_and_lean(motion: Motion) -> np.ndarray:
-    """(2,) radians, means over all frames: flexion of both elbows, and the trunk's lean ahead."""
+    """Measure (2,) radians, means over all frames: flexion of both elbows, and the trunk's forward lean."""
     body = identify(motion.skeleton)
     places, _ = forward_kinematics(motion)
     bends = [
@@ -168,12 +205,12 @@ def _elbow_and_lean(motion: Motion) -> np.ndarray:
 
 
 def _between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """The angle (T,) in radians between vectors (T, 3)."""
+    """Measure the angles (T,) in radians between vectors (T, 3)."""
     return arctan2(np.linalg.norm(cross(a, b), axis=1), np.sum(a * b, axis=1))
 
 
 def _blends(clips, frames: Frames, fps: float, low: float, high: float, speeds: dict[str, float]) -> Iterator[Made]:
-    """Mixtures of the nearest steady recordings below and above a gap; none where one side is lacking."""
+    """Iterate over blends of the nearest steady recordings below and above a gap; none where one side is missing."""
     slow, fast = _neighbours(clips, frames, fps, low, high)
     if not slow or not fast:
         return
@@ -186,7 +223,7 @@ def _blends(clips, frames: Frames, fps: float, low: float, high: float, speeds: 
 
 
 def _neighbours(clips, frames: Frames, fps: float, low: float, high: float) -> tuple[list[Strides], list[Strides]]:
-    """Steady straight stretches of forward locomotion below and above a gap, nearest in speed first."""
+    """Find steady straight stretches of forward locomotion below and above a gap, nearest in speed first."""
     slow: list[tuple[float, int, ClipAnnotation]] = []
     fast: list[tuple[float, int, ClipAnnotation]] = []
     for index, clip in enumerate(clips):
@@ -207,17 +244,19 @@ def _neighbours(clips, frames: Frames, fps: float, low: float, high: float) -> t
 
 
 def _straight(frames: Frames, part: np.ndarray, fps: float) -> bool:
-    """Whether frames `part` (K,) go on at one speed, forward, and hardly turn."""
+    """Whether frames `part` (K,) have one speed, move forward, and hardly turn."""
     speed, off = frames.speed[part], arctan2(frames.velocity[part, 1], frames.velocity[part, 0])
     steady = speed.std() < _STEADY * speed.mean() and np.mean(np.abs(off)) < 0.35
     return steady and np.ptp(frames.heading[part]) < 0.5 + 0.3 * len(part) / fps
 
 
 def _acts(clip, row: ClipAnnotation) -> bool:
+    """Whether a key moment's row overlaps the row."""
     return any(other.key is not None and other.start < row.end and other.end > row.start for other in clip.annotations)
 
 
 def _stretches(clips, found) -> list[Strides]:
+    """Find the strides of the best stretches."""
     out = []
     for _, index, row in sorted(found, key=lambda one: one[:2])[: 2 * _PAIRS]:
         clip, span = clips[index], slice(int(row.start), int(row.end) + 1)
@@ -228,13 +267,13 @@ def _stretches(clips, found) -> list[Strides]:
 
 
 def _runs(low: float, high: float, example: Motion, style: GaitStyle, speeds: dict[str, float]) -> Iterator[Made]:
-    """Running from `low` to `high` m/s and back: slowly, as quickly as players do, and weaving."""
+    """Iterate over runs from `low` to `high` m/s and back: slow changes, as quick as players change, and weaving."""
     if high < 1.1 * low:
         return
     for name, pace, weaves in (("slow", 0.8, False), ("quick", 2.5, False), ("weave", 1.0, True)):
         ramp = np.linspace(low, high, max(int((high - low) / pace * FPS), int(1.5 * FPS)))
         speed = np.concatenate([ramp, ramp[::-1]])
-        # as much sideways acceleration as players show at speed, about 4 m/s^2, to one side and the other
+        # as much sideways acceleration as players show at speed, about 4 m/s^2, alternating left and right
         turn = np.sin(2.0 * np.pi * np.arange(len(speed)) / (3.0 * FPS)) * np.minimum(1.2, 4.0 / speed) * weaves
         motion = gait(speed, None, FPS, example.skeleton, turn_rate=turn, style=style, example=example)
         yield _grounded(f"{MADE_FOLDER}{name}_{low:.1f}.bvh", motion, None, _gait_rows(speed, speeds))
@@ -243,7 +282,9 @@ def _runs(low: float, high: float, example: Motion, style: GaitStyle, speeds: di
 def _touches(
     name: str, speed: float, act: tuple[str, ...], kinds: Sequence[str], example: Motion, speeds: dict[str, float]
 ) -> Iterator[Made]:
-    """Touches with the right foot on the run, from `speed` m/s to a sprint, of each kind; `act`: their words."""
+    """Iterate over touches with the right foot on the run, from `speed` m/s to a sprint, of each kind; `act`: their
+    labels.
+    """
     while speed < FASTEST:
         for kind in kinds:
             made = gestures.strike(f"{' '.join(act)} {kind}", example.skeleton, FPS, example=example, at_speed=speed)
@@ -255,15 +296,24 @@ def _touches(
 
 
 def _gait_rows(speed: np.ndarray, speeds: dict[str, float]) -> tuple[ClipAnnotation, ...]:
-    """Rows that name the gait of every frame by its speed (T,), with the thresholds by which tracks are annotated."""
+    """Build rows with the gait of every frame by its speed (T,), with the thresholds by which tracks are annotated."""
     words = sorted((word for word in speeds if word in _GAITS), key=speeds.get)
     band = np.searchsorted(gait_thresholds(np.array([speeds[word] for word in words])), speed, side="right")
     return tuple(ClipAnnotation(a, b - 1, None, (words[band[a]], "front")) for a, b in equal_runs(band))
 
 
 def _grounded(name: str, motion: Motion, standing: np.ndarray | None, rows, hold: bool = False) -> Made:
-    """The clip with its soles on the ground, height 0, as recordings are, its feet held where they stand (`hold`),
-    and no point called standing that still moves."""
+    """Put a clip's soles on the ground, height 0, as in recordings.
+
+    Args:
+        name: of the clip.
+        motion: T frames.
+        heel_toe_contacts: (T, 2, 2) bool contacts; None detects them.
+        rows: its annotations.
+        plants_feet: plant the feet.
+    Returns:
+        The clip; points that still move are not in contact.
+    """
     standing = contacts.points(motion) if standing is None else standing
     motion = replace(motion, root_positions=motion.root_positions - [0.0, 0.0, contacts.ground_height(motion)])
     if hold:
@@ -273,7 +323,8 @@ def _grounded(name: str, motion: Motion, standing: np.ndarray | None, rows, hold
 
 
 def _still(motion: Motion) -> np.ndarray:
-    """(T, 2, 2) bool: left and right, heel and toe move over the ground by less than a stance's creep."""
+    """Detect which of left and right, heel and toe move over the ground by less than a stance's creep: (T, 2, 2) bool.
+    """
     body = identify(motion.skeleton)
     places, _ = forward_kinematics(motion)
     points = np.stack([places[:, [limb.foot, limb.toe_or_foot], :2] for limb in (body.left, body.right)], axis=1)

@@ -1,6 +1,6 @@
-"""Clips of many bodies become clips of one: the skeleton that most frames have, or the one that the user names.
+"""Brings clips of many bodies to one skeleton: the one with most frames, or the one that the user names.
 
-Every rig is studied once, from frames of all its clips, so that one actor's clips share one neutral posture.
+Every rig is analysed once, from frames of all its clips, so that one actor's clips share one neutral posture.
 """
 
 from __future__ import annotations
@@ -20,19 +20,30 @@ from ..motion.retargeting.retarget import Retargeter
 from ..motion.skeleton import Skeleton
 from . import repair
 
-SAME_BONES = 5e-3
-_SAMPLE = 400
+SAME_BONES = 5e-3  # metres between offsets of equal bones
+_SAMPLE = 400  # frames from which a rig is analysed
 
 
 def bring(
     paths: Sequence[Path], motions: Sequence[Motion], chosen: Motion | None, notes: list[str]
 ) -> Iterator[tuple[Motion, np.ndarray, bool]]:
-    """Each clip on the library's skeleton, its standing points (T, 2, 2) bool, and whether it came from another body.
+    """Bring clips to the library's skeleton.
 
-    motions: as read, in the order of `paths`; chosen: a recording whose skeleton is to be the library's (default: the
-    skeleton with most frames, the first path's among equals). `notes` gets one line about what was brought over.
-    Heels and toes stand where the recording's own do; where only the new body has toes they are looked for on it.
-    Raises InputError, naming the file, for a clip whose legs cannot be found."""
+    Heels and toes are in contact where the recording's own are; where only the new body has toes, contacts are detected
+    on
+    it.
+
+    Args:
+        paths: the files.
+        motions: as read, in the order of `paths`.
+        skeleton_example: a recording with the library's skeleton (default: the skeleton with most frames, the first
+            path's among equals).
+        notes: gets one line about retargeted clips.
+    Returns:
+        For each clip the motion, its contacts (T, 2, 2) bool of heels and toes, and whether it came from another body.
+    Raises:
+        InputError: naming the file, for a clip whose legs cannot be found.
+    """
     standing = [_named(path, lambda: contacts.points(motion)) for path, motion in zip(paths, motions)]
     groups = _groups(motions)
     skeleton = chosen.skeleton if chosen is not None else _commonest(motions, groups)
@@ -47,14 +58,24 @@ def bring(
             rigs.update(dict.fromkeys(group, rig))
     if rigs:
         others = sum(group[0] in rigs for group in groups)
-        notes.append(f"{len(rigs)} clips of {others} other skeletons brought to the one of {len(skeleton)} joints")
+        notes.append(f"{len(rigs)} clips of {others} other skeletons retargeted to the one with {len(skeleton)} joints")
     return _brought(motions, standing, skeleton, rigs)
 
 
 def bring_one(motion: Motion, target: Motion, bone_map: dict[str, str] | str | Path | None = None) -> Motion:
-    """`motion` on the skeleton of `target`, a recording or pose of it, feet held where they stood; same rate and floor.
+    """Retarget one motion to the skeleton of `target`, with its feet planted; same rate and floor.
 
-    bone_map: see `motion.retargeting.retarget`. On its own skeleton a motion stays. Raises InputError as there."""
+    On its own skeleton a motion is unchanged.
+
+    Args:
+        motion: the motion.
+        target: a recording or pose of the target skeleton.
+        bone_map: see `motion.retargeting.retarget`.
+    Returns:
+        The retargeted motion.
+    Raises:
+        InputError: as `Retargeter`.
+    """
     points, feet = _points_if_named(motion), _points_if_named(target)
     rig = Retargeter(
         motion, target.skeleton, bone_map, example=target,
@@ -68,7 +89,7 @@ def bring_one(motion: Motion, target: Motion, bone_map: dict[str, str] | str | P
 
 
 def _points_if_named(motion: Motion) -> np.ndarray | None:
-    """Standing points (T, 2, 2); None for a skeleton whose joints only a bone map knows."""
+    """Detect contacts (T, 2, 2); None for a skeleton whose joints only a bone map identifies."""
     try:
         return contacts.points(motion)
     except InputError:
@@ -76,6 +97,7 @@ def _points_if_named(motion: Motion) -> np.ndarray | None:
 
 
 def _brought(motions, standing, skeleton: Skeleton, rigs) -> Iterator[tuple[Motion, np.ndarray, bool]]:
+    """Iterate over the clips on the library's skeleton, with contacts and whether they were retargeted."""
     for number, (motion, points) in enumerate(zip(motions, standing)):
         if number in rigs:
             there = rigs[number].carry(motion)
@@ -85,12 +107,12 @@ def _brought(motions, standing, skeleton: Skeleton, rigs) -> Iterator[tuple[Moti
 
 
 def _standing_there(there: Motion, skeleton: Skeleton, points: np.ndarray) -> np.ndarray:
-    """Heels and toes that stand (T, 2, 2): the recording's own `points`; where only the new body has toes, its own."""
+    """Choose the contacts (T, 2, 2): the recording's own `points`, or new ones where only the new body has toes."""
     return contacts.points(there) if _has_toes(there.skeleton) and not _has_toes(skeleton) else points
 
 
 def _named(path: Path, work):
-    """The result of `work`; what it finds wrong with a skeleton is told with the file's name."""
+    """Run `work`; an error about its skeleton gets the file's name."""
     try:
         return work()
     except InputError as error:
@@ -103,7 +125,7 @@ def _has_toes(skeleton: Skeleton) -> bool:
 
 
 def _groups(motions: Sequence[Motion]) -> list[list[int]]:
-    """Clips by skeleton, in the order of their first."""
+    """Group clips by skeleton, in the order of their first."""
     groups: dict[str, list[int]] = {}
     for number, motion in enumerate(motions):
         groups.setdefault(motion.skeleton.fingerprint, []).append(number)
@@ -111,12 +133,14 @@ def _groups(motions: Sequence[Motion]) -> list[list[int]]:
 
 
 def _commonest(motions: Sequence[Motion], groups: list[list[int]]) -> Skeleton:
+    """Find the skeleton with most frames."""
     best = max(groups, key=lambda group: (sum(len(motions[i]) for i in group), -group[0]))
     return motions[best[0]].skeleton
 
 
 def _sample(motions: Sequence[Motion], standing: Sequence[np.ndarray]) -> tuple[Motion, np.ndarray]:
-    """Some frames of all clips of one rig, and which feet (T, 2) are flat on the ground in them; over one floor."""
+    """Sample frames of all clips of one rig above one floor, and which feet (T, 2) are flat on the ground in them.
+    """
     ends = np.cumsum([len(motion) for motion in motions])
     frames = np.unique(np.linspace(0, ends[-1] - 1, _SAMPLE).astype(int))
     roots, rotations, feet = [], [], []

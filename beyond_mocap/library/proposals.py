@@ -1,13 +1,13 @@
-"""Words for a recording that nobody has annotated yet, proposed by rules from its motion alone.
+"""Labels for recordings without annotations, proposed by rules from the motion alone.
 
-Locomotion follows from the pelvis's speed and from where the body faces while it travels. Actions are found by what
-stands out: a foot that swings faster than any stride of that speed would (a kick: the key moment is the foot's highest
-speed, the side the faster foot's), a body that falls freely for longer than a run does (a jump: its highest point), a
-head that strikes forward in the air (a header), a body that turns on the spot, one that gets up from the ground. There
-is no ball in a recording, so what only a ball shows (dribbling, receiving) is not proposed.
+Locomotion follows from the pelvis's speed and from the heading while the body travels. Actions are found by what stands
+out: a foot that swings faster than any stride of that speed (a kick: the key moment is the foot's highest speed, the
+side the faster foot's), a body that falls freely for longer than a run does (a jump: its highest point), a head that
+strikes forward in the air (a header), a body that turns on the spot, one that gets up from the ground. There is no ball
+in a recording, so what only a ball shows (dribbling, receiving) is not proposed.
 
-`propose` is all that others call. With a classifier that has learned from annotated clips (`library.classify`) the
-rules are what it starts from: it weighs them with what it has seen, and they stay for all acts that it does not know.
+`propose_labels` is the entry point. With a classifier trained on annotated clips (`library.classify`) the rules are its
+input: it weighs them with what it has learned, and they stay for all acts that it does not know.
 """
 
 from __future__ import annotations
@@ -37,29 +37,38 @@ if TYPE_CHECKING:
     from .classify.classifier import Classifier
 
 GAITS = tuple((word, find_label(word).gait) for word in LOCOMOTION)
-"""Each gait and the speed in m/s from which on it holds, where no library says its own."""
+"""Each gait and the speed in m/s from which on it applies, where no library has its own."""
 
 
-_GAIT_SECONDS, _SHORTEST = 0.5, 0.5  # over which speed is averaged; of a stretch
-_FOOT_SECONDS = 0.012  # over which a foot's speed is averaged: a kick's peak is short
+_GAIT_SECONDS, _SHORTEST = 0.5, 0.5  # seconds over which speed is averaged; least duration of a stretch
+_FOOT_SECONDS = 0.012  # seconds over which a foot's speed is averaged: a kick's peak is short
 # a kick's foot is faster against the pelvis than this, and than a stride at the pelvis's speed v: m/s, share of v, m/s
 _KICK, _STRIDE, _ABOVE_STRIDE = 6.5, 1.25, 3.5
 _KICK_BEFORE, _KICK_AFTER = 0.25, 0.25  # seconds of a kick around its key moment
-_RUNNING, _HIGH, _INSIDE = 2.0, 0.40, 0.65  # m/s of the pelvis; m above the floor; cosine of way and inner side
-_UPRIGHT = 0.5  # of the trunk's direction that points up
-_FLIGHT, _FALLS = 0.26, 0.6  # seconds without ground; of the pelvis's rise and fall as gravity would have it
+# m/s of the pelvis; m above the floor; cosine of the foot's path and its inner side
+_RUNNING, _HIGH, _INSIDE = 2.0, 0.40, 0.65
+_UPRIGHT = 0.5  # share of the trunk's direction that points up
+_FLIGHT, _FALLS = 0.26, 0.6  # seconds without contact; least rise of the pelvis, share of that of free flight
 _NOD = 1.0  # m/s of the head against the chest, forward: jumps without a ball have up to 0.5
 _TURN_RATE, _TURN = np.radians(45.0), np.radians(50.0)
-_TURN_SPEED = 2.0  # m/s: a body that travels faster goes round a curve
-_LYING, _UP = 0.45, 0.85  # of the leg's length: the pelvis of a body on the ground, of one that has got up
+_TURN_SPEED = 2.0  # m/s: a body that travels faster runs a curve
+_LYING, _UP = 0.45, 0.85  # pelvis height in leg lengths: of a body on the ground, of one that has got up
 
 
 def propose(
     motion: Motion, gaits: Sequence[tuple[str, float]] = GAITS, classifier: "Classifier | None" = None
 ) -> tuple[Proposal, ...]:
-    """What a recording may show, ordered by its first frame. gaits: each gait's word and the m/s from which on it
-    holds, slow to fast (`gaits_of` a library). classifier: what was learned from annotated clips; without one the rules
-    alone. InputError where the skeleton has no legs."""
+    """Propose labels for a recording.
+
+    Args:
+        motion: T frames.
+        gaits: each gait's label and the m/s from which on it applies, slow to fast (`list_gaits` of a library).
+        classifier: trained on annotated clips; None uses the rules alone.
+    Returns:
+        The proposals, ordered by their first frame.
+    Raises:
+        InputError: if the skeleton has no legs.
+    """
     seen = _Seen.of(motion)
     kicks = _kicks(seen)
     low = _on_ground(seen)
@@ -69,14 +78,25 @@ def propose(
 
 
 def gaits_of(library: Library) -> tuple[tuple[str, float], ...]:
-    """The gaits of a library with the speeds at which its own annotations change; InputError where it has none."""
+    """List the gaits of a library with the speeds at which its own annotations change; InputError where it has none."""
     return tuple(zip([gait.word for gait in library.gaits], [0.0, *library.gait_thresholds.tolist()]))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class _Seen:
-    """What the rules look at. places (T, J, 3) m; speed (T,) m/s of the pelvis over the ground; path (T, 2) m/s its
-    velocity; facing (T,) radians; leg, floor: m; upright (T,): share of the trunk's direction that points up."""
+    """The signals that the rules use.
+
+    Attributes:
+        motion: T frames.
+        body: its joints by meaning.
+        places: (T, J, 3) metres, world.
+        world: (T, J, 4) world rotations.
+        speed: (T,) m/s of the pelvis over the ground.
+        path: (T, 2) m/s, its velocity.
+        facing: (T,) radians, unwrapped.
+        leg, floor: metres.
+        upright: (T,) share of the trunk's direction that points up.
+    """
 
     motion: Motion
     body: Humanoid
@@ -91,6 +111,7 @@ class _Seen:
 
     @classmethod
     def of(cls, motion: Motion) -> "_Seen":
+        """Compute the signals of a motion."""
         body = identify(motion.skeleton)
         places, world = forward_kinematics(motion)
         path = _velocity(places[:, body.hips, :2], motion.fps, _GAIT_SECONDS / 4.0)
@@ -110,14 +131,14 @@ class _Seen:
 
 
 def _velocity(places: np.ndarray, fps: float, seconds: float) -> np.ndarray:
-    """(T, n) m/s of places (T, n) m, smoothed over about so many seconds."""
+    """Compute the velocity (T, n) m/s of positions (T, n) m, smoothed over about `seconds`."""
     if len(places) < 2:
         return np.zeros_like(places)
     return np.gradient(gaussian_filter1d(places, max(seconds * fps, 0.5), axis=0, mode="nearest"), axis=0) * fps
 
 
 def _locomotion(seen: _Seen, gaits) -> list[Proposal]:
-    """Stretches of one gait and one direction."""
+    """Propose stretches of one gait and one direction."""
     fps, words = seen.motion.fps, [word for word, _ in gaits]
     limits = np.array([speed for _, speed in gaits][1:])
     middle = np.concatenate([[0.0], 0.5 * (limits[1:] + limits[:-1]), [limits[-1] + 1.0]]) if len(limits) else [0.0]
@@ -125,6 +146,7 @@ def _locomotion(seen: _Seen, gaits) -> list[Proposal]:
     off = quaternion.wrapped(arctan2(seen.path[:, 1], seen.path[:, 0]) - seen.facing)
     quarter = without_short_runs(np.round(off / (np.pi / 2.0)).astype(int) % 4, int(_SHORTEST * fps))
     way = np.where(np.array([words[g] == STANDING for g in gait]), -1, quarter)
+    # one number for gait and direction together: gait * 5, plus 0 standing still, 1 to 4 the quarter of travel
     kind = without_short_runs(gait * 5 + way + 1, int(_SHORTEST * fps))
     out = []
     for start, stop in equal_runs(kind):
@@ -138,7 +160,7 @@ def _locomotion(seen: _Seen, gaits) -> list[Proposal]:
 
 
 def _kicks(seen: _Seen) -> list[Proposal]:
-    """Feet that swing faster than a stride; of two within the same half second the faster."""
+    """Propose kicks: feet that swing faster than a stride; of two within half a second the faster."""
     fps, found = seen.motion.fps, []
     for side, limb in (("left", seen.body.left), ("right", seen.body.right)):
         toe = seen.places[:, limb.toe_or_foot]
@@ -159,6 +181,7 @@ def _kicks(seen: _Seen) -> list[Proposal]:
 
 
 def _kick(seen: _Seen, over: float, key: int, side: str, speed: float) -> Proposal:
+    """Build the proposal of a kick with its side, pace, height, surface and direction."""
     limb = getattr(seen.body, side)
     ankle, toe = seen.places[:, limb.foot], seen.places[:, limb.toe_or_foot]
     words = ["kick", side, "running" if seen.speed[key] >= _RUNNING else "standing"]
@@ -172,7 +195,7 @@ def _kick(seen: _Seen, over: float, key: int, side: str, speed: float) -> Propos
 
 
 def _inner_share(seen: _Seen, side: str, key: int) -> float:
-    """Cosine between where the foot goes and where its inner side looks: across the plane of shin and foot."""
+    """Compute the cosine between the foot's velocity and its inner side: across the plane of shin and foot."""
     ankle, tip = part_surfaces(seen.motion.skeleton, "foot", (side,))[0].line(seen.places, seen.world)
     shin = ankle[key] - seen.places[key, getattr(seen.body, side).lower_leg]
     inner = np.cross(tip[key] - ankle[key], shin) * (1.0 if side == "right" else -1.0)
@@ -181,14 +204,14 @@ def _inner_share(seen: _Seen, side: str, key: int) -> float:
 
 
 def _kicked_way(seen: _Seen, toe: np.ndarray, key: int) -> int:
-    """Index into DIRECTIONS: where the foot swings, against the body's facing."""
+    """Find the index into DIRECTIONS of the foot's swing relative to the heading."""
     way = _velocity(toe, seen.motion.fps, _FOOT_SECONDS)[key]
     off = quaternion.wrapped(arctan2(way[1], way[0]) - seen.facing[key])
     return int(np.round(off / (np.pi / 2.0))) % 4
 
 
 def _jumps(seen: _Seen, kicks: list[Proposal]) -> list[Proposal]:
-    """Flights longer than a run's, and higher; those of kicks are kicks. With a head that strikes: headers."""
+    """Propose jumps: flights longer and higher than a run's, except in kicks. With a head that strikes: headers."""
     fps, hips = seen.motion.fps, seen.places[:, seen.body.hips, 2]
     feet = seen.places[:, [seen.body.left.toe_or_foot, seen.body.right.toe_or_foot], 2]
     rest = np.percentile(feet, 10, axis=0)
@@ -211,7 +234,7 @@ def _jumps(seen: _Seen, kicks: list[Proposal]) -> list[Proposal]:
 
 
 def _nod(seen: _Seen, key: int) -> float:
-    """m/s of the head against the chest, forward, at its highest within a quarter of a second of `key`."""
+    """Measure the highest forward speed (m/s) of the head against the chest within a quarter of a second of `key`."""
     if seen.body.head is None:
         return 0.0
     way = seen.places[:, seen.body.head] - seen.places[:, seen.body.chest]
@@ -222,7 +245,7 @@ def _nod(seen: _Seen, key: int) -> float:
 
 
 def _turns(seen: _Seen) -> list[Proposal]:
-    """Stretches in which the body turns by more than _TURN without travelling fast."""
+    """Propose stretches in which the body turns by more than _TURN without travelling fast."""
     rate = _velocity(seen.facing[:, None], seen.motion.fps, 0.1)[:, 0]
     out = []
     for side, sign in (("left", 1.0), ("right", -1.0)):
@@ -237,7 +260,7 @@ def _turns(seen: _Seen) -> list[Proposal]:
 
 
 def _on_ground(seen: _Seen) -> list[Proposal]:
-    """Lying, and getting up from it."""
+    """Propose lying on the ground, and getting up from it."""
     height = seen.places[:, seen.body.hips, 2] - seen.floor
     low, up = height < _LYING * seen.leg, height > _UP * seen.leg
     out = []
@@ -253,7 +276,7 @@ def _on_ground(seen: _Seen) -> list[Proposal]:
 
 
 def _belly_down(seen: _Seen, start: int, stop: int) -> bool:
-    """Whether the body lies on its front: across the hips times up the spine looks down."""
+    """Whether the body lies on its front: across the hips x up the spine points down."""
     at = slice(start, stop)
     body, places = seen.body, seen.places
     across = places[at, body.left.upper_leg] - places[at, body.right.upper_leg]

@@ -1,16 +1,16 @@
-"""Recordings mended on entry: single-frame pops, a floor that drifts or tilts, and feet that slide while they stand.
+"""Repairs recordings on entry: single-frame pops, a floor that drifts or tilts, and feet that slide while in contact.
 
 Inertial suits dead-reckon the pelvis, so their travel and their floor drift and planted feet slide (0.35 to 0.7 m/s in
 real data); optical recordings have pops where a marker was swapped and a floor that is centimetres off. A library that
-is cut and joined from such clips would carry all of it into every result. What is done is told, one line per kind.
+is cut and joined from such clips would carry all of it into every result. Repairs are reported, one line per kind.
 
-The travel is mended before the feet: wherever a foot stands, the *pelvis* is moved with the opposite of its slide,
-smoothly, because there the suit's dead reckoning is wrong, not the leg; only what is left is taken out by bending the
-legs. Feet keep their heights meanwhile: pressed onto one plane, the runs of four libraries got 1.5 to 1.7 times the
+The travel is corrected before the feet: wherever a foot is in contact, the *pelvis* is moved smoothly by the opposite
+of its slide, because there the suit's dead reckoning is wrong, not the leg; only the remainder is removed by bending
+the legs. Feet keep their heights meanwhile: pressed onto one plane, the runs of four libraries got 1.5 to 1.7 times the
 jerk (95th percentile of a clip, median), with their own heights 1.0 to 1.1 times, and they slide less.
 
-Nobody's foot stands dead still: the faster the run, the faster its ball rolls and creeps. A clip slides where it does
-so by more than recordings of its speed from good volumes.
+No foot in contact is completely still: the faster the run, the faster its ball rolls and creeps. A clip counts as
+sliding where it slides by more than recordings of its speed from good capture volumes.
 """
 
 from __future__ import annotations
@@ -33,26 +33,31 @@ from ..motion.track import zero_phase_hann
 _POP = np.radians(12.0)
 _POP_SHARE = 4.0
 _POP_SECONDS = 0.04  # longer than a pop
-# balls of feet that slide faster than sqrt(a^2 + (b v)^2) in the middle of stances (m/s, mean over a clip that goes at
-# v): optical recordings have 0.01 to 0.1 where they stand or walk and up to 0.067 v in runs, suits 0.12 to 0.25 at any
-# speed
+# limit of the slide of the balls of the feet in the middle of stances, sqrt(a^2 + (b v)^2) (m/s, mean over a clip at
+# mean speed v): optical recordings have 0.01 to 0.1 standing or walking and up to 0.067 v in runs, suits 0.12 to 0.25
+# at any speed
 _SLIDES, _SLIDES_SHARE = 0.13, 0.065
 # stiffness of the floor's drift and of the corrected travel: about the seconds over which they can change
 _LOW_SECONDS, _DRIFT = 1.5, 0.13
 _FLOOR_SECONDS, _TRAVEL_SECONDS = 1.5, 0.2  # how slowly the floor's height and the sliding may change
-_FLOOR_MOST = 0.02  # metres of drift that are left alone: no floor is that even, and soles lie a little differently
-_KEEP_SPEED = 0.005  # weight of no change of speed against a foot that stands
+_FLOOR_MOST = 0.02  # metres of drift that are ignored: floors are uneven, and soles lie a little differently
+_KEEP_SPEED = 0.005  # weight of an unchanged speed against a foot in contact
 _SINKS = 0.10  # metres that a suit's pelvis may be too high above its feet
-_BALL = 0.7  # of the way from ankle to the foot's tip
+_BALL = 0.7  # share of the distance from ankle to the foot's tip
 
 
 @dataclass(frozen=True, kw_only=True)
 class Repaired:
-    """A mended clip and what was done.
+    """A repaired clip and what was changed.
 
-    standing (T, 2, 2): left and right, heel and toe, on the ground. drift: metres between the lowest and the highest
-    floor. travel: metres by which the last frame was moved against the first. slide: m/s before and after, mean over
-    standing heels and toes. slid: whether it slid so much that way and feet were mended."""
+    Attributes:
+        motion: the repaired motion.
+        heel_toe_contacts: (T, 2, 2) bool, left and right, heel and toe, on the ground.
+        drift: metres between the lowest and the highest floor.
+        travel: metres by which the last frame was moved relative to the first.
+        slide: m/s before and after, mean over heels and toes in contact.
+        was_sliding: whether the clip was sliding, so that travel and feet were corrected.
+    """
 
     motion: Motion
     standing: np.ndarray
@@ -64,8 +69,13 @@ class Repaired:
 
 @dataclass(frozen=True)
 class Mended:
-    """What mending one clip found and left: pops, rotations replaced; drift, metres between the lowest and the highest
-    floor; slid and slides, m/s of standing heels and toes before and after."""
+    """Figures of one clip's repair.
+
+    Attributes:
+        pops: rotations replaced.
+        drift: metres between the lowest and the highest floor.
+        slid, slides: m/s of heels and toes in contact, before and after.
+    """
 
     pops: int
     drift: float
@@ -74,10 +84,16 @@ class Mended:
 
 
 def without_pops(motion: Motion) -> tuple[Motion, int]:
-    """The motion without rotations that jump for one or two frames and return, and the number of rotations replaced.
+    """Remove rotations that jump for one or two frames and return.
 
     A joint pops where it is more than 12 degrees off the slerp of the frames around the gap, and more than four times
-    as far as these are apart from each other or from their own outer neighbours (a fast swing moves on, a pop returns).
+    as
+    far as these are apart from each other or from their own outer neighbours (a fast swing moves on, a pop returns).
+
+    Args:
+        motion: T frames.
+    Returns:
+        The motion, and the number of rotations replaced.
     """
     rotations, count = np.array(motion.rotations), 0
     for width in range(1, 1 + min(2, int(_POP_SECONDS * motion.fps))):
@@ -91,14 +107,21 @@ def without_pops(motion: Motion) -> tuple[Motion, int]:
 
 
 def without_drift(motion: Motion) -> tuple[Motion, float]:
-    """The motion on a floor that neither rises nor sinks by more than _DRIFT metres and by how much it did.
+    """Remove a floor drift of more than _DRIFT metres.
 
     The floor is the lowest joint within _LOW_SECONDS (longer than a flight), smoothed. An inertial suit's floor can
-    rise by half a metre in five seconds, and `_levelled` knows only feet that are seen to stand."""
+    rise by
+    half a metre in five seconds, and `_level_floor` knows only feet detected as in contact.
+
+    Args:
+        motion: T frames.
+    Returns:
+        The motion, and the metres between lowest and highest floor, 0 where nothing was changed.
+    """
     low = forward_kinematics(motion)[0][..., 2].min(axis=1)
     width = max(1, int(round(_LOW_SECONDS * motion.fps)))
     floor = np.zeros((len(low), 1))
-    for _ in range(3):  # on a slope the lowest within a window lies at its end: what is left is smaller each time
+    for _ in range(3):  # on a slope the lowest point of a window lies at its end: the remainder is smaller each time
         floor += zero_phase_hann(minimum_filter1d(low[:, None] - floor, width, axis=0), motion.fps, _LOW_SECONDS)
     drift = float(np.ptp(floor))
     if drift < _DRIFT:
@@ -107,11 +130,12 @@ def without_drift(motion: Motion) -> tuple[Motion, float]:
 
 
 def _popped(rotations: np.ndarray, width: int) -> np.ndarray:
-    """(T, J) bool: first frames of runs of `width` frames that jump and return; rotations (T, J, 4)."""
+    """Detect first frames of runs of `width` frames that jump and return: (T, J) bool; rotations (T, J, 4)."""
     out = np.zeros(rotations.shape[:2], bool)
     count = len(rotations) - width - 3
     if count < 1:
         return out
+    # with the run starting at frame f: outer f - 2, before f - 1, after f + width, beyond f + width + 1
     outer, before = rotations[:count], rotations[1 : count + 1]
     after, beyond = rotations[width + 2 : width + 2 + count], rotations[width + 3 : width + 3 + count]
     still = np.max([_angle(outer, before), _angle(before, after), _angle(after, beyond)], axis=0)
@@ -124,16 +148,24 @@ def _popped(rotations: np.ndarray, width: int) -> np.ndarray:
 
 
 def _angle(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """The angle (...,) in radians between rotations (..., 4)."""
+    """Measure the angles (...,) in radians between rotations (..., 4)."""
     return 2.0 * np.arccos(np.clip(np.abs(np.sum(a * b, axis=-1)), 0.0, 1.0))
 
 
 def grounded(motion: Motion, standing: np.ndarray | None = None, plants: bool = False) -> Repaired:
-    """The motion on a level floor at height 0, where its soles stand (`contacts.ground_height`), feet standing still.
+    """Repair floor and feet: a level floor at height 0 under the soles (`contacts.measure_ground_height`), and planted
+    feet.
 
-    standing (T, 2, 2) bool: left and right, heel and toe; found where it is not given. Feet are held, and the way is
-    corrected, in clips that slide (`slides`); with `plants` feet are held in any case (a body that got other feet).
-    Bones and rate stay."""
+    Bones and rate stay.
+
+    Args:
+        motion: T frames.
+        heel_toe_contacts: (T, 2, 2) bool, left and right, heel and toe in contact; None detects it.
+        always_plant: plant the feet also in clips that do not slide (a body that got other feet). Clips that slide
+            (`is_sliding`) get planted feet and a corrected path anyway.
+    Returns:
+        The repaired clip.
+    """
     standing = contacts.points(motion) if standing is None else standing
     motion, drift = _levelled(motion, standing)
     before, travel = slide(motion, standing), 0.0
@@ -148,21 +180,23 @@ def grounded(motion: Motion, standing: np.ndarray | None = None, plants: bool = 
 
 
 def slides(motion: Motion, standing: np.ndarray) -> bool:
-    """Whether feet that stand, by `standing` (T, 2, 2), slide faster than in good recordings of that speed."""
+    """Whether feet in contact, by `heel_toe_contacts` (T, 2, 2), slide faster than in good recordings of that speed."""
     way = np.linalg.norm(np.diff(motion.root_positions[:, :2], axis=0), axis=1)
     speed = way.mean() * motion.fps if len(way) else 0.0
     return _ball_slide(motion, standing) > np.hypot(_SLIDES, _SLIDES_SHARE * speed)
 
 
 def held(motion: Motion, standing: np.ndarray) -> Motion:
-    """The motion with its feet held where `standing` (T, 2, 2) says that heels and toes stand, at their own heights."""
+    """Plant the feet where `heel_toe_contacts` (T, 2, 2) marks heels and toes in contact, at their own heights."""
     planted = plant(motion.skeleton, motion.root_positions, motion.rotations, standing=standing, fps=motion.fps,
                     sinks=_SINKS, levels=False)
     return replace(motion, root_positions=planted.root, rotations=planted.rotations)
 
 
 def slide(motion: Motion, standing: np.ndarray) -> float:
-    """Mean horizontal speed in m/s of heels and toes while they stand, `standing` (T, 2, 2); 0 where none does."""
+    """Measure the mean horizontal speed in m/s of heels and toes in contact, `heel_toe_contacts` (T, 2, 2); 0 without
+    contact.
+    """
     body = identify(motion.skeleton)
     places, _ = forward_kinematics(motion)
     points = np.stack([places[:, [limb.foot, limb.toe_or_foot], :2] for limb in (body.left, body.right)], axis=1)
@@ -171,7 +205,7 @@ def slide(motion: Motion, standing: np.ndarray) -> float:
 
 
 def _ball_slide(motion: Motion, standing: np.ndarray) -> float:
-    """Mean speed in m/s of the balls of the feet in the middle of their stances; 0 without stances."""
+    """Measure the mean speed in m/s of the balls of the feet in the middle of their stances; 0 without stances."""
     speed = np.linalg.norm(np.diff(_balls(motion)[..., :2], axis=0), axis=-1) * motion.fps
     weight = _inner(standing[..., 1])
     firm = np.minimum(weight[1:], weight[:-1])
@@ -179,9 +213,12 @@ def _ball_slide(motion: Motion, standing: np.ndarray) -> float:
 
 
 def _balls(motion: Motion) -> np.ndarray:
-    """Where the balls of both feet are, (T, 2, 3) metres: toe joints, else on the way from ankle to the foot's tip.
+    """Compute the positions of the balls of both feet, (T, 2, 3) metres: toe joints, else between ankle and the foot's
+    tip.
 
-    They stand from the foot's landing to its push off; a heel rises meanwhile and says little of floor and travel."""
+    They are in contact from the foot's landing to its push off; a heel rises meanwhile and shows little of floor and
+    travel.
+    """
     skeleton, body = motion.skeleton, identify(motion.skeleton)
     places, world = forward_kinematics(motion)
     balls = []
@@ -194,7 +231,7 @@ def _balls(motion: Motion) -> np.ndarray:
 
 
 def _levelled(motion: Motion, standing: np.ndarray) -> tuple[Motion, float]:
-    """The motion without the slow rise and fall of the floor under its standing feet, and its range in metres."""
+    """Level the slow rise and fall of the floor under feet in contact; returns the motion and its range in metres."""
     weight = _inner(standing[..., 1])
     firm = np.flatnonzero(weight.any(axis=1))
     if len(firm) < 2:
@@ -210,10 +247,13 @@ def _levelled(motion: Motion, standing: np.ndarray) -> tuple[Motion, float]:
 
 
 def _travelled(motion: Motion, standing: np.ndarray) -> tuple[Motion, float]:
-    """The motion whose pelvis goes where its standing feet say, and by how far its way is longer or shorter, metres.
+    """Correct the pelvis's travel so that feet in contact stay; returns the motion and the last frame's shift in
+    metres.
 
-    Only the middle of a stance tells: a foot that lands or leaves moves. On recordings without sliding the way comes
-    out as it was, to half a per cent."""
+    Only the middle of a stance counts: a foot that lands or leaves moves. On recordings without sliding the path comes
+    out
+    unchanged, to half a per cent.
+    """
     velocity = np.diff(_balls(motion)[..., :2], axis=0) * motion.fps
     weight = _inner(standing[..., 1])
     firm = np.minimum(weight[1:], weight[:-1])
@@ -224,7 +264,9 @@ def _travelled(motion: Motion, standing: np.ndarray) -> tuple[Motion, float]:
 
 
 def _inner(stands: np.ndarray) -> np.ndarray:
-    """Weights (T, 2), 1 in the middle third of every stance and 0 in its outer sixths, from `stands` (T, 2) bool."""
+    """Weight stances (T, 2): 1 in the middle third of every stance and 0 in its outer sixths, from `contacts` (T, 2)
+    bool.
+    """
     weight = np.zeros(stands.shape)
     for side, one in enumerate(stands.T):
         for start, stop in runs(one):
@@ -234,10 +276,17 @@ def _inner(stands: np.ndarray) -> np.ndarray:
 
 
 def _smooth(pushed: np.ndarray, weight: np.ndarray, seconds: float, fps: float, pull: float) -> np.ndarray:
-    """The curve f (T,) of least sum w (f - v)^2 + pull f^2 + stiffness |f''|^2, from pushed = w v (T, P), weights (T,
-    P).
+    """Fit the curve f (T,) of least sum w (f - v)^2 + pull f^2 + stiffness |f''|^2.
 
-    seconds: how slowly it can change; the stiffness is its fourth power."""
+    Args:
+        weighted_values: (T, P) w v.
+        weight: (T, P) w.
+        seconds: how slowly f can change; the stiffness is its fourth power.
+        fps: frames per second.
+        pull: weight of f itself.
+    Returns:
+        (T,).
+    """
     squares = BandedLeastSquares(len(pushed), reach=2)
     squares.add_value(weight.sum(axis=1) + pull)
     squares.add_difference(2, (seconds * fps) ** 4)
@@ -246,19 +295,21 @@ def _smooth(pushed: np.ndarray, weight: np.ndarray, seconds: float, fps: float, 
 
 
 def describe_repairs(repaired: Sequence[tuple[Repaired, int]]) -> list[str]:
-    """What was done to a library's clips, one line per kind. repaired: each clip's repair and its number of pops."""
+    """Describe the repairs of a library's clips, one line per kind. repaired: each clip's repair and its number of
+    pops.
+    """
     lines = []
     pops = [count for _, count in repaired if count]
     if pops:
-        lines.append(f"{sum(pops)} single-frame jumps of joints taken out of {len(pops)} clips")
+        lines.append(f"{sum(pops)} single-frame jumps of joints removed from {len(pops)} clips")
     drifts = [one.drift for one, _ in repaired if one.drift > 0.0]
     if drifts:
-        lines.append(f"floor levelled in {len(drifts)} clips, by {np.median(drifts) * 100:.0f} cm in the median")
+        lines.append(f"floor levelled in {len(drifts)} clips, by {np.median(drifts) * 100:.0f} cm (median)")
     slid = [one for one, _ in repaired if one.slid]
     if slid:
         before, after = (np.mean([one.slide[i] for one in slid]) * 100 for i in (0, 1))
         lines.append(
-            f"standing feet held in {len(slid)} clips: they slid {before:.0f} cm/s and now {after:.0f} cm/s "
-            f"in the mean; the way corrected by {np.median([one.travel for one in slid]):.2f} m in the median"
+            f"feet planted in {len(slid)} clips: mean slide {before:.0f} cm/s before, {after:.0f} cm/s after; "
+            f"path corrected by {np.median([one.travel for one in slid]):.2f} m (median)"
         )
     return lines

@@ -1,9 +1,9 @@
-"""Which recordings lie below a folder, whether they can be read, and which words were written about them.
+"""The recordings below a folder, whether they can be read, and their annotations.
 
-Recordings in forms that only Blender reads (FBX, glTF, USD) are converted once to BVH and kept beside the cache:
+Recordings in formats that only Blender reads (FBX, glTF, USD) are converted once to BVH and stored beside the cache:
 `CACHE/converted/` mirrors the library's folders, `kicks/low.fbx` becomes `CACHE/converted/kicks/low.fbx.bvh`. A table
-of each source's size and time says whether a conversion still stands for it; one that does not is never read. Blender
-converts (the extension's Build Library does it first); the command line reads what has been converted.
+of each source's size and time shows whether a conversion is current; one that is not is never read. Blender converts
+(the extension's Build Library does it first); the command line reads what has been converted.
 """
 
 from __future__ import annotations
@@ -24,22 +24,29 @@ _TABLE = "converted.json"
 
 
 def find_clips(folder: str | Path) -> list[Path]:
-    """All BVH files below `folder`, sorted by their path below it; symbolic links are followed, loops are not.
+    """Find all BVH files below `folder`, sorted by their path below it; symbolic links are followed, loops are not.
 
-    Raises InputError where the folder is missing, holds no BVH file, or one whose name cannot be written into a table.
+    Args:
+        folder: the library's folder.
+    Returns:
+        The files.
+    Raises:
+        InputError: if the folder is missing, holds no BVH file, or one whose name cannot be written into a table.
     """
     found = find_recordings(folder, (".bvh",))
     if not found:
-        raise InputError(folder, "no BVH file below it", "at least one .bvh", "copy or link recordings into it")
+        raise InputError(folder, "no BVH file in the folder", "at least one .bvh", "copy recordings into it")
     return found
 
 
 def find_recordings(folder: str | Path, endings: tuple[str, ...] = (".bvh", *FOREIGN)) -> list[Path]:
-    """All files below `folder` with one of these endings, as `find_clips`, converted or not, or none."""
+    """Find all files below `folder` with one of these endings, as `find_clips`, converted or not; the list may be
+    empty.
+    """
     folder = Path(folder)
     if not folder.is_dir():
-        what = "no folder but a file" if folder.is_file() else "no such folder"
-        raise InputError(folder, what, "a folder with BVH files", "give the folder of your library")
+        what = "a file, not a folder" if folder.is_file() else "no such folder"
+        raise InputError(folder, what, "a folder with BVH files", "choose the folder of your library")
     found: list[Path] = []
     seen: set[tuple[int, int]] = set()
     for here, folders, files in os.walk(folder, followlinks=True):
@@ -52,36 +59,49 @@ def find_recordings(folder: str | Path, endings: tuple[str, ...] = (".bvh", *FOR
         found += [Path(here) / name for name in files if name.lower().endswith(endings)]
     for path in found:
         if str(path.relative_to(folder)).encode("utf-8", "replace").decode() != str(path.relative_to(folder)):
-            raise InputError(ascii(str(path)), "a name that is not UTF-8", "one that tables can hold", "rename it")
+            raise InputError(ascii(str(path)), "a name that is not UTF-8", "a name in UTF-8", "rename the file")
     return sorted(found, key=lambda path: path.relative_to(folder).as_posix())
 
 
 def own_recordings(folder: str | Path) -> list[Path]:
-    """The recordings that are a library's clips, as `find_recordings`: of `kick.bvh` beside `kick.fbx` the former."""
+    """List the recordings that are a library's clips, as `find_recordings`; of `kick.bvh` and `kick.fbx` only the
+    former.
+    """
     found = find_recordings(folder)
     plain = {path.with_suffix("") for path in found if not is_foreign(path)}
     return [path for path in found if not is_foreign(path) or path.with_suffix("") not in plain]
 
 
 def readable_clips(folder: str | Path, place: str | Path) -> tuple[list[Path], Conversions, list[str]]:
-    """The recordings of a library that can be read now, their conversions, and a line about those that wait for theirs.
+    """Find the recordings of a library that can be read now.
 
-    place: the library's cache. InputError where there is none that can be read."""
+    Args:
+        folder: the library's folder.
+        place: its cache folder.
+    Returns:
+        The recordings, their conversions, and a line about recordings that are not converted yet.
+    Raises:
+        InputError: if none can be read.
+    """
     found, conversions = own_recordings(folder), Conversions(folder, place)
     waiting = conversions.waiting(found)
     late = set(waiting)
     ready = [path for path in found if path not in late]
     if not ready and waiting:
-        what = f"no BVH file below it, but {len(waiting)} that only Blender reads ({waiting[0].name})"
-        raise InputError(folder, what, "at least one .bvh", "press Build Library in Blender, which converts them")
+        what = f"no BVH file in the folder, but {len(waiting)} that only Blender reads ({waiting[0].name})"
+        raise InputError(folder, what, "at least one .bvh", "press Build Library in Blender")
     if not ready:
-        raise InputError(folder, "no BVH file below it", "at least one .bvh", "copy or link recordings into it")
+        raise InputError(folder, "no BVH file in the folder", "at least one .bvh", "copy recordings into it")
     return ready, conversions, describe_waiting(waiting)
 
 
 def find_tables(folder: Path, clips: list[Path]) -> list[Path]:
-    """The `annotations.csv` files that may speak about `clips`: from each clip's folder up to the library's top, and
-    the one in the folder above that, since a library is often one folder of a larger collection."""
+    """Find the `annotations.csv` files that may apply to `clips`.
+
+    From each clip's folder up to the library's top, and in the folder above that, since a library is often one folder
+    of a
+    larger collection.
+    """
     folder = Path(folder)
     homes = {clip.parent for clip in clips}
     places = {place for home in homes for place in (home, *home.parents) if place == folder or folder in place.parents}
@@ -90,20 +110,27 @@ def find_tables(folder: Path, clips: list[Path]) -> list[Path]:
 
 
 def _absolute(path: Path) -> Path:
-    """The whole path without `..`: where the library is given as `..`, the folder above it is not its last part."""
+    """Return the absolute path without `..`: with the library given as `..`, the folder above it is not its last part.
+    """
     return Path(os.path.normpath(path.absolute()))
 
 
 class Annotations:
-    """What was written about the clips of a library, found as ../shared/contract.md describes "Library annotations"."""
+    """The annotations of a library's clips, found as ../shared/contract.md describes under "Library annotations"."""
 
     def __init__(self, folder: Path, clips: list[Path], but: Callable[[Mapping], bool] | None = None):
-        """Reads every table that may apply, `but` rows as `read_annotation_csv`; InputError where one is broken."""
+        """Read every table that may apply, without the rows that `skips` selects (`read_annotation_csv`); InputError
+        for
+        a broken
+        one.
+        """
         tables = find_tables(folder, clips)
         self.tables = {_absolute(table.parent): read_annotation_csv(table, but) for table in tables}
 
     def of(self, clip: Path, fps: float) -> tuple[ClipAnnotation, ...]:
-        """Rows of one clip: NAME.txt beside it, else the nearest table from its folder upward that has rows for it."""
+        """Read the rows of one clip: NAME.txt beside it, else the nearest table from its folder upward that has rows
+        for it.
+        """
         beside = clip.with_suffix(".txt")
         if beside.is_file():
             return tuple(read_clip_annotations(beside, fps))
@@ -116,7 +143,7 @@ class Annotations:
         return ()
 
     def sources(self, clips: list[Path]) -> list[Path]:
-        """Every file that was or would be read for words: part of what the cache depends on."""
+        """List every file that was or would be read for annotations; the cache depends on them."""
         texts = [clip.with_suffix(".txt") for clip in clips]
         return [path for path in texts if path.is_file()] + [place / TABLE_NAME for place in sorted(self.tables)]
 
@@ -127,12 +154,15 @@ def is_foreign(path: Path) -> bool:
 
 
 class Conversions:
-    """Which recordings below a library's folder have been converted, and where that is kept.
+    """The conversions of the recordings below a library's folder.
 
-    folder: the library's; place: its cache (`cache.place`)."""
+    Attributes:
+        folder: the library's.
+        converted_folder: where conversions are stored.
+    """
 
     def __init__(self, folder: str | Path, place: str | Path):
-        """Reads the table; a damaged one counts as empty."""
+        """Read the table of conversions; a damaged one counts as empty. place: the library's cache folder."""
         self.folder, self.room = Path(folder), Path(place) / "converted"
         try:
             table = json.loads((self.room / _TABLE).read_text("utf-8"))
@@ -141,21 +171,25 @@ class Conversions:
             self._stamps = {}
 
     def readable(self, path: Path) -> Path:
-        """The BVH file to read for a recording: itself, or its conversion."""
+        """Return the BVH file to read for a recording: itself, or its conversion."""
         return self.room / (self._name(path) + ".bvh") if is_foreign(path) else path
 
     def stands(self, path: Path) -> bool:
-        """Whether a recording can be read as it is now."""
+        """Whether a recording can be read in its current state."""
         if not is_foreign(path):
             return True
         return self._stamps.get(self._name(path)) == stamp_of(path) and self.readable(path).is_file()
 
     def waiting(self, paths: Sequence[Path]) -> list[Path]:
-        """Those of `paths` that are still to be converted."""
+        """List the recordings among `paths` that need a conversion."""
         return [path for path in paths if not self.stands(path)]
 
     def prepare(self, path: Path) -> Path:
-        """Makes the folder for a conversion and returns the file to write; InputError where that cannot be done."""
+        """Create the folder for a conversion and return the file to write.
+
+        Raises:
+            InputError: if the folder cannot be written.
+        """
         target = self.readable(path)
         try:
             target.parent.mkdir(parents=True, exist_ok=True)
@@ -165,7 +199,7 @@ class Conversions:
         return target
 
     def keep(self, path: Path, stamp: list[int]) -> None:
-        """Notes that a recording has been converted as it was when its `stamp` was taken."""
+        """Record that a recording has been converted in the state of its `stamp`."""
         self._stamps[self._name(path)] = stamp
         atomic_write(self.room / _TABLE, json.dumps(self._stamps, indent=0, sort_keys=True))
 
@@ -174,16 +208,16 @@ class Conversions:
 
 
 def describe_waiting(waiting: Sequence[Path]) -> list[str]:
-    """One line about recordings that are not converted yet; none where there are none."""
+    """Describe recordings that are not converted yet, in one line; no line where there are none."""
     if not waiting:
         return []
     count, kinds = len(waiting), ", ".join(sorted({path.suffix.lower() for path in waiting}))
-    return [f"{count} {'clip' if count == 1 else 'clips'} left out ({kinds}: {waiting[0].name}): not converted; "
-            "Build Library in Blender converts them"]
+    return [f"{count} {'clip' if count == 1 else 'clips'} skipped ({kinds}: {waiting[0].name}): not converted; "
+            "press Build Library in Blender to convert them"]
 
 
 def stamp_of(path: Path) -> list[int]:
-    """Size and time of change of a file; zeros where it cannot be seen."""
+    """Read size and modification time of a file; zeros where it cannot be read."""
     try:
         status = os.stat(path)
     except OSError:

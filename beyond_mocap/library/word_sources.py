@@ -1,8 +1,8 @@
-"""Labels that no person gave: proposals, and where a clip's words say so, with each row's source and how sure it was.
+"""Labels that no person wrote: proposals, and how a clip's annotations record each row's source and confidence.
 
-In a text it stands behind a line as a comment, `156f kick right low  # learned 0.93`, in a table in the columns
-`source` and `confidence`, where it has them. Only learning reads it; a row that a person has changed has none. A table
-of proposals says in a third column, `why`, what was seen: it is empty as soon as a person has accepted the row.
+In a text file they follow a line as a comment, `156f kick right low  # learned 0.93`; in a table they are in the
+columns `source` and `confidence`, where it has them. Only learning reads them; a row that a person has changed has
+none. A table of proposals has the reason in a third column, `why`, which is emptied when a person accepts the row.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ RULES, LEARNED = "rules", "learned"
 
 Found = dict[ClipAnnotation, tuple[str, float]]
 Sources = Mapping[ClipAnnotation, tuple[str, float]]
-"""A row -> what proposed it, and its confidence from 0 to 1."""
+"""A row -> its source (RULES or LEARNED) and its confidence from 0 to 1."""
 
 _COMMENT = re.compile(rf"#\s*({RULES}|{LEARNED})\s+([01](?:\.\d+)?)\s*$")
 COLUMNS = ("source", "confidence")
@@ -30,8 +30,14 @@ _ROW = ("start_frame", "end_frame", "key_frame", "labels")
 
 @dataclass(frozen=True)
 class Proposal:
-    """Words for a stretch of a recording, in its own frames; confidence: 0 to 1; why: what was seen, for a person;
-    source: RULES, or LEARNED from annotated clips."""
+    """Proposed labels for a stretch of a recording.
+
+    Attributes:
+        annotation: the row, in the recording's own frames.
+        confidence: 0 to 1.
+        why: the reason, for people.
+        source: RULES, or LEARNED from annotated clips.
+    """
 
     annotation: ClipAnnotation
     confidence: float
@@ -40,26 +46,34 @@ class Proposal:
 
 
 def comment(row: ClipAnnotation, sources: Sources) -> str:
-    """What is written behind the row's lines; empty where a person has said it."""
+    """Format the comment behind a row's lines; empty where a person wrote the row."""
     found = sources.get(row)
     return f"  # {found[0]} {found[1]:.2f}" if found else ""
 
 
 def cells(row: ClipAnnotation, sources: Sources) -> dict[str, str]:
-    """What stands in a table's COLUMNS."""
+    """Format a table's cells in COLUMNS."""
     source, confidence = sources.get(row, ("", 0.0))
     return {"source": source, "confidence": f"{confidence:.2f}" if source else ""}
 
 
 def is_open(row: Mapping) -> bool:
-    """Whether a table's row (column -> text) was proposed and nobody has accepted it yet."""
+    """Whether a table's row (column -> text) was proposed and not accepted yet."""
     return (row.get("source") or "").strip() in (RULES, LEARNED) and bool((row.get("why") or "").strip())
 
 
 def sources_in_text(path: Path, rows: tuple[ClipAnnotation, ...], fps: float) -> Found:
-    """The sources of rows that were read from a text file; of a row with two lines the key moment's counts.
+    """Read the sources of rows in a text file; of a row with two lines the key moment's counts.
 
-    fps: the clip's rate. InputError where the file cannot be read."""
+    Args:
+        path: the file.
+        rows: the rows that were read from it.
+        fps: the clip's rate.
+    Returns:
+        The sources by row.
+    Raises:
+        InputError: if the file cannot be read.
+    """
     said = {}
     for line in read_text(path).splitlines():
         found = _COMMENT.search(line)
@@ -74,7 +88,7 @@ def sources_in_text(path: Path, rows: tuple[ClipAnnotation, ...], fps: float) ->
 
 
 def sources_in_table(path: Path, name: str, rows: tuple[ClipAnnotation, ...]) -> Found:
-    """The sources of a clip's rows in a table that has the columns; `name` as its column `file` spells it."""
+    """Read the sources of a clip's rows in a table that has the columns; `name` as its column `file` spells it."""
     spelled: dict[tuple, ClipAnnotation] = {
         (str(row.start), str(row.end), "" if row.key is None else str(row.key), " ".join(row.words)): row
         for row in rows

@@ -1,1 +1,1 @@
-"""Optical markers become the motion of a skeleton (Fredriksson §3.4, §3.5, §5)."""
+"""Reconstruct the motion of a skeleton from optical markers (Fredriksson sections 3.4, 3.5 and 5)."""

@@ -1,9 +1,8 @@
-"""What no fitting can mend, told apart before it begins: mirrored markers, exchanged sides, somebody else's static,
-nobody there.
+"""Check a trial before the fit: mirrored markers, exchanged sides, the static of another person, empty recordings.
 
-Skin lets two markers of a segment come nearer and go apart by a centimetre, but their usual distance stays: in 21
-comparisons between recordings of different bodies a third to nine tenths of the distances within segments differed by
-more than 15 mm, between a static and a walk of the same body none, between a static and a sprint at most a fifth.
+Skin lets two markers of a segment come nearer and move apart by a centimetre, but their usual distance stays. In 21
+comparisons between recordings of different bodies, a third to nine tenths of the distances within segments differed by
+more than 15 mm; between a static and a walk of the same body none did, between a static and a sprint at most a fifth.
 """
 
 from __future__ import annotations
@@ -20,30 +19,41 @@ from .model.marker_set import UNLABELED
 from .model.model import MarkerModel
 from .trial import MarkerTrial, list_some
 
-_MIRRORED = -0.5
-_OFF = 0.012  # metres by which a distance may differ, beside half of what it does in the trial itself
-_OTHER_BODY, _SOME = 0.25, 0.1  # shares of distances that are off: another body's; markers that were put on anew
-_LACKING = 0.3  # of the trial's markers that a static may lack
-_FEW = 4  # distances that are too few to tell
-_EMPTY_SECONDS, _EMPTY_SHARE = 0.1, 0.2  # from when on a stretch with so few markers is told
+_MIRRORED = -0.5  # handedness below which a body is mirrored (-1: surely, +1: surely not)
+_OFF = 0.012  # metres by which a distance may differ, in addition to half of its range in the trial itself
+# Shares of differing distances from which on the markers are those of another body, or some markers were moved.
+_OTHER_BODY, _SOME = 0.25, 0.1
+_LACKING = 0.3  # share of the trial's markers that a static may lack
+_FEW = 4  # with fewer distances no comparison is made
+# A stretch of at least this many seconds with fewer than this share of the markers is reported.
+_EMPTY_SECONDS, _EMPTY_SHARE = 0.1, 0.2
 
 
 def check(trial: MarkerTrial, static: MarkerTrial | None, clusters: Mapping[str, Sequence[str]],
           model: MarkerModel | None = None) -> tuple[str, ...]:
-    """Lines on what is odd about a trial and its static, or model; InputError where no skeleton can come of it.
+    """Check a trial and its static or model.
 
-    clusters: segment -> labels. static, model: either may be missing. Raises where markers are mirrored or left and
-    right exchanged, where static or model are of another body, and where no marker is seen at all."""
+    Args:
+        trial: the recorded markers.
+        static: a static trial, or None.
+        clusters: segment -> labels of its markers.
+        model: a model, or None; not used with a static.
+    Returns:
+        Messages on what is unusual.
+    Raises:
+        InputError: if markers are mirrored or left and right exchanged, if static or model are of another body, or if
+            no marker is visible at all.
+    """
     labels = [label for group in clusters.values() for label in group if label in trial.labels]
     body = trial.only(labels)
     if not body.seen.any():
-        raise InputError(trial.name, "none of its body's markers is seen", "a recorded body", "choose another file")
+        raise InputError(trial.name, "none of the body's markers is visible", "a recorded body", "choose another file")
     _check_sides(body, static, clusters)
     lines = list(_empty(body))
     if static is not None:
         if not static.seen.any():
-            raise InputError(static.name, "no marker is seen", "a static trial with the trial's markers",
-                             "choose another, or go without")  # fmt: skip
+            raise InputError(static.name, "no marker is visible", "a static trial with the trial's markers",
+                             "choose another static trial, or use none")  # fmt: skip
         lines += _complete(body, static)
         lines += _same_body(body, _Usual(static), clusters, static.name, "the static")
     elif model is not None:
@@ -52,7 +62,7 @@ def check(trial: MarkerTrial, static: MarkerTrial | None, clusters: Mapping[str,
 
 
 def _complete(trial: MarkerTrial, static: MarkerTrial) -> list[str]:
-    """A line on the trial's markers that the static lacks; InputError where these are most."""
+    """Report markers of the trial that the static lacks; raise InputError if more than 30 % are missing."""
     lacking = [label for label in trial.labels if label not in static.labels]
     if not lacking:
         return []
@@ -61,25 +71,34 @@ def _complete(trial: MarkerTrial, static: MarkerTrial) -> list[str]:
         raise InputError(
             static.name,
             f"has {len(trial.labels) - len(lacking)} of the trial's {len(trial.labels)} markers, not {told}",
-            "a static trial with the trial's markers", "choose another, or go without",
+            "a static trial with the trial's markers", "choose another static trial, or use none",
         )
-    return [f"{static.name} lacks {told}: where these lie is told by the motion"]
+    return [f"{static.name} lacks {told}: their places are estimated from the motion"]
 
 
 def unused(trial: MarkerTrial, clusters: Mapping[str, Sequence[str]], others: Sequence[str] = ()) -> list[str]:
-    """A line on the named markers that lie on no segment; others: those known to be on no body."""
+    """Report labeled markers that lie on no segment.
+
+    Args:
+        trial: the recorded markers.
+        clusters: segment -> labels of its markers.
+        others: labels that are known to be on no body.
+    Returns:
+        One message, or none.
+    """
     known = {label for group in clusters.values() for label in group} | set(others)
     left = [label for label in trial.labels if label not in known and not UNLABELED.match(label)]
-    return [f"{len(left)} markers of no segment are not used: {list_some(left)}"] if left else []
+    return [f"{len(left)} markers belong to no segment and are not used: {list_some(left)}"] if left else []
 
 
 def _check_sides(trial: MarkerTrial, static: MarkerTrial | None, clusters) -> None:
+    """Raise InputError if trial or static are mirrored, and say what is exchanged."""
     both = [one for one in (trial, static) if one is not None]
     mirrored = [handedness(one.labels, one.positions) < _MIRRORED for one in both]
     if not any(mirrored):
         return
     name = both[mirrored.index(True)].name
-    found, step = "left and right are exchanged", "exchange the labels, or the coordinates' left and right"
+    found, step = "left and right are exchanged", "exchange the left and right labels, or mirror the coordinates"
     if len(both) == 2 and not all(mirrored):
         good, bad = (static, trial) if mirrored[0] else (trial, static)
         if _crossed(bad, good, clusters):
@@ -87,11 +106,13 @@ def _check_sides(trial: MarkerTrial, static: MarkerTrial | None, clusters) -> No
         else:
             found, step = "its coordinates are mirrored", "read it with its axes right-handed"
     expected = "a right-handed recording, left labels on the left"
-    raise InputError(name, f"the body stands mirrored: {found}", expected, step)
+    raise InputError(name, f"the body is mirrored: {found}", expected, step)
 
 
 def _crossed(bad: MarkerTrial, good: MarkerTrial, clusters) -> bool:
-    """Whether the bad one's left segments have the shape of the good one's right ones rather than of its left ones."""
+    """Return whether left segments of the bad trial have the shape of right ones of the good trial, not of left
+    ones.
+    """
     mine, own = _Usual(bad), _Usual(good)
     straight, crossed = [], []
     for one, other in _pairs(clusters):
@@ -103,24 +124,25 @@ def _crossed(bad: MarkerTrial, good: MarkerTrial, clusters) -> bool:
 
 
 def _other_side(label: str) -> str:
+    """Return the label of the same marker on the other side."""
     return {"L": "R", "R": "L"}.get(label[:1], label[:1]) + label[1:]
 
 
 def _pairs(clusters) -> list[tuple[str, str]]:
-    """Pairs of markers that one segment carries, in the order of their labels' tails, so that sides compare."""
+    """List the marker pairs of each segment, sorted by the labels without their first letter, so that sides compare."""
     return [tuple(sorted(two, key=lambda label: (label[1:], label)))
             for group in clusters.values() for two in combinations(group, 2)]  # fmt: skip
 
 
 class _Usual:
-    """The usual distance of two markers in a trial, metres, found when it is asked for."""
+    """The usual distance of two markers in a trial, metres, computed on demand."""
 
     def __init__(self, trial: MarkerTrial):
         self._trial, self._index = trial, {label: i for i, label in enumerate(trial.labels)}
         self._known: dict[tuple[str, str], np.ndarray] = {}
 
     def apart(self, pair) -> np.ndarray:
-        """Distances in the frames that see both: (t,) m."""
+        """Return the distances in the frames that see both markers: (t,) metres."""
         if pair not in self._known:
             one, other = (self._trial.positions[:, self._index[label]] for label in pair)
             apart = np.linalg.norm(one - other, axis=-1)
@@ -135,7 +157,7 @@ class _Usual:
 
 
 def _of_model(model: MarkerModel) -> dict[tuple[str, str], float]:
-    """Distances between markers that one segment of a model carries, metres."""
+    """Measure the distances between markers that one segment of a model carries: {(label, label): metres}."""
     known = {}
     for rows in model.clusters().values():
         for i, j in combinations(rows, 2):
@@ -145,6 +167,7 @@ def _of_model(model: MarkerModel) -> dict[tuple[str, str], float]:
 
 
 def _same_body(trial: MarkerTrial, known, clusters, name: str, what: str) -> list[str]:
+    """Compare distances within segments; report a few that differ, raise InputError if many do."""
     usual = _Usual(trial)
     pairs = [pair for pair in _pairs(clusters) if pair in usual and pair in known]
     if len(pairs) < _FEW:
@@ -159,13 +182,13 @@ def _same_body(trial: MarkerTrial, known, clusters, name: str, what: str) -> lis
     told = ", ".join(f"{a}-{b} {1000 * usual[a, b]:.0f} against {1000 * known[a, b]:.0f} mm" for a, b in worst)
     count = f"{int(wrong.sum())} of {len(pairs)} distances within segments differ from {what}'s: {told}"
     if share >= _OTHER_BODY:
-        raise InputError(trial.name, f"{count}; {name} is of another body, or its markers were put on anew",
-                         f"{what} of the same body in the same session", "choose that, or go without")
-    return [f"{count}; some markers may have been put on anew"]
+        raise InputError(trial.name, f"{count}; {name} is of another body, or its markers were attached again",
+                         f"{what} of the same body in the same session", "choose that one, or none")
+    return [f"{count}; some markers may have been attached again"]
 
 
 def _empty(trial: MarkerTrial):
-    """A line for each stretch in which hardly any marker is seen."""
+    """Report each stretch in which hardly any marker is visible."""
     few = trial.seen.mean(axis=1) < _EMPTY_SHARE
     for first, end in runs(few):
         if (end - first) / trial.fps >= _EMPTY_SECONDS:

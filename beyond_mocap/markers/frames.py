@@ -1,4 +1,6 @@
-"""Technical frames: where a rigid cluster of markers is in each frame, by singular values (Fredriksson §3.4.2)."""
+"""Technical frames: fit the rigid motion of a marker cluster in each frame by singular values (Fredriksson section
+3.4.2).
+"""
 
 from __future__ import annotations
 
@@ -6,17 +8,23 @@ from typing import NamedTuple
 
 import numpy as np
 
-# A cluster tells its turn about its own longest line only by what lies off that line: below this part of its length
-# (root mean squares) half a millimetre of noise on a hand's breadth already turns it by ten degrees.
+# Only the extent off its longest line determines how a cluster turns about that line. Below this share of its length
+# (root mean squares), half a millimetre of noise on a hand's breadth already rotates it by ten degrees.
 _OFF_THE_LINE = 0.03
 
 
 class RigidFit(NamedTuple):
-    """`rotation @ model + shift` lies nearest to what was seen.
+    """The rigid motion `rotation @ model + shift` that lies nearest to the recorded markers.
 
-    rotation: (..., 3, 3) right-handed matrices. shift: (..., 3) m. rms: (...,) m, root of the weighted mean squared
-    distance. sound: (...,) bool, False where the markers do not determine the rotation (fewer than three, or nearly on
-    one line): it is one of many that fit as well. Without any marker seen, rotation, shift and rms are NaN."""
+    Without any visible marker, rotation, shift and rms are NaN.
+
+    Attributes:
+        rotation: (..., 3, 3) right-handed rotation matrices.
+        shift: (..., 3) metres.
+        rms: (...,) metres, root of the weighted mean squared distance.
+        is_determined: (...,) bool, False where the markers do not determine the rotation (fewer than three, or nearly
+            on one line); the rotation is then one of many that fit equally well.
+    """
 
     rotation: np.ndarray
     shift: np.ndarray
@@ -25,13 +33,20 @@ class RigidFit(NamedTuple):
 
 
 def rigid_fit(model: np.ndarray, seen: np.ndarray, weights: np.ndarray | None = None) -> RigidFit:
-    """The rigid motions that carry clusters `model` (..., N, 3) m nearest to `seen` (..., N, 3) m, all frames at once.
+    """Fit the rigid motions that bring clusters nearest to the recorded markers, all frames at once.
 
-    weights: (..., N) >= 0, how much each marker counts; None: all alike. A marker that is NaN in either cluster counts
-    nothing. Leading axes are matched by numpy's rules, so that one shape (N, 3) fits a whole trial (T, N, 3).
+    The cross-covariance of both clusters about their means (eq. 3.12-3.13) is factored into singular values, which give
+    the rotation (eq. 3.14); the last direction is reversed where the result would be a reflection (eq. 3.15).
 
-    The factors of the cross-covariance C of both clusters about their means (eq. 3.12-3.13) give the rotation
-    (eq. 3.14), with the last direction turned round where it would mirror (eq. 3.15)."""
+    Args:
+        model: (..., N, 3) metres, the cluster. Leading axes broadcast, so one shape (N, 3) fits a whole trial (T, N,
+            3).
+        seen: (..., N, 3) metres, the recorded markers; a marker that is NaN in either cluster has no weight.
+        weights: (..., N) >= 0, the weight of each marker; None weights all equally.
+    Returns:
+        Rotation, shift, rms and whether the fit is determined, over the leading axes.
+    Source: Fredriksson section 3.4.2, equations (3.12) to (3.15).
+    """
     model, seen, weight = _counted(model, seen, weights)
     total = weight.sum(axis=-1)
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -49,14 +64,15 @@ def rigid_fit(model: np.ndarray, seen: np.ndarray, weights: np.ndarray | None = 
     shift = seen_mean - np.einsum("...ij,...j->...i", rotation, model_mean)
     away = np.einsum("...ij,...nj->...ni", rotation, model_arms) - seen_arms
     rms = np.sqrt(np.einsum("...n,...nc,...nc->...", share, away, away))
-    # what a turn about the longest line costs is the sum of the two smaller values; their sizes are lengths squared
+    # rotating about the longest line changes the misfit by the sum of the two smaller singular values;
+    # these are squared lengths, hence the squared share
     sound = (size[..., 1] + sign * size[..., 2] > _OFF_THE_LINE**2 * size[..., 0]) & (np.sum(weight > 0.0, axis=-1) > 2)
-    known = np.where(total > 0.0, 1.0, np.nan)
+    known = np.where(total > 0.0, 1.0, np.nan)  # NaN marks frames without a visible marker
     return RigidFit(rotation * known[..., None, None], shift * known[..., None], rms * known, sound)
 
 
 def _counted(model, seen, weights):
-    """Both clusters with zeros for what counts nothing, and the weights (..., N), over common leading axes."""
+    """Return both clusters with zeros where a marker has no weight, and the weights (..., N), broadcast together."""
     model, seen = np.broadcast_arrays(np.asarray(model, dtype=float), np.asarray(seen, dtype=float))
     there = np.isfinite(model).all(axis=-1) & np.isfinite(seen).all(axis=-1)
     weight = np.where(there, 1.0 if weights is None else np.asarray(weights, dtype=float), 0.0)
@@ -65,20 +81,42 @@ def _counted(model, seen, weights):
 
 
 def placed(fit: RigidFit, model: np.ndarray) -> np.ndarray:
-    """Where the fitted motions carry points `model` (..., N, 3) m: (..., N, 3) m."""
+    """Move points with fitted motions.
+
+    Args:
+        fit: the fitted motions.
+        model: (..., N, 3) metres, points in the model's frame.
+    Returns:
+        (..., N, 3) metres, the points in the world.
+    """
     return np.einsum("...ij,...nj->...ni", fit.rotation, model) + fit.shift[..., None, :]
 
 
 def taken_back(fit: RigidFit, seen: np.ndarray) -> np.ndarray:
-    """Where points `seen` (..., N, 3) m lie in the model's own frame: (..., N, 3) m."""
+    """Convert points of the world to the model's own frame.
+
+    Args:
+        fit: the fitted motions.
+        seen: (..., N, 3) metres, world.
+    Returns:
+        (..., N, 3) metres, in the model's frame.
+    """
     return np.einsum("...ji,...nj->...ni", fit.rotation, seen - fit.shift[..., None, :])
 
 
 def mean_rotation(rotations: np.ndarray, weights: np.ndarray | None = None) -> np.ndarray:
-    """The mean (3, 3) of rotation matrices (T, 3, 3): the one nearest to all by squared chords, NaN left out.
+    """Compute the mean of rotation matrices: the rotation nearest to all by squared chords.
 
-    weights: (T,) or None. The same as the dominant eigenvector of the quaternions' outer products (Markley et al. 2007,
-    the [46] of Fredriksson §5.2.1), found from the matrices' sum. Without any rotation: the identity."""
+    The result equals the dominant eigenvector of the quaternions' outer products, computed from the sum of the
+    matrices.
+
+    Args:
+        rotations: (T, 3, 3) rotation matrices; NaN ones are left out.
+        weights: (T,) weights, or None.
+    Returns:
+        (3, 3) the mean rotation; the identity if there is no rotation.
+    Source: Markley et al. 2007, reference [46] of Fredriksson section 5.2.1.
+    """
     rotations = np.asarray(rotations, dtype=float)
     weight = np.isfinite(rotations).all(axis=(-1, -2)) * (1.0 if weights is None else np.asarray(weights, dtype=float))
     if not np.any(weight > 0.0):

@@ -1,9 +1,9 @@
-"""The recipe for a folder of trials: which are statics, which belong to one session, one model for all of a subject.
+"""Reconstruct a folder of trials: find statics and sessions, and build one model for all trials of a subject.
 
-A folder's own files are one session; where it has folders below, each of these is one. A static trial is told by its
-name, and serves the trials of its session whose markers and body it has. Trials that share a static share the model
-that is made of it, and the models of several sessions of one subject get one skeleton (Fredriksson §5.2.3); trials
-without a static are modelled from their own motion.
+The files of a folder are one session; where it has folders below, each of these is one. A static trial is recognised by
+its name, and serves the trials of its session that have its markers and body. Trials with the same static share the
+model that is built from it, and the models of several sessions of one subject get one skeleton (Fredriksson section
+5.2.3). Trials without a static are modelled from their own motion.
 """
 
 from __future__ import annotations
@@ -22,15 +22,20 @@ from .trial import MarkerTrial
 
 SUFFIXES = (".c3d", ".trc")
 _STATIC = re.compile(r"static|calib|(^|[^a-z])cal([^a-z]|$)|[tna][-_ ]?pose|standing", re.IGNORECASE)
-_SAME_MARKERS = 0.8  # of a trial's markers that its static must have
+_SAME_MARKERS = 0.8  # share of a trial's markers that its static must have
 
 Read = Callable[[Path], MarkerTrial]
 
 
 @dataclass(frozen=True)
 class Recording:
-    """One file of a folder. name: what its results are called, with its session before it. session: its folder below
-    the one that was asked for, "" for that itself."""
+    """One file of a folder.
+
+    Attributes:
+        path: the file.
+        name: name of its results, with its session in front.
+        session: its folder relative to the given one; "" for the given folder itself.
+    """
 
     path: Path
     name: str
@@ -38,14 +43,21 @@ class Recording:
 
     @property
     def is_static(self) -> bool:
-        """Whether its name says that the body only stands."""
+        """Whether the file name says that the body only stands."""
         return bool(_STATIC.search(self.path.stem))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Made:
-    """What became of one trial: the reconstruction, or the error that says why there is none. static: its static, or
-    None. note: why a static that was there is not its own, or ""."""
+    """The outcome for one trial.
+
+    Attributes:
+        recording: the file.
+        reconstruction: the result; None where it failed.
+        error: why it failed, or "".
+        static: its static trial, or None.
+        note: why a static that exists is not used, or "".
+    """
 
     recording: Recording
     made: Reconstruction | None
@@ -55,10 +67,14 @@ class Made:
 
 
 def recordings_of(folder: Path) -> list[Recording]:
-    """All recordings of markers in a folder and in those below it, by name. InputError where there is none."""
+    """List all marker recordings in a folder and below it, by name.
+
+    Raises:
+        InputError: if there are none.
+    """
     paths = sorted(path for path in folder.rglob("*") if path.suffix.lower() in SUFFIXES and path.is_file())
     if not paths:
-        raise InputError(folder, "holds no .c3d and no .trc", "recordings of markers", "choose another folder")
+        raise InputError(folder, "contains no .c3d or .trc file", "recordings of markers", "choose another folder")
     bare = [path.relative_to(folder).with_suffix("").as_posix() for path in paths]
     names = [name if bare.count(name) == 1 else name + path.suffix.lower().replace(".", "_")
              for name, path in zip(bare, paths)]
@@ -69,9 +85,21 @@ def recordings_of(folder: Path) -> list[Recording]:
 def reconstruct_folder(folder: Path, read: Read, settings: ReconstructSettings = ReconstructSettings(),
                        model: MarkerModel | None = None, progress: Callable[[float, str], None] | None = None,
                        cancelled: Callable[[], bool] | None = None) -> Iterator[Made]:
-    """Every trial of a folder, one after the other; what cannot be made is told and does not stop the others.
+    """Reconstruct every trial of a folder, one after the other; a trial that fails is reported and does not stop the
+    others.
 
-    read: reads one file. model: for all of them, instead of models made here. InputError for a folder without trials.
+    Args:
+        folder: the folder with the recordings.
+        read: reads one file.
+        settings: the options.
+        model: a model for all trials, instead of models built from them.
+        progress: called with the share that is done and a text.
+        cancelled: returns True when the user stops the job.
+    Yields:
+        The outcome of each trial.
+    Raises:
+        InputError: if the folder has no trials.
+        Cancelled: if the user stops the job.
     """
     recordings = recordings_of(folder)
     statics, moving = _told_apart(recordings, read)
@@ -87,7 +115,15 @@ def reconstruct_folder(folder: Path, read: Read, settings: ReconstructSettings =
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class _Plan:
-    """A trial, its static as read or None, why it cannot be read, and why a static is not its own."""
+    """What is planned for one trial.
+
+    Attributes:
+        recording: the file.
+        static: its static recording with the trial read from it, or None.
+        error: why the trial cannot be read, or "".
+        subject: whose markers these are.
+        note: why a static is not used, or "".
+    """
 
     recording: Recording
     static: tuple[Recording, MarkerTrial] | None = None
@@ -97,12 +133,16 @@ class _Plan:
 
     @property
     def static_path(self) -> Path | None:
+        """Path of the static trial, or None."""
         return None if self.static is None else self.static[0].path
 
 
 def _told_apart(recordings: Sequence[Recording], read: Read):
-    """The statics, read, and the other recordings. Where all have the names of statics they are trials too; a static
-    that cannot be read is told as a trial."""
+    """Split the recordings into statics, read, and trials.
+
+    If all names are those of statics, they are trials too. A static that cannot be read is treated as a trial, so that
+    its error is reported.
+    """
     if all(one.is_static for one in recordings):
         return [], list(recordings)
     statics, moving = [], []
@@ -118,6 +158,7 @@ def _told_apart(recordings: Sequence[Recording], read: Read):
 
 
 def _planned(one: Recording, read: Read, statics, settings: ReconstructSettings) -> _Plan:
+    """Read a trial and choose its static."""
     try:
         trial = read(one.path)
         static, note = _static_for(one, trial, statics, settings)
@@ -127,8 +168,10 @@ def _planned(one: Recording, read: Read, statics, settings: ReconstructSettings)
 
 
 def _static_for(one: Recording, trial: MarkerTrial, statics, settings):
-    """The static of a trial's session that has its markers and body, of several the one whose name is likest, or None;
-    and a line on one that is of another body, or ""."""
+    """Choose the static of a trial: same session, markers and body; of several, the one with the most similar name.
+
+    Returns the static or None, and a message on a static that is of another body, or "".
+    """
     if not statics:
         return None, ""
     marker_set = set_of(trial, None, settings)
@@ -144,21 +187,23 @@ def _static_for(one: Recording, trial: MarkerTrial, statics, settings):
         try:
             check(named, other, marker_set.clusters(named.labels))
         except InputError as error:
-            note = f"goes without a static: {error}"
+            note = f"reconstructed without a static: {error}"
             continue
         fits.append((len(os.path.commonprefix([recording.path.stem, one.path.stem])), shared, (recording, static)))
     return (max(fits, key=lambda row: row[:2])[2], "") if fits else (None, note)
 
 
 def _models(plans: Sequence[_Plan], read: Read, settings, cancelled) -> dict[Path, MarkerModel]:
-    """Static -> its model, made with the first trial it serves; sessions of one subject get one skeleton."""
+    """Build one model for each static, from the first trial that it serves; sessions of one subject get one
+    skeleton.
+    """
     first = {plan.static_path: plan for plan in reversed(plans) if plan.static is not None}
     models: dict[Path, MarkerModel] = {}
     for path, plan in reversed(first.items()):
         try:
             models[path] = modelled(read(plan.recording.path), plan.static[1], settings, cancelled=cancelled)
         except (InputError, OSError):
-            continue  # is told when its trials are made
+            continue  # the error is reported when its trials are reconstructed
     groups: dict[tuple, list[Path]] = {}
     for path, own in models.items():
         groups.setdefault((first[path].subject, own.set_name, own.skeleton.names), []).append(path)
@@ -171,6 +216,7 @@ def _models(plans: Sequence[_Plan], read: Read, settings, cancelled) -> dict[Pat
 
 
 def _made(plan: _Plan, read: Read, settings, model, progress, cancelled) -> Made:
+    """Reconstruct one trial; errors other than a cancellation become part of the outcome."""
     if plan.error:
         return Made(recording=plan.recording, made=None, error=plan.error)
     static, still = plan.static or (None, None)
@@ -185,6 +231,7 @@ def _made(plan: _Plan, read: Read, settings, model, progress, cancelled) -> Made
 
 
 def _part_of(progress, number: int, count: int, name: str):
+    """Return a progress callback for one of `count` trials, or None."""
     if progress is None:
         return None
     return lambda fraction, text="": progress((number + fraction) / count, f"{name}: {text}")

@@ -1,5 +1,4 @@
-"""The figures of a motion that was reconstructed from markers: how near its markers are, how its feet stand, what was
-mended."""
+"""Figures of a reconstructed motion: how near its markers are, how far its feet slide, and what was corrected."""
 
 from __future__ import annotations
 
@@ -14,7 +13,13 @@ from .pose.residuals import residuals
 
 
 def figures(made) -> dict:
-    """The report of a `reconstruct.Reconstruction`, for JSON; lengths of markers in millimetres, see the keys."""
+    """Collect the report of a reconstruction.
+
+    Args:
+        reconstruction: a `reconstruct.Reconstruction`.
+    Returns:
+        Values for JSON; lengths of markers in millimetres, other units as the keys say.
+    """
     solved, motion = made.solved, made.motion
     posing = made.seconds.get("pose") or solved.seconds
     return {"trial": made.raw.name, "subject": made.model.subject, "marker_set": made.model.set_name,
@@ -30,8 +35,14 @@ def figures(made) -> dict:
 
 
 def residual_figures(made) -> dict:
-    """Millimetres between the model's markers and those seen: of the pose, beside what fitting every segment alone
-    leaves (`single_mean`), and of the motion that is written, after its filters (`output_mean`)."""
+    """Measure the distances in millimetres between the model's markers and the recorded ones.
+
+    Args:
+        reconstruction: a `reconstruct.Reconstruction`.
+    Returns:
+        Figures of the solved pose, of every segment fitted alone (`single_mean`), and of the motion that is written,
+        after its filters (`output_mean`).
+    """
     seen = 1000.0 * made.solved.residual[np.isfinite(made.solved.residual)]
     single = 1000.0 * made.solved.single[np.isfinite(made.solved.single)]
     written = 1000.0 * residuals(made.model, made.motion, made.trial)
@@ -42,13 +53,16 @@ def residual_figures(made) -> dict:
 
 
 def weighted_squares(solved) -> dict:
-    """The sum over markers of weight x residual^2 a frame, m^2 (Fredriksson §5.3.2 eq. 5.1): mean and deviation."""
+    """Measure the sum over markers of weight x residual^2 per frame, square metres: mean and standard deviation.
+
+    Source: Fredriksson section 5.3.2, equation (5.1).
+    """
     each = np.nansum(solved.weights * solved.residual**2, axis=1)
     return {"mean": float(each.mean()), "sd": float(each.std())} if len(each) else {"mean": None, "sd": None}
 
 
 def bones_change(motion: Motion) -> float:
-    """The largest difference in metres between a bone's length in any frame and in the skeleton."""
+    """Measure the largest difference in metres between a bone's length in any frame and in the skeleton."""
     places, _ = forward_kinematics(motion)
     parents = np.array(motion.skeleton.parents[1:], dtype=int)
     lengths = np.linalg.norm(places[:, 1:] - places[:, parents], axis=-1)
@@ -56,7 +70,13 @@ def bones_change(motion: Motion) -> float:
 
 
 def skate(motion: Motion) -> dict | None:
-    """Speed of standing feet and travel of their toes in a stance; None for a body without legs or a slow recording."""
+    """Measure how fast feet slide while in contact, and how far toes travel in a contact.
+
+    Args:
+        motion: the reconstructed motion.
+    Returns:
+        Values for JSON; None for a skeleton without legs or fewer than three frames.
+    """
     try:
         identify(motion.skeleton)
     except InputError:
@@ -72,7 +92,7 @@ def skate(motion: Motion) -> dict | None:
 
 
 def limit_shares(solved, names) -> dict[str, float]:
-    """Joint -> share of the frames in which it is at a limit, for those that are at all."""
+    """Measure in which share of the frames each joint is at a limit; joints that never are, are left out."""
     share = np.asarray(solved.at_limit, dtype=bool).mean(axis=0)
     return {name: float(part) for name, part in zip(names, share) if part > 0}
 

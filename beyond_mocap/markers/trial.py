@@ -1,8 +1,9 @@
-"""A trial: one recording of markers, as every reader gives it and every step of the way to a skeleton takes it.
+"""A trial: one recording of optical markers, the type that all readers return and all reconstruction steps take.
 
-Some systems expose at whole milliseconds and write the nominal rate (`frame_times`). At 360 Hz the steps then are 3, 3,
-3, 2, 3, 3, 3, 3, 2 ms instead of 2.78, and every marker of the body seems 28 % slower in one frame of four or five and
-8 % faster in the others. No filter of one marker tells this from movement; all markers together do.
+Some systems expose at whole milliseconds and write the nominal rate (`estimate_frame_times`). At 360 Hz the steps are
+then 3, 3, 3, 2, 3, 3, 3, 3, 2 ms instead of 2.78 ms, and every marker of the body seems 28 % slower in one frame of
+four or five and 8 % faster in the others. A filter on one marker cannot separate this from movement; all markers
+together can.
 """
 
 from __future__ import annotations
@@ -15,20 +16,23 @@ import numpy as np
 
 from ..base.errors import InputError
 
-FEWEST_FPS, MOST_FPS = 1.0, 20000.0
+FEWEST_FPS, MOST_FPS = 1.0, 20000.0  # frames per second that a trial may have
 
-TICK = 1e-3  # seconds: the clock that the exposures are bound to
-_SMOOTH = 19  # frames over which a marker's step is smoothed, several times the pattern's length
-_LEAST_ALIKE = 0.8  # correlation of the markers' common unsteadiness with the clock's
-_PHASES = 36
+TICK = 1e-3  # seconds, the clock period to which exposures are rounded
+_SMOOTH = 19  # frames over which a marker's step is smoothed, several times the length of the jitter pattern
+_LEAST_ALIKE = 0.8  # minimum correlation of the markers' common jitter with the jitter of the clock
+_PHASES = 36  # phases of the clock that are tried
 
 
 @dataclass(frozen=True)
 class MarkerEvent:
-    """A moment that the recording itself names.
+    """An event that the recording itself names.
 
-    seconds: on the trial's clock (as `MarkerTrial.start`). label: as written, for instance "Foot Strike". side: "left",
-    "right" or ""."""
+    Attributes:
+        seconds: time on the trial's clock (as `MarkerTrial.start`).
+        label: as written in the file, for instance "Foot Strike".
+        side: "left", "right" or "".
+    """
 
     seconds: float
     label: str
@@ -37,15 +41,21 @@ class MarkerEvent:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class MarkerTrial:
-    """Markers over time: T frames of M markers.
+    """The positions of M markers over T frames. Arrays are read-only copies.
 
-    labels: M unique names without the subject's prefix. positions: (T, M, 3) metres, Z up, right-handed, NaN where a
-    marker is not seen. fps: frames per second. residuals: (T, M) metres, what the cameras disagree by, NaN where not
-    seen; None where the file does not say. events: in the order of time. start: seconds of frame 0. name: the file's,
-    without its ending. subject: whose markers these are, "" where the file does not say. notes: lines for people on
-    what was decided on reading (unit, up axis, labels left out). Arrays are read-only copies.
-
-    InputError where shapes do not fit, a label comes twice or is empty, the rate is none, or a coordinate is infinite.
+    Attributes:
+        labels: M unique names without the subject's prefix.
+        positions: (T, M, 3) metres, Z up, right-handed, NaN where a marker is not visible.
+        fps: frames per second.
+        residuals: (T, M) metres by which the cameras disagree, NaN where not visible; None where the file has none.
+        events: sorted by time.
+        start: seconds of frame 0.
+        name: file name without its ending.
+        subject: whose markers these are, "" where the file does not say.
+        notes: messages on decisions made while reading (unit, up axis, labels left out).
+    Raises:
+        InputError: if shapes do not match, a label is empty or repeated, the rate is out of range, or a coordinate is
+            infinite.
     """
 
     labels: tuple[str, ...]
@@ -69,15 +79,16 @@ class MarkerTrial:
         self._check()
 
     def _check(self) -> None:
+        """Raise InputError for shapes, labels, rates and coordinates that are not valid."""
         shape = self.positions.shape
         if len(shape) != 3 or shape[1:] != (len(self.labels), 3):
             raise InputError(self.name, f"positions of shape {shape}", f"(frames, {len(self.labels)} labels, 3)")
         if self.residuals is not None and self.residuals.shape != shape[:2]:
             raise InputError(self.name, f"residuals of shape {self.residuals.shape}", f"{shape[:2]}")
         if twice := repeated(self.labels):
-            raise InputError(self.name, f"label {twice[0]!r} twice", "unique labels", "rename one of them")
+            raise InputError(self.name, f"duplicate label {twice[0]!r}", "unique labels", "rename one of them")
         if not all(isinstance(label, str) and label.strip() for label in self.labels):
-            raise InputError(self.name, "a marker without a label", "unique labels", "name it")
+            raise InputError(self.name, "a marker without a label", "unique labels", "give it a label")
         if not FEWEST_FPS <= self.fps <= MOST_FPS:
             raise InputError(self.name, f"{self.fps:g} frames per second", f"{FEWEST_FPS:g} to {MOST_FPS:g}")
         if not np.isfinite(self.start):
@@ -90,14 +101,14 @@ class MarkerTrial:
 
     @cached_property
     def seen(self) -> np.ndarray:
-        """(T, M) bool: where a marker has a place."""
+        """(T, M) bool, where a marker is visible."""
         seen = np.isfinite(self.positions).all(axis=-1)
         seen.setflags(write=False)
         return seen
 
     @property
     def seconds(self) -> np.ndarray:
-        """(T,) seconds of the frames, on the trial's clock."""
+        """(T,) seconds of the frames on the trial's clock."""
         return self.start + np.arange(len(self)) / self.fps
 
     @property
@@ -106,7 +117,11 @@ class MarkerTrial:
         return max(len(self) - 1, 0) / self.fps
 
     def index(self, label: str) -> int:
-        """Which marker this label is. InputError where there is none, with what there is."""
+        """Return the index of the marker with this label.
+
+        Raises:
+            InputError: if no marker has this label; the message lists the labels.
+        """
         try:
             return self.labels.index(label)
         except ValueError:
@@ -114,14 +129,29 @@ class MarkerTrial:
             raise InputError(self.name, f"no marker {label!r}", f"one of {there}", "check the spelling") from None
 
     def only(self, labels: Iterable[str]) -> MarkerTrial:
-        """The trial with these markers alone, in this order. InputError where one is missing."""
+        """Select markers.
+
+        Args:
+            labels: the markers to keep, in the new order.
+        Returns:
+            The trial with these markers alone.
+        Raises:
+            InputError: if a label is missing.
+        """
         chosen = [self.index(label) for label in labels]
         residuals = None if self.residuals is None else self.residuals[:, chosen]
         return replace(self, labels=tuple(self.labels[i] for i in chosen), positions=self.positions[:, chosen],
                        residuals=residuals)
 
     def frames(self, first: int, end: int) -> MarkerTrial:
-        """The frames from `first` up to, not with, `end`, on the same clock; events outside are left out."""
+        """Select frames.
+
+        Args:
+            first: index of the first frame.
+            end: index after the last frame.
+        Returns:
+            The trial with these frames on the same clock; events outside are left out.
+        """
         first, end, _ = slice(first, end).indices(len(self))
         start, last = self.start + first / self.fps, self.start + (end - 1) / self.fps
         near = 0.5 / self.fps
@@ -130,24 +160,37 @@ class MarkerTrial:
         return replace(self, positions=self.positions[first:end], residuals=residuals, start=start, events=inside)
 
     def renamed(self, names: Mapping[str, str]) -> MarkerTrial:
-        """The trial with other labels: {old: new}; labels that are not named stay. InputError where a new one is there
-        already."""
+        """Return the trial with other labels.
+
+        Args:
+            names: {old label: new label}; other labels stay.
+        Raises:
+            InputError: if a new label exists already.
+        """
         return replace(self, labels=tuple(names.get(label, label) for label in self.labels))
 
     def with_positions(self, positions: np.ndarray) -> MarkerTrial:
-        """The trial with other places, (T, M, 3) m; residuals stay where the frames are as many, and go otherwise."""
+        """Return the trial with other positions, (T, M, 3) metres.
+
+        Residuals stay if the number of frames and markers is unchanged; otherwise they are dropped.
+        """
         keeps = self.residuals is not None and np.shape(positions)[:2] == self.residuals.shape
         return replace(self, positions=positions, residuals=self.residuals if keeps else None)
 
 
 def list_some(names: Sequence[str], most: int = 6) -> str:
-    """The first of many names, and how many more there are."""
+    """Format the first names of a list, and how many more there are.
+
+    Args:
+        names: the names.
+        most: how many are written out.
+    """
     shown = ", ".join(name or "(no name)" for name in names[:most])
     return shown + (f" and {len(names) - most} more" if len(names) > most else "")
 
 
 def repeated(labels: Iterable[str]) -> list[str]:
-    """Labels that come more than once, each told once, in the order of their second coming."""
+    """Return the labels that occur more than once, each once, in the order of their second occurrence."""
     met, twice = set(), []
     for label in labels:
         if label in met and label not in twice:
@@ -157,20 +200,27 @@ def repeated(labels: Iterable[str]) -> list[str]:
 
 
 def _frozen(values, where: str, what: str) -> np.ndarray:
+    """Return a read-only float array; raise InputError where the values are not numbers."""
     try:
         out = np.array(values, dtype=float)
     except (TypeError, ValueError):
-        raise InputError(where, f"{what} that are no numbers", "an array of numbers") from None
+        raise InputError(where, f"{what} that are not numbers", "an array of numbers") from None
     out.setflags(write=False)
     return out
 
 
 def frame_times(trial: MarkerTrial) -> np.ndarray | None:
-    """Seconds (T,) on the trial's clock at which the frames were taken, or None where they stand evenly.
+    """Estimate when the frames were exposed, for systems whose clock ticks in whole milliseconds.
 
-    The steps of all markers, each against its own smooth course, give one common unsteadiness per frame; it is compared
-    with the one that a clock of whole milliseconds would make, at every phase, and believed where both correlate by
-    more than 0.8."""
+    The steps of all markers, each against its own smoothed steps, give one common jitter per frame. It is correlated
+    with the jitter that a clock of whole milliseconds would cause, at every phase.
+
+    Args:
+        trial: the recorded markers, T frames.
+    Returns:
+        (T,) seconds on the trial's clock; None where the frames are evenly spaced, or no phase correlates by more than
+        0.8.
+    """
     step = 1.0 / (trial.fps * TICK)
     if abs(step - round(step)) < 1e-3 or step < 1.5 or len(trial) < 3 * _SMOOTH:
         return None
@@ -178,6 +228,7 @@ def frame_times(trial: MarkerTrial) -> np.ndarray | None:
     if not np.sum(weight * common**2) > 0.0:
         return None
     best, found = _LEAST_ALIKE, None
+    # the clock's ticks (T,) at each phase, and the relative jitter (T-1,) of the steps between them
     for phase in np.arange(_PHASES) / _PHASES:
         ticks = np.floor(np.arange(len(trial)) * step + phase + 1e-9)
         jitter = np.diff(ticks) / step - 1.0
@@ -192,16 +243,22 @@ def frame_times(trial: MarkerTrial) -> np.ndarray | None:
 
 
 def evenly(trial: MarkerTrial) -> MarkerTrial:
-    """The trial as it would be with evenly spaced frames; itself where it has them. What is not seen stays so."""
+    """Resample a trial to evenly spaced frames.
+
+    Args:
+        trial: the recorded markers.
+    Returns:
+        The resampled trial, or the trial itself where its frames are even. Markers that are not visible stay so.
+    """
     times = frame_times(trial)
     if times is None:
         return trial
-    note = f"the frames were taken at whole milliseconds, not every {1000.0 / trial.fps:.2f} ms: put at even times"
+    note = f"frames were recorded at whole milliseconds, not every {1000.0 / trial.fps:.2f} ms: resampled evenly"
     return replace(trial, positions=_at_even_times(trial, times), notes=(*trial.notes, note))
 
 
 def _common_unsteadiness(positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """By what share (T-1,) the steps of all markers are longer than their smooth course, and how much it weighs."""
+    """Measure by what share (T-1,) all markers' steps exceed their smoothed steps, and the weight (T-1,) of each."""
     from scipy.signal import savgol_filter
 
     steps = np.diff(positions, axis=0)
@@ -209,6 +266,7 @@ def _common_unsteadiness(positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]
     filled = np.where(known[..., None], steps, 0.0)
     smooth = savgol_filter(filled, _SMOOTH, 3, axis=0)
     gap = np.apply_along_axis(np.convolve, 0, ~known, np.ones(_SMOOTH), "same") > 0.5
+    # steps within half a window of a gap are smoothed with zeros; they get no weight
     smooth[gap] = 0.0
     weight = np.einsum("tmc,tmc->t", smooth, smooth)
     shared = np.einsum("tmc,tmc->t", filled - smooth, smooth)
@@ -216,7 +274,7 @@ def _common_unsteadiness(positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]
 
 
 def _at_even_times(trial: MarkerTrial, times: np.ndarray) -> np.ndarray:
-    """(T, M, 3) m by cubic splines through what is seen, one for all markers that are seen in the same frames."""
+    """Interpolate (T, M, 3) metres by cubic splines, one for all markers that are visible in the same frames."""
     from scipy.interpolate import CubicSpline
 
     out = np.array(trial.positions)

@@ -1,5 +1,7 @@
-"""The results of a folder of reconstructed trials, one row a trial, read from the reports that were written; where
-their throws land, and how fast these are beside a speed gun."""
+"""The results of a folder of reconstructed trials, one row for each trial, read from the written reports.
+
+Also: where the throws land, and how fast they are compared with a radar gun.
+"""
 
 from __future__ import annotations
 
@@ -16,13 +18,21 @@ from ..evaluation.report import check_depth
 
 CULLED = 3.0  # standard deviations from the mean, beyond which a throw is left out (Fredriksson §8.2)
 
-LEAST = 6  # pairs below which Wilcoxon's test cannot reject anything at 0.05 (two-sided: 2 / 2^n)
+LEAST = 6  # pairs; with fewer, Wilcoxon's test cannot reject anything at 0.05 (two-sided: 2 / 2^n)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Throw:
-    """A release. speed, radar: m/s, radar None where the file's name had none. side: of the hand. hips: (2,) m at the
-    start, impact: (2,) m on the ground, None where the ball never came down. velocity: (3,) m/s. how: "ball" or "hand".
+    """The release of a throw, as the report has it.
+
+    Attributes:
+        speed: m/s.
+        radar: m/s of a radar gun; None where the file name has none.
+        side: "left" or "right", the throwing hand.
+        hips: (2,) metres, level, at the start.
+        impact: (2,) metres, level, on the ground; None where the ball never came down.
+        velocity: (3,) m/s.
+        method: "ball" or "hand", what the release was estimated from.
     """
 
     speed: float
@@ -36,10 +46,19 @@ class Throw:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class TrialResult:
-    """One trial. subject: as the file says, else its session, "" where unknown. frames: how many. squares: m^2,
-    weighted squared residuals a frame (mean and standard deviation; eq. 5.1). residual, single: mm, root mean square of
-    the model's markers and of single segments. rate: frames a second of the pose. throw: its release, or None. error:
-    why there is no motion, "" where there is."""
+    """The result of one trial.
+
+    Attributes:
+        name: of the trial.
+        subject: as the file says, else its session; "" where unknown.
+        frames: number of frames.
+        squares: (mean, standard deviation) of the weighted squared residuals per frame, square metres (eq. 5.1).
+        residual: mm, root mean square distance of the model's markers.
+        single: mm, the same with every segment fitted alone.
+        rate: frames solved per second.
+        throw: the release, or None.
+        error: why there is no motion; "" where there is one.
+    """
 
     name: str
     subject: str
@@ -53,19 +72,27 @@ class TrialResult:
 
 
 def read_results(folder: Path) -> tuple[TrialResult, ...]:
-    """The trials of a folder by name: of its trials.json, else of all *.report.json below it. InputError where there
-    are none, or a report cannot be read."""
+    """Read the results of a folder, sorted by name.
+
+    Args:
+        folder: with a trials.json, else with *.report.json files in it or below.
+    Returns:
+        One result for each trial.
+    Raises:
+        InputError: if there are none, or a report cannot be read.
+    """
     table = folder / "trials.json"
     if table.is_file():
         rows = _read(table).get("trials", ())
         return tuple(_of_row(folder, row) for row in rows)
     reports = sorted(folder.rglob("*.report.json"))
     if not reports:
-        raise InputError(folder, "no reports of trials", "what 'reconstruct FOLDER --out' wrote", "check the folder")
+        raise InputError(folder, "no reports of trials", "the output of a reconstructed folder", "check the folder")
     return tuple(_of_report(path.name.removesuffix(".report.json"), _read(path)) for path in reports)
 
 
 def _of_row(folder: Path, row: Mapping) -> TrialResult:
+    """Build a result from a row of trials.json and the report that it names."""
     name = str(row.get("trial", ""))
     if row.get("error") or not row.get("report"):
         return TrialResult(name=name, subject=str(row.get("subject") or ""), error=str(row.get("error") or "no motion"))
@@ -74,6 +101,7 @@ def _of_row(folder: Path, row: Mapping) -> TrialResult:
 
 
 def _of_report(name: str, report: Mapping) -> TrialResult:
+    """Build a result from the report of one trial."""
     residual, squares = report.get("residual_mm") or {}, report.get("weighted_se") or {}
     return TrialResult(name=name, subject=str(report.get("subject") or ""), frames=int(report.get("frames") or 0),
                        squares=(_number(squares.get("mean")), _number(squares.get("sd"))),
@@ -83,6 +111,7 @@ def _of_report(name: str, report: Mapping) -> TrialResult:
 
 
 def _throw(release: Mapping | None) -> Throw | None:
+    """Build a throw from the release of a report; None where there is none."""
     if not release or release.get("speed_m_s") is None:
         return None
     impact = release.get("impact_m")
@@ -99,18 +128,23 @@ def _number(value) -> float:
 
 
 def _read(path: Path) -> Mapping:
+    """Read a JSON object; raise InputError where it cannot be read."""
     try:
         found = json.loads(path.read_text("utf-8"))
     except (OSError, ValueError, RecursionError) as error:
         raise InputError(path, f"cannot be read: {error}", "a report in JSON", "reconstruct the folder again") from None
     if not isinstance(found, Mapping):
-        raise InputError(path, "holds no object", "a report in JSON", "reconstruct the folder again")
+        raise InputError(path, "contains no object", "a report in JSON", "reconstruct the folder again")
     check_depth(found, path)
     return found
 
 
 def dominant_sides(results: Sequence[TrialResult]) -> dict[str, str]:
-    """Subject -> the hand that threw more often; ties go to the right."""
+    """Find the hand with which each subject throws more often.
+
+    Returns:
+        Subject -> "left" or "right"; ties go to the right.
+    """
     sides: dict[str, list[str]] = {}
     for result in results:
         if result.throw is not None:
@@ -120,10 +154,17 @@ def dominant_sides(results: Sequence[TrialResult]) -> dict[str, str]:
 
 
 def aligned_impacts(results: Sequence[TrialResult]) -> np.ndarray:
-    """(N, 2) m of the N results: where each throw meets the ground, NaN where it does not.
+    """Place the impacts of all throws in a common frame, as in figure 8.2.
 
-    Axes as in fig. 8.2: origin at the hips in the trial's first frame, y along the direction of a subject's throws (the
-    mean of their level directions, for nobody knows the target), x to the right of it."""
+    The origin is at the hips in the trial's first frame. The y axis is the direction of a subject's throws (the mean of
+    their level directions, since the target is unknown), the x axis points to the right of it.
+
+    Args:
+        results: N results.
+    Returns:
+        (N, 2) metres, where each throw meets the ground; NaN where it does not.
+    Source: Fredriksson section 8.2.
+    """
     out = np.full((len(results), 2), np.nan)
     for subject in {result.subject for result in results}:
         rows = [i for i, result in enumerate(results)
@@ -141,7 +182,13 @@ def aligned_impacts(results: Sequence[TrialResult]) -> np.ndarray:
 
 
 def near_mean(points: np.ndarray) -> np.ndarray:
-    """(N,) bool: the points (N, 2) within three standard deviations of their mean on both axes; NaN are not kept."""
+    """Select the points within three standard deviations of their mean on both axes.
+
+    Args:
+        points: (N, 2) metres.
+    Returns:
+        (N,) bool; False for NaN.
+    """
     known = np.isfinite(points).all(axis=-1)
     if np.count_nonzero(known) < 3:
         return known
@@ -151,9 +198,17 @@ def near_mean(points: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, kw_only=True)
 class Paired:
-    """count: of pairs. mean, sd: m/s of estimated - measured. share: of the measured, mean of the absolute differences.
-    within: share of pairs that differ by at most 10 %. wilcoxon: two-sided p that the differences are about zero, and
-    normal: p of Shapiro and Wilk that they are normal; NaN where there are too few."""
+    """A comparison of estimated with measured speeds. Tests are NaN where there are too few pairs.
+
+    Attributes:
+        count: number of pairs.
+        mean: m/s, mean of estimated - measured.
+        sd: m/s, their standard deviation.
+        share: mean absolute difference as a share of the measured speed.
+        within: share of pairs that differ by at most 10 %.
+        wilcoxon: two-sided p-value that the differences are centred on zero.
+        normal: p-value of the Shapiro-Wilk test that they are normal.
+    """
 
     count: int
     mean: float
@@ -165,7 +220,14 @@ class Paired:
 
 
 def compare_speeds(estimated: np.ndarray, measured: np.ndarray) -> Paired:
-    """The comparison of speeds (N,) m/s that belong together; pairs with NaN are left out."""
+    """Compare paired speeds; pairs with NaN are left out.
+
+    Args:
+        estimated: (N,) m/s.
+        measured: (N,) m/s.
+    Returns:
+        The statistics of the differences.
+    """
     from scipy.stats import shapiro, wilcoxon
 
     estimated, measured = np.asarray(estimated, float), np.asarray(measured, float)

@@ -1,10 +1,12 @@
-"""The report over a folder of trials as one page for a browser (Fredriksson §8.1-8.2): how well markers fit and how
-long it took, where throws land, how fast they are beside a speed gun. It loads nothing, and all names are escaped.
+"""The report on a folder of trials as one HTML page (Fredriksson sections 8.1-8.2).
 
-    page = trials_report(folder)
+It shows how well markers fit, how long the solver took, where throws land, and how fast they are compared with a radar
+gun. The page loads nothing from elsewhere, and all names are escaped.
 
-`folder` is what `beyond-mocap reconstruct FOLDER --out OUT` wrote. Pictures are PNGs as bytes; matplotlib is imported
-inside functions.
+    page = build_trials_report(folder)
+
+`folder` is the output of `beyond-mocap reconstruct FOLDER --out OUT`. Pictures are PNGs as bytes; matplotlib is
+imported inside functions.
 """
 
 from __future__ import annotations
@@ -25,9 +27,15 @@ _BINS = 24
 
 
 def trials_report(folder: Path) -> str:
-    """The page, as text: how well markers fit and how long it took, where throws land, how fast they are.
+    """Build the page.
 
-    InputError where the folder holds no reports, or matplotlib is not installed."""
+    Args:
+        folder: the output folder of a reconstructed folder of trials.
+    Returns:
+        The page as HTML text.
+    Raises:
+        InputError: if the folder has no reports, or matplotlib is not installed.
+    """
     results = read_results(Path(folder))
     made = [result for result in results if not result.error]
     title = Path(folder).resolve().name
@@ -39,14 +47,15 @@ def trials_report(folder: Path) -> str:
 
 
 def _fit_text(made: Sequence[TrialResult]) -> html.Html:
+    """Describe how well the markers fit and how fast the solver is."""
     residual, single = (_mean([getattr(r, name) for r in made]) for name in ("residual", "single"))
     rate = _mean([r.rate for r in made])
-    said = f"Residuals {residual:.1f} mm (segments alone {single:.1f} mm), {rate:.0f} frames a second on the whole."
-    return html.element("p", f"{said} Bars end one standard deviation up and down.")
+    said = f"Residuals {residual:.1f} mm (segments alone {single:.1f} mm), {rate:.0f} frames per second overall."
+    return html.element("p", f"{said} Error bars show one standard deviation.")
 
 
 def _throws(made: Sequence[TrialResult]) -> list[html.Html]:
-    """What there is to say of throws; nothing where none was found."""
+    """Build the sections on throws; none where no throw was found."""
     thrown = [result for result in made if result.throw is not None]
     if not thrown:
         return []
@@ -65,6 +74,7 @@ def _throws(made: Sequence[TrialResult]) -> list[html.Html]:
 
 
 def _speed_text(estimated: np.ndarray, measured: np.ndarray) -> html.Html:
+    """Describe the differences between estimated and measured speeds, with both tests."""
     found = compare_speeds(estimated, measured)
     many = "throws" if found.count != 1 else "throw"
     lines = [f"{found.count} {many} with a measured speed: estimated - measured {found.mean:+.2f} m/s"
@@ -75,11 +85,12 @@ def _speed_text(estimated: np.ndarray, measured: np.ndarray) -> html.Html:
     if np.isfinite(found.wilcoxon):
         lines.append(f"No difference (Wilcoxon, paired, two-sided): p = {found.wilcoxon:.4f}.")
     else:
-        lines.append(f"Too few or too equal for the paired test, which needs {LEAST} throws.")
+        lines.append(f"No paired test: it needs at least {LEAST} throws that differ.")
     return html.fragment(*(html.element("p", line) for line in lines))
 
 
 def _table(results: Sequence[TrialResult]) -> html.Html:
+    """Build the table of all trials."""
     number = html.build_title
     titles = ("trial", "subject", number("frames"), number("residual, mm"), number("frames/s"), "hand",
               number("speed, m/s"), number("radar"), "")
@@ -104,8 +115,13 @@ def _mean(values: Sequence[float]) -> float:
 
 
 def draw_residuals_and_time(results: Sequence[TrialResult]) -> bytes:
-    """Fig. 8.1: weighted squared residuals a frame, and milliseconds a frame, by subject; bars end one standard
-    deviation up and down."""
+    """Draw figure 8.1: weighted squared residuals and milliseconds per frame, by subject, with one standard deviation.
+
+    Args:
+        results: the results; failed trials are left out.
+    Returns:
+        A PNG image.
+    """
     made = [result for result in results if not result.error]
     subjects = sorted({result.subject for result in made})
     figure, (left, right) = _canvas(1, 2, 3.6)
@@ -114,15 +130,21 @@ def draw_residuals_and_time(results: Sequence[TrialResult]) -> bytes:
     names = [subject or "no name" for subject in subjects]
     _bar(left, names, [1e4 * mean for mean, _ in squares], [1e4 * sd for _, sd in squares])
     left.set_ylabel("cm², sum over markers")
-    left.set_title("squared residuals a frame, weighted", loc="left", fontsize=9.5)
+    left.set_title("squared residuals per frame, weighted", loc="left", fontsize=9.5)
     _bar(right, names, [np.mean(t) if t else np.nan for t in times], [np.std(t) if t else 0.0 for t in times])
     right.set_ylabel("ms")
-    right.set_title("time a frame of the pose", loc="left", fontsize=9.5)
+    right.set_title("solving time per frame", loc="left", fontsize=9.5)
     return _png(figure)
 
 
 def draw_residuals_by_trial(results: Sequence[TrialResult]) -> bytes:
-    """Root mean square residuals of every trial, beside what fitting each segment alone leaves."""
+    """Draw the root mean square residuals of every trial, beside those of fitting each segment alone.
+
+    Args:
+        results: the results; failed trials are left out.
+    Returns:
+        A PNG image.
+    """
     made = [result for result in results if not result.error]
     figure, (ax,) = _canvas(1, 1, 0.9 + 0.28 * len(made))
     rows = np.arange(len(made))
@@ -137,7 +159,13 @@ def draw_residuals_by_trial(results: Sequence[TrialResult]) -> bytes:
 
 
 def draw_impact_map(points: np.ndarray) -> bytes:
-    """Fig. 8.2: how many throws land where, points (N, 2) m as `aligned_impacts` gives them, and their margins."""
+    """Draw figure 8.2: how many throws land where, with both marginal histograms.
+
+    Args:
+        points: (N, 2) metres, as `align_impacts` returns them.
+    Returns:
+        A PNG image.
+    """
     from matplotlib.figure import Figure
     from matplotlib.ticker import MaxNLocator
 
@@ -159,7 +187,14 @@ def draw_impact_map(points: np.ndarray) -> bytes:
 
 
 def draw_impact_scatter(results: Sequence[TrialResult], points: np.ndarray) -> bytes:
-    """Fig. 8.3: where each subject's throws land, by dominant and other arm."""
+    """Draw figure 8.3: where each subject's throws land, by dominant and other arm.
+
+    Args:
+        results: N results.
+        points: (N, 2) metres, as `align_impacts` returns them.
+    Returns:
+        A PNG image.
+    """
     sides = dominant_sides(results)
     figure, axes = _canvas((len(sides) + 2) // 3, min(len(sides), 3), 3.6)
     for ax, (subject, strong) in zip(axes, sorted(sides.items())):
@@ -178,7 +213,14 @@ def draw_impact_scatter(results: Sequence[TrialResult], points: np.ndarray) -> b
 
 
 def draw_speeds(measured: np.ndarray, estimated: np.ndarray) -> bytes:
-    """Fig. 8.4: how speeds (N,) m/s are spread, measured and estimated, and pair by pair."""
+    """Draw figure 8.4: the distribution of speeds, measured and estimated, and the pairs.
+
+    Args:
+        measured: (N,) m/s.
+        estimated: (N,) m/s.
+    Returns:
+        A PNG image.
+    """
     figure, (left, right) = _canvas(1, 2, 3.8)
     edges = _edges(np.concatenate([measured, estimated]), 16)
     for values, colour, name in ((measured, QUIET, "measured"), (estimated, DOMINANT, "estimated")):
@@ -200,7 +242,7 @@ def draw_speeds(measured: np.ndarray, estimated: np.ndarray) -> bytes:
 
 
 def _over_frames(made: Sequence[TrialResult]) -> tuple[float, float]:
-    """Mean and standard deviation over all frames of several trials."""
+    """Return mean and standard deviation of the squared residuals over all frames of several trials."""
     count = np.array([r.frames for r in made], float)
     mean, spread = np.array([r.squares for r in made], float).reshape(-1, 2).T
     known = np.isfinite(mean) & np.isfinite(spread) & (count > 0)
@@ -208,6 +250,7 @@ def _over_frames(made: Sequence[TrialResult]) -> tuple[float, float]:
         return np.nan, 0.0
     share = count[known] / count[known].sum()
     whole = float(share @ mean[known])
+    # total variance = mean of (variance + squared mean) minus the squared total mean
     return whole, float(np.sqrt(max(share @ (spread[known] ** 2 + mean[known] ** 2) - whole**2, 0.0)))
 
 
@@ -218,6 +261,7 @@ def _bar(ax, names, values, spread) -> None:
 
 
 def _ground(ax) -> None:
+    """Label the axes of an impact plot and mark the thrower."""
     ax.set_xlabel("m to the right of the throw", fontsize=8)
     ax.set_ylabel("m from the hips", fontsize=8)
     ax.tick_params(labelsize=8)
@@ -227,6 +271,7 @@ def _ground(ax) -> None:
 
 
 def _edges(values: np.ndarray, bins: int = _BINS) -> np.ndarray:
+    """Return the edges of `bins` bins over the values, with a margin of 5 %."""
     low, high = float(np.min(values)), float(np.max(values))
     room = max(0.05 * (high - low), 0.25)
     return np.linspace(low - room, high + room, bins + 1)
@@ -237,7 +282,7 @@ def _short(name: str) -> str:
 
 
 def _canvas(rows: int, columns: int, height: float):
-    """A figure without a window, and its axes row by row."""
+    """Build a figure without a window; return it with its axes, row by row."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(_WIDTH, height * rows), dpi=_DPI, layout="constrained")

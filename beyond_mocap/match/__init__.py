@@ -1,11 +1,12 @@
-"""A whole match in pieces, made by any number of processes.
+"""Synthesis of a whole match in pieces, by any number of processes.
 
-- `order`        what is asked; `folder` where it is made, by one run at a time; `state` what match.json says
-- `make`         the whole way
-- `roles`        who is there when and where; `words` what each does with the ball, by `event_clock` from events too
-- `parts`        each player's orders; `player_edit` all that is kept of a player, and its file
-- `expand`       the motion of any span of it; `shown` the same as it is to be seen; `match_ball` the ball
-- `pieces`       the stages, the work in pieces and the processes that do it
-- `crowd`        bodies kept apart
+- `request`      what is requested; `folder` where the results are, one run at a time; `state` the content of match.json
+- `synthesize_match`  all stages in order
+- `roles`        who is present when and where; `labels` what each player does with the ball, with `event_clock` from
+  events too
+- `player_plans` each player's plans; `player_edit` everything stored about a player, and its file
+- `player_motion` the motion of any span of a player; `displayed_motion` the same as it is displayed; `match_ball` the
+ball - `pieces`       the stages, the work in pieces and the processes that do it
+- `crowd`        collision avoidance
 - `report`       the page over a match
 """

@@ -1,13 +1,13 @@
-"""Events brought to the tracking's clock: people and their software write events down seconds late, and their clock may
-run apart from the cameras'.
+"""Align events with the tracking's clock: events are noted by people and software seconds late, and their clock may
+drift
+against the cameras'.
 
-Touches of the ball are solved from tracking (`solve_ball`); an event of a player belongs to one of his touches. Over
-all pairs of an event and a touch of the same player, the difference of times that comes most often is the lag of a
-period; a line through the pairs near it takes out what the clocks run apart. People are seconds late, not minutes, so a
-far lag counts for less than a near one, by a Cauchy distribution around none: among few pairs a near one wins, and a
-clock that is minutes off needs some three agreeing pairs more than one that is seconds off. Events are believed where
-so many fit that chance does not explain it, at any lag as likely as theirs. Then each player's events and touches are
-brought together in order, as two lines of text are.
+Touches are solved from tracking (`solve_ball`); an event of a player belongs to one of their touches. Over all pairs of
+an event and a touch of the same player, the most frequent time difference is the lag of a period; a line through the
+pairs near it gives the drift. Events are seconds late, not minutes, so a large lag counts for less than a small one, by
+a Cauchy distribution around zero: among few pairs a small lag wins, and a clock that is minutes off needs about three
+agreeing pairs more than one that is seconds off. A period's events are used if so many fit that chance does not explain
+it, at any lag as likely as theirs. Then each player's events and touches are paired in order, like two lines of text.
 """
 
 from __future__ import annotations
@@ -25,40 +25,47 @@ from ..files.event_data import CERTAIN, MatchEvent, MatchEvents
 from ..motion.track.match_data import Half
 
 MOST_LAG = 300.0
-"""Seconds by which clocks may differ: a feed whose clock begins elsewhere, if enough of its events say so."""
+"""s by which clocks may differ, for a feed whose clock starts elsewhere, if enough of its events agree."""
 
 WINDOW = 2.0
-"""Seconds from its place on the corrected clock within which an event's touch is looked for."""
+"""s around an event's time on the corrected clock within which its touch may be."""
 
-_BIN = 0.1  # s of lag that are told apart
-_SPREAD = 0.5  # s by which lags of one period scatter
-_MOST_DRIFT = 0.002  # s a second
-_FEWEST = 8  # events whose players touch the ball, below which nothing can be told
-_INSIDE = 4  # passes and shots within what was solved, below which a lag may be chance
-_SURE = 30  # pairs from which a drift is told from scatter
-_TELLING = 15  # of them, below which events that do not fit may be of this match all the same
-_LEAST_MATCHED, _ABOVE_CHANCE = 0.3, 1.6  # share of the certain events that must fit, and how much more than by chance
-_USUAL_LAG = 5.0  # s
-_LEAST_CHANCE = 0.04  # of an event to fit with a wrong lag: few events in a short span show it badly
-_LEAST_SURE = 4.0  # nats
-_PAIR = 2.7  # nats that a pair is worth
-_DOUBTFUL = 0.3  # of an event that may be no touch, where one that is a touch for certain counts 1
+_BIN = 0.1  # s, width of a bin of lags
+_SPREAD = 0.5  # s, scatter of the lags of one period
+_MOST_DRIFT = 0.002  # s per second
+_FEWEST = 8  # events of players who touch the ball: with fewer the lag is unknown
+_INSIDE = 4  # passes and shots in the solved time: with fewer a lag may be chance
+_SURE = 30  # pairs: with fewer, drift cannot be separated from scatter
+_TELLING = 15  # certain events: with fewer, a bad fit does not prove another match
+_LEAST_MATCHED, _ABOVE_CHANCE = 0.3, 1.6  # least share of certain events that fit, and least ratio to chance
+_USUAL_LAG = 5.0  # s, scale of the Cauchy distribution of lags
+_LEAST_CHANCE = 0.04  # least probability to fit with a wrong lag: few events estimate it badly
+_LEAST_SURE = 4.0  # nats that make a clock certain
+_PAIR = 2.7  # nats that one pair is worth
+_DOUBTFUL = 0.3  # weight of an event that may be no touch, relative to a certain one
 _SENDING = {kind.name for kind in EVENT_KINDS if kind.ball == "sends"}
 _TAKING = {kind.name for kind in EVENT_KINDS if kind.ball == "takes"}
 _SENT = {kind.name for kind in TOUCH_KINDS if kind.ball == "sends"}
 _TAKEN = {kind.name for kind in TOUCH_KINDS if kind.ball == "takes"}
-_CHANCES = (-97.0, -71.0, -53.0, -37.0, 37.0, 53.0, 71.0, 97.0)  # s by which lags are wrong for certain
-_NEAR = 1.0  # s within which an event fits, for these shares
-_UNLIKE = 0.6  # s that another kind or part of the body is worth
-_NO_TOUCH = 1.4  # s that an event without a touch is worth
+_CHANCES = (-97.0, -71.0, -53.0, -37.0, 37.0, 53.0, 71.0, 97.0)  # s added to a lag to measure fits by chance
+_NEAR = 1.0  # s between event and touch within which they fit
+_UNLIKE = 0.6  # s, cost of another kind or body part
+_NO_TOUCH = 1.4  # s, cost of an event without a touch
 
 
 @dataclass(frozen=True, kw_only=True)
 class PeriodClock:
-    """lag: s that events of a period are later than their touches, at its begin; drift: s that it grows each second.
-    spread: s, the usual distance from it (median absolute deviation times 1.48). matched: share of the events that are
-    touches for certain which have one; by_chance: the same with wrong lags. told: how many these events are. sure:
-    nats, how unlikely it is that so many fit by chance at a lag as far off (`_sure`)."""
+    """The clock of one period's events.
+
+    Attributes:
+        lag: s that events are later than their touches, at the start of the period.
+        drift: s per second by which the lag grows.
+        spread: s, the usual distance from the lag (median absolute deviation times 1.48).
+        matched: share of the certain events that have a touch.
+        by_chance: the same with wrong lags.
+        told: number of certain events.
+        sure: nats, how unlikely it is that so many fit by chance at a lag as large (`_compute_confidence`).
+    """
 
     lag: float
     drift: float
@@ -70,15 +77,21 @@ class PeriodClock:
 
     @property
     def fits(self) -> bool:
-        """Whether its events fit touches better than by chance."""
+        """True if its events fit touches better than by chance."""
         return self.sure >= _LEAST_SURE and self.matched >= max(_LEAST_MATCHED, _ABOVE_CHANCE * self.by_chance)
 
 
 @dataclass(frozen=True, kw_only=True)
 class AlignedEvents:
-    """The events of a match on the tracking's clock. events: as given. times: (E,) s of each on the match's clock, lag
-    taken out; NaN in halves whose clock cannot be set. touches: (E,) the index of each one's solved touch, -1 where it
-    has none. clocks: period -> its clock. notes: lines for people."""
+    """The events of a match on the tracking's clock.
+
+    Attributes:
+        events: as given.
+        times: (E,) s on the match's clock, lag removed; NaN in halves whose clock is unknown.
+        touches: (E,) index of each event's touch, -1 if it has none.
+        clocks: clock by period.
+        notes: messages for people.
+    """
 
     events: tuple[MatchEvent, ...]
     times: np.ndarray
@@ -91,12 +104,21 @@ def aligned(
     events: MatchEvents, touches: Sequence[SolvedTouch], halves: Sequence[Half],
     span: tuple[float, float] | None = None,
 ) -> AlignedEvents:
-    """Events on the tracking's clock, each with its touch.
+    """Align events with the tracking's clock and pair them with touches.
 
-    touches: solved, on the match's clock, in order; halves: of the match. span: seconds within which
-    touches were solved, by default all; events outside it keep their place and no touch. A period whose events fit no
-    better than by chance is left out. InputError where that is so of all, and of many events: they are of another
-    match."""
+    A period whose events fit no better than by chance is left out.
+
+    Args:
+        events: the provider's events.
+        touches: solved, on the match's clock, in order.
+        halves: of the match.
+        span: (start, end) s in which touches were solved, by default all; events outside keep their time and have no
+            touch.
+    Returns:
+        The events with times and touches.
+    Raises:
+        InputError: if no period fits and there are many events: they belong to another match.
+    """
     span = span or (-np.inf, np.inf)
     times, clocks, notes = np.full(len(events.events), np.nan), {}, []
     for half in halves:
@@ -105,13 +127,13 @@ def aligned(
         found = _half_clock([events.events[i] for i in members], own, half, span)
         if found is None:
             if members and own:
-                told = "too few events of players who touch the ball to set its clock: they are left out"
+                told = "too few events of players who touch the ball to align its clock; its events are ignored"
                 notes.append(f"period {half.number}: {told}")
             continue
         clocks[half.number], times[members] = found
     _check(events, clocks)
     for number in [number for number, clock in clocks.items() if not clock.fits]:
-        notes.append(f"{_told(number, clocks.pop(number))}, which may be chance: they are left out")
+        notes.append(f"{_told(number, clocks.pop(number))}, which may be chance; its events are ignored")
         times[[i for i, event in enumerate(events.events) if event.period == number]] = np.nan
     pairs = _pairs(events.events, times, touches)
     notes += [_told(number, clock) for number, clock in clocks.items()]
@@ -119,8 +141,10 @@ def aligned(
 
 
 def _half_clock(events, touches, half: Half, span) -> tuple[PeriodClock, np.ndarray] | None:
-    """A half's clock, and its events' times (E,) s on the match's; None where nothing can be told. A clock that does
-    not count from the half's begin is tried from its first frame."""
+    """Fit a half's clock; return it and its events' times (E,) s on the match's clock, None if it is unknown.
+
+    A clock that does not count from the start of the half is tried from its first frame too.
+    """
     since = np.array([event.time for event in events])
     tried = []
     for zero in dict.fromkeys((half.zero, half.start)):
@@ -131,16 +155,16 @@ def _half_clock(events, touches, half: Half, span) -> tuple[PeriodClock, np.ndar
 
 
 def _told(number: int, clock: PeriodClock) -> str:
-    drift = f", {1000.0 * clock.drift:+.2f} s more in 1000 s" if clock.drift else ""
+    drift = f", drifting {1000.0 * clock.drift:+.2f} s in 1000 s" if clock.drift else ""
     return (
         f"period {number}: events come {clock.lag:.2f} s after their touches{drift}, "
-        f"give or take {clock.spread:.2f} s; "
+        f"± {clock.spread:.2f} s; "
         f"{clock.matched:.0%} of passes and shots fit (by chance {clock.by_chance:.0%})"
     )
 
 
 def _clock(events, since, touches, start: float, span) -> PeriodClock | None:
-    """The clock of one period, that stands at 0 at `start` s: since (E,) s are its events' times on it."""
+    """Fit the clock of one period, which is 0 at `start` s; since: (E,) s, its events' times on it."""
     when = np.array([touch.time - start for touch in touches])
     who = np.array([touch.player for touch in touches])
     sent = np.array([touch.kind in _SENT for touch in touches], bool)
@@ -161,6 +185,7 @@ def _clock(events, since, touches, start: float, span) -> PeriodClock | None:
     right, wrong = fit.at([lag]), fit.at([lag + by for by in _CHANCES])
     if right[0, 1] < _INSIDE:
         return None
+    # 1.48 turns the median absolute deviation of a normal distribution into its standard deviation.
     rest = early - late * (1.0 + drift) - lag
     near = rest[np.abs(rest) < 3.0 * _SPREAD]
     spread = 1.48 * float(np.median(np.abs(near - np.median(near)))) if len(near) else np.nan
@@ -172,7 +197,9 @@ def _clock(events, since, touches, start: float, span) -> PeriodClock | None:
 
 
 def _commonest(lags: np.ndarray, weights: np.ndarray) -> float:
-    """The lag (s) around which most weight lies, within _SPREAD, less what a far one costs; of equal ones the least."""
+    """Find the lag (s) with most weight within _LAG_SPREAD, minus the cost of a large lag; of equal ones the
+    smallest.
+    """
     edges = np.arange(-MOST_LAG - 1.0, MOST_LAG + 1.0 + _BIN, _BIN)
     counts, _ = np.histogram(lags, edges, weights=weights)
     reach = np.arange(-15, 16) * _BIN
@@ -184,13 +211,15 @@ def _commonest(lags: np.ndarray, weights: np.ndarray) -> float:
 
 
 def _far(lag):
-    """Nats by which a lag (s) is less likely than none: long tails (Cauchy's) around the usual ones."""
+    """Compute the nats by which a lag (s) is less likely than none: a Cauchy distribution around the usual lags."""
     return np.log1p((lag / _USUAL_LAG) ** 2)
 
 
 def _line(early: np.ndarray, late: np.ndarray, lag: float) -> tuple[float, float]:
-    """Lag at the begin and drift of the line through the pairs near `lag`, those far from it counting less and less;
-    a drift only where many pairs over a long time tell of one."""
+    """Fit lag and drift through the pairs near `lag`; distant pairs count less and less.
+
+    A drift is accepted only if many pairs over a long time show it.
+    """
     found, drift = lag, 0.0
     for reach in (6.0 * _SPREAD, 4.0 * _SPREAD, 3.0 * _SPREAD, 2.0 * _SPREAD, 2.0 * _SPREAD):
         off = early - late * (1.0 + drift) - found
@@ -198,6 +227,7 @@ def _line(early: np.ndarray, late: np.ndarray, lag: float) -> tuple[float, float
         if np.count_nonzero(near) < _FEWEST:
             break
         x, y = late[near], (early - late)[near]
+        # Tukey's biweight; the reach shrinks from round to round.
         weights = (1.0 - (off[near] / reach) ** 2) ** 2
         middle = np.average(x, weights=weights)
         around = np.average((x - middle) ** 2, weights=weights)
@@ -211,8 +241,16 @@ def _line(early: np.ndarray, late: np.ndarray, lag: float) -> tuple[float, float
 
 
 class _Fit:
-    """Which events of players have a touch of theirs within _NEAR, at one lag or another. when (T,) s and who (T,) of
-    touches, since (E,) s of events and span s on the period's clock."""
+    """Count events that have a touch of their player within _FIT_SECONDS, at any lag.
+
+    Args:
+        events: E events.
+        since: (E,) s of events on the period's clock.
+        when: (T,) s of touches on the period's clock.
+        who: (T,) players of the touches.
+        span: (start, end) s on the period's clock.
+        drift: s per second.
+    """
 
     def __init__(self, events, since: np.ndarray, when: np.ndarray, who: np.ndarray, span, drift: float):
         self._span, self._drift, self._rows = span, drift, []
@@ -226,7 +264,7 @@ class _Fit:
             self._rows.append((since[own], certain[own], edges))
 
     def at(self, lags) -> np.ndarray:
-        """[fitting, all] within the span: of those that are touches for certain, and of the others; over all `lags`."""
+        """Count [fitting, all] within the span over all `lags`: row 0 certain events, row 1 the others."""
         out = np.zeros((2, 2), int)
         for since, certain, edges in self._rows:
             there = (since - np.reshape(lags, (-1, 1))) / (1.0 + self._drift)
@@ -239,7 +277,9 @@ class _Fit:
 
 
 def _sure(fitting: int, count: int, chance: float) -> float:
-    """Nats: how unlikely it is that as many of `count` fit by `chance` (Chernoff's bound of a binomial's tail)."""
+    """Compute the nats: how unlikely it is that as many of `count` fit by `chance` (Chernoff's bound of a binomial
+    tail).
+    """
     chance = min(max(chance, _LEAST_CHANCE), 0.99)
     share = fitting / max(count, 1)
     if share <= chance:
@@ -249,7 +289,7 @@ def _sure(fitting: int, count: int, chance: float) -> float:
 
 
 def _check(events: MatchEvents, clocks: Mapping[int, PeriodClock]) -> None:
-    """InputError where no period fits better than by chance, and there are enough events to tell."""
+    """Check that a period fits better than by chance, if there are enough events; InputError otherwise."""
     many = sum(clock.told for clock in clocks.values()) >= _TELLING
     if many and not any(clock.fits for clock in clocks.values()):
         best = max(clocks.values(), key=lambda clock: clock.matched)
@@ -258,7 +298,7 @@ def _check(events: MatchEvents, clocks: Mapping[int, PeriodClock]) -> None:
 
 
 def _pairs(events: Sequence[MatchEvent], times: np.ndarray, touches: Sequence[SolvedTouch]) -> np.ndarray:
-    """(E,) the index of each event's touch, -1 for none: for each player the cheapest way to bring both in order."""
+    """Pair each player's events with touches at the lowest cost, in order; (E,) touch indices, -1 for none."""
     out = np.full(len(events), -1)
     for player in sorted({event.player for event in events if event.player}):
         own = [i for i, event in enumerate(events) if event.player == player and event.played and np.isfinite(times[i])]
@@ -270,9 +310,11 @@ def _pairs(events: Sequence[MatchEvent], times: np.ndarray, touches: Sequence[So
 
 
 def _together(own, his, events, times, touches) -> list[tuple[int, int]]:
-    """Pairs (event, touch) in the order of both, by dynamic programming."""
+    """Pair events and touches (event, touch) in the order of both, by dynamic programming."""
     best = np.full((len(own) + 1, len(his) + 1), np.inf)
     best[0], way = 0.0, np.zeros(best.shape, int)
+    # best[r, c]: lowest cost of the first r events and c touches. Steps: 0 the event has no touch,
+    # 1 the touch has no event, 2 they are a pair.
     for row, event in enumerate(own, 1):
         best[row, 0] = best[row - 1, 0] + _NO_TOUCH
         for column, touch in enumerate(his, 1):
@@ -290,7 +332,7 @@ def _together(own, his, events, times, touches) -> list[tuple[int, int]]:
 
 
 def _unlike(event: MatchEvent, touch: SolvedTouch, time: float) -> float:
-    """Seconds: how far a touch is from an event, and how unlike it; inf beyond WINDOW."""
+    """Compute how much a touch differs from an event, in s; inf beyond PAIR_WINDOW."""
     off = abs(touch.time - time)
     if off > WINDOW:
         return np.inf

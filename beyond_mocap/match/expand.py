@@ -1,9 +1,9 @@
-"""The motion of any span of a player, out of their edit list; takes of a player joined, and cut.
+"""Construct the motion of any span of a player from their edit list; join takes of a player, and cut them.
 
-A player is laid out in windows of a fixed grid, each with some seconds around it, and one window hands over to the
-next at their edge. So a frame is made in the same way whatever span is asked for, and comes out bit for bit the same;
-only the signs of quaternions, which are continuous within a motion, may be the other ones. No more than two windows are
-in memory beside what comes out.
+A player is constructed in windows of a fixed grid, each with some seconds around it, and one window blends into the
+next at their edge. So a frame is constructed in the same way whatever span is requested, and is the same bit for bit;
+only the signs of quaternions, which are continuous within a motion, may differ. No more than two windows are in memory
+besides the result.
 """
 
 from __future__ import annotations
@@ -34,16 +34,16 @@ from .pieces.units import cut_plan, frame_count, window_edges
 from .player_edit import PlayerEdit, Stretch
 
 AROUND = 4.0
-"""Seconds on either side of a window that are laid out too."""
+"""s on either side of a window that are constructed too."""
 
 HAND_OVER = 0.5
-"""Seconds behind an edge in which the motion of the window before goes over into the next one's."""
+"""s after an edge in which the motion of the window before blends into the next one's."""
 
 SETTLED = 2.0
-"""Seconds behind an edge within which a foot that stands has come to where the next window has it."""
+"""s after an edge within which a foot in contact reaches its position in the next window."""
 
 _PINNED = 1e-9
-"""Share of a frame's own place that is as good as nothing, and holds it there."""
+"""A share that counts as zero but fixes a frame at its own position."""
 
 Progress = Callable[[float, str], None]
 
@@ -53,14 +53,22 @@ _SAME_TIME = 1e-6
 def expanded(
     library: Library, edit: PlayerEdit, start: float, end: float, progress: Progress | None = None
 ) -> tuple[Take, ...]:
-    """What a player does from `start` to `end` seconds of the match: one take for each of his stretches on the pitch
-    that reaches into it.
+    """Construct what a player does in a span of the match: one take for each stretch on the pitch that reaches into it.
 
-    library: the recordings. A take's first frame is the stretch's first one that is not before `start`; its plan is the
-    order of that time, and it has no edit list. progress(fraction, text) is called now and then. InputError where the
-    library lacks a clip that is shown, and where `end` is not behind `start`."""
+    Args:
+        library: the clips.
+        edit: the player's edit list.
+        start: s on the match's clock.
+        end: s on the match's clock.
+        progress: receives the share done and a text.
+    Returns:
+        Takes; the first frame of each is the stretch's first one at or after `start`. Its plan is that of its time; it
+        has no edit list.
+    Raises:
+        InputError: if the library lacks a clip that is used, or `end` is not after `start`.
+    """
     if not end > start:
-        raise InputError("times", f"{start:g} to {end:g} s", "an end behind the start")
+        raise InputError("times", f"{start:g} to {end:g} s", "an end after the start")
     report = progress or (lambda fraction, text: None)
     takes = []
     for number, stretch in enumerate(edit.stretches):
@@ -75,8 +83,15 @@ def expanded(
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class _Window:
-    """Frames low .. high of a stretch at the output's rate, laid out with those around them as `take`, whose first
-    frame is frame `first` of the stretch. standing: (T, 2) bool of its feet, heel or toe."""
+    """One constructed window.
+
+    Attributes:
+        low: first frame of the window in the stretch, at the output's rate.
+        high: end frame of the window.
+        first: frame of the stretch of the take's first frame.
+        take: the window with the frames around it.
+        foot_contacts: (T, 2) bool, heel or toe of each foot in contact.
+    """
 
     low: int
     high: int
@@ -86,7 +101,7 @@ class _Window:
 
 
 class _Layout:
-    """A stretch and the grid in which it is laid out."""
+    """A stretch and the grid of windows in which it is constructed."""
 
     def __init__(self, library: Library, window: float, stretch: Stretch):
         self.plan, self.edit = stretch.plan, stretch.edit
@@ -97,7 +112,7 @@ class _Layout:
         self.edges = window_edges(self.begin, self.count, window, self.fps, step=1)
 
     def take(self, start: float, end: float, tell: Callable[[float], None]) -> Take | None:
-        """Frames from `start` to `end` s; None where there are fewer than two."""
+        """Construct the frames from `start` to `end` s; None if there are fewer than two."""
         low = max(0, int(np.ceil((start - self.begin) * self.fps - 1e-6)))
         high = min(self.count, int(np.floor((end - self.begin) * self.fps + 1e-6)) + 1)
         if high - low < 2:
@@ -106,7 +121,7 @@ class _Layout:
         return one_take(parts, cut_plan(self.plan, self._time(low), self._time(high - 1)))
 
     def _parts(self, low: int, high: int, tell: Callable[[float], None]) -> Iterator[Take]:
-        """Frames low .. high, window by window."""
+        """Iterate over the frames low .. high, window by window."""
         settled = int(round(SETTLED * self.fps))
         numbers = [n for n, (a, b) in enumerate(zip(self.edges, self.edges[1:])) if a < high and b > low]
         before = None
@@ -120,7 +135,7 @@ class _Layout:
             before = window
 
     def _window(self, number: int) -> _Window:
-        """The window with what lies around it; its own key moments only count where they lie in it."""
+        """Construct a window with its margins; only key moments within its plan count."""
         low, high = self.edges[number : number + 2]
         around = int(round(AROUND * self.fps))
         first, end = max(0, low - around), min(self.count, high + around)
@@ -131,8 +146,9 @@ class _Layout:
         return _Window(low=low, high=high, first=first, take=take, standing=self._standing(shown_here, take))
 
     def _shown(self, plan: Plan, at: float) -> EditList:
-        """What is shown in the time of a plan that begins at frame `at` (fractional) of the stretch, at the library's
-        rate."""
+        """Select the edit list of a plan that starts at frame `at` (fractional) of the stretch, at the library's
+        rate.
+        """
         count, whole = frame_count(plan), int(at)
         edit = part(self.edit, whole, min(whole + count + 1, len(self.edit)))
         edit = bound(self.library, edit, plan.timeline.keys)
@@ -140,7 +156,7 @@ class _Layout:
         return EditList(clip, frame, np.flatnonzero(np.diff(piece)) + 1, edit.keys)
 
     def _standing(self, edit: EditList, take: Take) -> np.ndarray:
-        """(T, 2) bool: feet of which heel or toe stand."""
+        """Find the feet (T, 2) bool whose heel or toe is in contact."""
         index = np.minimum(np.arange(len(take.motion)) * (FPS / self.fps), len(edit) - 1)
         what = shown(self.library, edit, index)
         frame, clips = np.round(what.clip_frame).astype(int), self.library.clips
@@ -152,7 +168,7 @@ class _Layout:
 
 
 def _handed_over(before: _Window, window: _Window, settled: int) -> Take:
-    """The window's take, whose first `settled` own frames set out from where the window before ends."""
+    """Blend the first `settle_frames` own frames of a window's take from where the window before ends."""
     take, old, fps = window.take, before.take, window.take.motion.fps
     hand = int(round(HAND_OVER * fps))
     settled = min(settled, len(take.motion) - (window.low - window.first) - 1)
@@ -160,6 +176,7 @@ def _handed_over(before: _Window, window: _Window, settled: int) -> Take:
     then = slice(window.low - before.first, window.low - before.first + hand)
     ahead = np.arange(settled + 1)
     share = eased(1.0 - (ahead + 1.0) / (hand + 1.0), np.ones(len(ahead)))
+    # Over BLEND_SECONDS the old pose fades out; feet in contact may take until the settle time.
     share[-1] = _PINNED
     places, turns = take.motion.root_positions[at].copy(), take.motion.rotations[at].copy()
     new = places.copy(), turns.copy()
@@ -175,7 +192,7 @@ def _handed_over(before: _Window, window: _Window, settled: int) -> Take:
 def _ball_handed(
     old: BallPath | None, new: BallPath | None, then: slice, first: int, share: np.ndarray
 ) -> BallPath | None:
-    """The new path of the ball, which sets out on the old one: a share (H,) of it at frames first ... of the new."""
+    """Blend the start of the new ball path from the old one: its share (H,) at frames first ... of the new."""
     if old is None or new is None:
         return new
     places, before = new.positions.copy(), old.positions[then]
@@ -186,8 +203,15 @@ def _ball_handed(
 
 
 def own_part(take: Take, first: int, end: int) -> Take:
-    """Frames first .. end of a take, with the key moments, pins, touches and warnings of that time. It has no edit
-    list, and nothing that would be needed to edit it."""
+    """Cut frames first .. end out of a take, with the key moments, pins, touches and warnings of that time.
+
+    Args:
+        take: the take.
+        first: first frame.
+        end: end frame.
+    Returns:
+        The take, without edit list and without what editing needs.
+    """
     inside = slice(first, end)
     begin, fps = take.start_time + first / take.motion.fps, take.motion.fps
     until = begin + (end - first) / fps
@@ -221,20 +245,27 @@ def _within(time: float, begin: float, until: float) -> bool:
 
 
 def _told_in(line: str, begin: float, until: float) -> bool:
-    """Whether a line is about no time, or about one that begins here."""
+    """Say whether a warning is about no time, or about a time that starts here."""
     spans = spans_of(line)
     return not spans or _within(spans[0][0], begin, until)
 
 
 def _between(timeline: Timeline, begin: float, until: float) -> Timeline:
-    """Spans cut to a time, and the key moments in it."""
+    """Cut spans to a time, and select the key moments in it."""
     spans = [span for span in timeline.spans if span.start < until - _SAME_TIME and span.end > begin + _SAME_TIME]
     cut = [replace(span, start=max(span.start, begin), end=min(span.end, until)) for span in spans]
     return Timeline(tuple(cut), tuple(key for key in timeline.keys if _within(key.in_force, begin, until)))
 
 
 def one_take(takes: Sequence[Take], plan: Plan) -> Take:
-    """Takes that follow each other without a gap, as one; plan: the order of their time."""
+    """Join takes that follow each other without a gap.
+
+    Args:
+        takes: in order of time.
+        plan: the plan of their whole time.
+    Returns:
+        One take.
+    """
     clips = tuple(dict.fromkeys(path for take in takes for path in take.clips))
     number = {path: index for index, path in enumerate(clips)}
     firsts = np.cumsum([0, *(len(take.motion) for take in takes)])
@@ -263,7 +294,7 @@ def one_take(takes: Sequence[Take], plan: Plan) -> Take:
 
 
 def _one_timeline(timelines: Sequence[Timeline]) -> Timeline:
-    """Timelines one after the other; a span that goes on in the next is one span."""
+    """Join timelines; a span that continues in the next one becomes one span."""
     spans: list[Span] = []
     for span in sorted((s for each in timelines for s in each.spans), key=lambda span: (span.words, span.start)):
         last = spans[-1] if spans else None
@@ -276,7 +307,7 @@ def _one_timeline(timelines: Sequence[Timeline]) -> Timeline:
 
 
 def _one_ball(takes: Sequence[Take], times: np.ndarray) -> BallPath | None:
-    """The ball of all takes; unknown where one has none, None where none has any. times: (T,) s of all frames."""
+    """Join the balls of all takes at times (T,) s; unknown where a take has none, None if no take has one."""
     if all(take.ball is None for take in takes):
         return None
     empty = [(np.full((len(take.motion), 3), np.nan), np.zeros(len(take.motion), bool)) for take in takes]

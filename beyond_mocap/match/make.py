@@ -1,10 +1,11 @@
-"""The whole way of a match: files in, a folder out (docs/match/match.md).
+"""Synthesize a match: files in, a folder out (docs/match/match.md).
 
-    made = make_match(MatchOrder(tracking=Path("match.dat"), library=Path("clips"), out=Path("made"), end=60.0))
+    result = synthesize_match(MatchRequest(tracking=Path("match.dat"), library=Path("clips"), out=Path("out"),
+    end=60.0))
 
-Read -> who is there when -> the ball solved -> words -> tracks pushed apart -> windows of everybody searched by workers
--> joined into edit lists -> bodies kept apart -> the ball where it is met -> reports. Whatever ends a run, the same
-order goes on where it was, and comes to the same bits.
+Read -> find who is present when -> solve the ball -> labels -> separate tracks -> workers search windows of all players
+-> join them into edit lists -> resolve collisions -> place the ball where it is touched -> reports. However a run ends,
+the same request resumes where it was, with the same bits.
 """
 
 from __future__ import annotations
@@ -38,17 +39,22 @@ from .state import begun, now, row_of
 from .words import MatchWords, words_of
 
 AROUND = 5.0
-"""Seconds before and behind the span in which the ball is solved too."""
+"""s before and after the span in which the ball is solved too."""
 
 _SHARES = {"read": 0.02, "library": 0.07, "ball": 0.12, "search": 0.7, "crowd": 0.8, "figures": 0.98, "page": 1.0}
-"""Where the progress is when a stage is done."""
+"""Progress at the end of each stage."""
 
 Progress = Callable[[float, str], None]
 
 
 @dataclass(frozen=True)
 class MadePlayer:
-    """id: of a player; reason: why he could not be made, ""."""
+    """How a player ended.
+
+    Attributes:
+        id: of the player.
+        reason: why they could not be synthesized, "" if they were.
+    """
 
     id: str
     reason: str = ""
@@ -56,8 +62,15 @@ class MadePlayer:
 
 @dataclass(frozen=True, kw_only=True)
 class MatchResult:
-    """order: what was asked. span: (start, end) s. done, failed: who was made, and who was not. notes: lines for
-    people."""
+    """The result of a match.
+
+    Attributes:
+        request: what was requested.
+        span: (start, end) s.
+        finished: players that were synthesized.
+        failed: players that were not.
+        notes: messages for people.
+    """
 
     order: MatchOrder
     span: tuple[float, float]
@@ -69,11 +82,21 @@ class MatchResult:
 def make_match(
     order: MatchOrder, progress: Progress | None = None, cancelled: Callable[[], bool] | None = None
 ) -> MatchResult:
-    """Makes what of `order` is not in its folder yet.
+    """Synthesize whatever of a request is not in its folder yet.
 
-    progress(fraction, text) is called now and then. A player who cannot be made does not stop the others; match.json
-    and the result say why. InputError for what is wrong with the order, its files or its cluster; Cancelled. What was
-    done till then is kept and found again by the next run."""
+    A player who fails does not stop the others; match.json and the result give the reason. After a cancellation or an
+    error the next run resumes from what is done.
+
+    Args:
+        request: the request.
+        progress: receives the share done and a text.
+        cancelled: called now and then; True cancels the work.
+    Returns:
+        The result.
+    Raises:
+        InputError: if the request, its files or its cluster are wrong.
+        Cancelled: if `cancelled` returns True.
+    """
     from threadpoolctl import threadpool_limits
 
     report = progress or (lambda fraction, text: None)
@@ -98,10 +121,10 @@ def make_match(
         job = stages.Job(order=order, folder=folder, state=state, source=source, library=library, place=place,
                          report=report, cancelled=cancelled)
         try:
-            with threadpool_limits(limits=1):  # more threads add up in another order
+            with threadpool_limits(limits=1):  # more threads would change the order of sums
                 _make(job, match, events, span, report)
         except BeyondMocapError as error:
-            if state.players:  # else nothing was begun
+            if state.players:  # otherwise no work has started
                 state.tell(status="cancelled" if isinstance(error, Cancelled) else "failed", reason=str(error))
             raise
         finally:
@@ -111,10 +134,12 @@ def make_match(
 
 
 def _library(order: MatchOrder, report: Progress, cancelled) -> tuple[Library, LibrarySource]:
-    """The library, with all that it has to make kept beside its cache, and how workers find it."""
+    """Build the library, with everything it derives stored beside its cache, and the source by which workers find
+    it.
+    """
     library = build(order.library, cache_dir=order.cache, skeleton=order.skeleton, unit=order.unit, seed=order.seed,
                     progress=report, cancelled=cancelled)
-    library.extended  # worked out once, here, instead of by every worker  # noqa: B018
+    library.extended  # computed once, here, instead of by every worker  # noqa: B018
     source = LibrarySource(order.library, order.cache, skeleton=order.skeleton, unit=order.unit, seed=order.seed,
                            key=library.kept[1])
     hold(source, library)
@@ -124,7 +149,7 @@ def _library(order: MatchOrder, report: Progress, cancelled) -> tuple[Library, L
 def _make(
     job: stages.Job, match: Match, events: MatchEvents | None, span: tuple[float, float], report: Progress
 ) -> None:
-    """All stages behind the reading."""
+    """Run all stages after reading."""
     state, begin = job.state, now()
     roles = roles_of(match, job.order, span)
     state.told["notes"] += absent_lines(job.order, roles, span)
@@ -160,21 +185,21 @@ def _make(
 
 
 def _solved(job: stages.Job, match: Match, span: tuple[float, float], report: Progress) -> SolvedBall | None:
-    """The ball around the span; None where it is not to be solved, or cannot be."""
+    """Solve the ball around the span; None if it is not requested or not possible."""
     if not job.order.solve_touches:
         return None
     try:
         return solve_ball(match, report, job.cancelled, span[0] - AROUND, span[1] + AROUND)
     except InputError as error:
-        job.state.told["notes"].append(f"the ball is not solved: {error}")
+        job.state.told["notes"].append(f"the ball cannot be solved: {error}")
         return None
 
 
 def _words(job: stages.Job, match: Match, events: MatchEvents | None, solved: SolvedBall | None) -> MatchWords:
-    """Everybody's words, from touches and, where there are some, events."""
+    """Label all players from touches and, if there are any, events."""
     told = job.state.told
     if events is not None and solved is None:
-        told["notes"].append(f"{job.order.events}: not used, since no touch of the ball tells how its clock goes")
+        told["notes"].append(f"{job.order.events}: ignored, because without ball touches its clock is unknown")
     words = words_of(match, solved, events)
     told["notes"] += words.notes
     told["events"] = dict(words.figures) or None
@@ -182,7 +207,7 @@ def _words(job: stages.Job, match: Match, events: MatchEvents | None, solved: So
 
 
 def _ball(job: stages.Job, match: Match, solved: SolvedBall | None, span, crowd) -> BallPath:
-    """The match's ball over the span, written out where it is known at all."""
+    """Write the match's ball over the span, if it is known at all, and return it."""
     fps = job.order.fps
     first, last = int(np.ceil(span[0] * fps - 1e-6)), int(np.floor(span[1] * fps + 1e-6))
     times = np.arange(first, last + 1) / fps
@@ -200,7 +225,7 @@ def _ball(job: stages.Job, match: Match, solved: SolvedBall | None, span, crowd)
 
 
 def _close(job: stages.Job, crowd) -> None:
-    """The last news, and the page."""
+    """Write the final state and the page."""
     state = job.state
     state.told["crowd"] = {
         "overlap_before_m": max((part.before for part in crowd.values()), default=0.0),
@@ -217,7 +242,15 @@ def _close(job: stages.Job, crowd) -> None:
 
 
 def result_of(order: MatchOrder) -> MatchResult:
-    """What stands in the folder of an order that has been made; InputError as `folder.read_state`."""
+    """Read the result of a request that has been run.
+
+    Args:
+        request: the request.
+    Returns:
+        The result.
+    Raises:
+        InputError: as for `folder.read_state`.
+    """
     told = read_state(order.out)
     made = {status: tuple(MadePlayer(row["id"], row.get("reason", "")) for row in told["players"]
                           if row["status"] == status) for status in ("done", "failed")}  # fmt: skip
@@ -227,7 +260,7 @@ def result_of(order: MatchOrder) -> MatchResult:
 
 
 def _part(report: Progress, stage: str) -> Progress:
-    """The progress of one stage as a part of the whole."""
+    """Scale the progress of one stage to its part of the whole."""
     names = list(_SHARES)
     low, high = _SHARES[names[names.index(stage) - 1]] if stage != names[0] else 0.0, _SHARES[stage]
     return lambda fraction, text: report(low + (high - low) * fraction, text)

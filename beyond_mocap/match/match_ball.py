@@ -1,8 +1,8 @@
-"""The one ball of a match: as it was solved, led in all players' hands and to their feet where they meet it, and
-players brought to it.
+"""The one ball of a match: as it was solved, moved into players' hands and to their feet where they touch it; and ball
+contact restored on players.
 
-Both keeping out of others' bodies and turning a head move striking parts off the ball by centimetres: `at_ball` brings
-them back.
+Collision avoidance and head tracking move striking parts off the ball by centimetres: `restore_ball_contact` solves the
+contact again.
 """
 
 from __future__ import annotations
@@ -25,22 +25,31 @@ from ..synthesis.known_touches import course_of
 from ..synthesis.plan import Plan
 from ..synthesis.take import KeyResult, Take
 
-_STEP = 1e-4  # m, to which places are rounded, as files have them
+_STEP = 1e-4  # m, positions are rounded to this, as in files
 
 CLOSED = 0.15
-"""Metres of gap that are closed, as much as `synthesis.construct.strike` closes; who misses the ball by more
-plays as he does."""
+"""m: the largest gap that is closed, the same as in `synthesis.construct.strike`; a player who misses the ball by more
+is not corrected."""
 
 OPEN = 1e-3
-"""Metres of gap that are left."""
+"""m: smaller gaps are left."""
 
 EASE = 0.3
-"""Seconds before and after a touch in which the part comes to the ball and goes back, less where another touch lies
-within them."""
+"""s before and after a touch in which the part moves to the ball and back, less if another touch is within them."""
 
 
 def ball_plan(match: Match, solved: SolvedBall | None, start: float, end: float, fps: float) -> Plan | None:
-    """An order that has the ball from `start` to `end` s and nobody, for `course`; None where it is nowhere known."""
+    """Build a plan that has the ball and no player, for `sample_ball`.
+
+    Args:
+        match: the match.
+        solved: the solved ball, None if it is not solved.
+        start: s.
+        end: s.
+        fps: frames per second.
+    Returns:
+        The plan, or None if the ball is not known anywhere.
+    """
     inside = (match.times >= start - 1.0 / match.fps) & (match.times <= end + 1.0 / match.fps)
     times, ball = match.times[inside], match.ball[inside]
     if not np.isfinite(ball[:, :2]).all(axis=1).any():
@@ -51,7 +60,14 @@ def ball_plan(match: Match, solved: SolvedBall | None, start: float, end: float,
 
 
 def course(plan: Plan, times: np.ndarray) -> BallPath:
-    """The ball of a plan at `times` (T,) s as nobody has met it yet: solved where that is known, else as sampled."""
+    """Sample the ball of a plan before any player moves it: solved where that is known, otherwise as in the feed.
+
+    Args:
+        plan: the plan.
+        times: (T,) s.
+    Returns:
+        The ball path.
+    """
     sampled = plan.sampled(plan.fps)
     place = interpolate(times, sampled.times, sampled.ball, outside=np.nan)
     near = np.clip(np.searchsorted(sampled.times, times - 0.5 / plan.fps), 0, len(sampled) - 1)
@@ -63,8 +79,7 @@ def course(plan: Plan, times: np.ndarray) -> BallPath:
 
 
 def led_by(take: Take) -> tuple[np.ndarray, np.ndarray]:
-    """Frames (K,) of the match's clock at which a player leads the ball elsewhere than it was, and by how much: (K, 3)
-    m."""
+    """Find the frames (K,) of the match's clock at which a player moves the ball, and the offsets (K, 3) m."""
     if take.ball is None:
         return np.zeros(0, int), np.zeros((0, 3))
     off = take.ball.positions - course(take.plan, take.ball.times).positions
@@ -74,10 +89,18 @@ def led_by(take: Take) -> tuple[np.ndarray, np.ndarray]:
 
 
 def met(ball: BallPath, first: int, led: Iterable[tuple[np.ndarray, np.ndarray]]) -> BallPath:
-    """The ball (T frames from frame `first` of the match's clock on) where everybody's `led_by` has it.
+    """Apply to the ball what all players' `find_led_ball` found.
 
-    One who touches the ball leads it between the touches before and after his own only, so that what several do adds
-    up without hurting anybody's touch."""
+    A player moves the ball only between the touches before and after their own, so several players' offsets add up
+    without changing another player's touch.
+
+    Args:
+        ball: T frames.
+        first: frame of the match's clock of its first frame.
+        led: frames (K,) and offsets (K, 3) m of each player.
+    Returns:
+        The ball path.
+    """
     places = np.array(ball.positions)
     for frames, off in led:
         inside = (frames >= first) & (frames < first + len(places))
@@ -86,8 +109,15 @@ def met(ball: BallPath, first: int, led: Iterable[tuple[np.ndarray, np.ndarray]]
 
 
 def at_ball(take: Take, ball: np.ndarray) -> Take:
-    """The take with its striking parts on the ball (T, 3) m, NaN where it is not known, at each key moment at which
-    they were meant to be. Frames further than EASE from such a moment keep their bits."""
+    """Solve ball contact again after collision avoidance and head tracking moved the striking part.
+
+    Args:
+        take: the take.
+        ball: (T, 3) m, NaN where unknown.
+    Returns:
+        The take with its striking parts on the ball at each key moment that touches it. Frames farther than
+        EASE_SECONDS from such a moment keep their bits.
+    """
     touches = [key for key in take.keys if surfaces(take.motion.skeleton, key.touching)]
     found = (_meeting(take.motion, key, ball, _alone(key, touches)) for key in touches)
     meetings = [meeting for meeting in found if meeting is not None]
@@ -97,14 +127,14 @@ def at_ball(take: Take, ball: np.ndarray) -> Take:
 
 
 def _alone(key: KeyResult, touches: Sequence[KeyResult]) -> tuple[float, float]:
-    """Frames before and after a touch in which the body is its own."""
+    """Find the frames before and after a touch that are free of other touches."""
     apart = [round(other.frame) - round(key.frame) for other in touches]
     before, after = [-step for step in apart if step < 0], [step for step in apart if step > 0]
     return min(before, default=np.inf), min(after, default=np.inf)
 
 
 def _meeting(motion: Motion, key: KeyResult, ball: np.ndarray, alone: tuple[float, float]) -> Meeting | None:
-    """What brings a part to the ball at one key moment; None where it is there, or too far."""
+    """Build what moves a part to the ball at one key moment; None if it is there already, or too far away."""
     frame = int(np.clip(np.rint(key.frame), 0, len(motion) - 1))
     parts = surfaces(motion.skeleton, key.touching)
     if not np.isfinite(ball[frame]).all():

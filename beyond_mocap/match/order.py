@@ -1,5 +1,7 @@
-"""What is asked of a match: plain values, and the digests by which work that was done already is found again: the same
-content has the same name in every process and on every machine."""
+"""What is requested of a match, as plain values, and the digests by which finished work is found again: the same
+content
+has the same digest in every process and on every machine.
+"""
 
 from __future__ import annotations
 
@@ -20,27 +22,43 @@ from .pieces.units import OVERLAP, WINDOW
 
 _DEFAULTS = defaults("match")
 FORM = 3
-"""Raised whenever the same order would give other results, so that kept ones are not taken for them."""
+"""Raised whenever the same request would give other results, so that stored ones are not used for it."""
 
 WINDOWS = (5.0, 600.0)
-"""Seconds that a window has at least and at most."""
+"""s: shortest and longest window."""
 
 _LENGTH = 20  # bytes of a digest
 
 
 @dataclass(frozen=True)
 class MatchOrder:
-    """One match to make.
+    """One match to synthesize. The settings table describes the fields that are not listed here.
 
-    tracking, meta, events: the provider's files (None: looked for beside, none); provider: whose form, "" guessed.
-    events_meta, events_provider: the same of the events.
-    library, cache, skeleton, unit: as `library.build` has them. out: the folder of the results. start, end: seconds on
-    the match's clock, None from its first to its last sample. players: ids, () everybody. annotations: folder with a
-    text for players (ID.txt), instead of automatic words. window, overlap: seconds that a piece of the search has, and
-    shares with the next. variety: as a plan has it. workers, scheduler: `pool.Workplace`. The settings table says what
-    the other fields mean.
-    InputError for numbers outside their limits, a span that ends before it begins, times that are no numbers, and
-    what is said of events where there are none or of a provider whose events nobody reads."""
+    Attributes:
+        tracking: the provider's tracking file.
+        meta: its metadata; None: searched beside it, or none.
+        events: the events file; None: no events.
+        provider: the form of the files; "": detected.
+        events_meta: metadata of the events.
+        events_provider: the form of the events; "": detected.
+        library: as for `library.build`.
+        cache: as for `library.build`.
+        skeleton: as for `library.build`.
+        unit: as for `library.build`.
+        out: folder of the results.
+        start: s on the match's clock; None: its first sample.
+        end: s on the match's clock; None: its last sample.
+        players: ids; (): all players.
+        annotations: folder with a text per player (ID.txt), used instead of automatic labels.
+        window: s of a piece of the search.
+        overlap: s that neighbouring pieces share.
+        variety: as in a plan.
+        workers: as for `pool.WorkerConfig`.
+        scheduler: as for `pool.WorkerConfig`.
+    Raises:
+        InputError: for numbers outside their limits, a span that ends before it starts, times that are NaN, event
+            settings without events, or an unknown provider of events.
+    """
 
     tracking: Path
     library: Path
@@ -70,23 +88,23 @@ class MatchOrder:
     events_provider: str = ""
 
     def __post_init__(self):
-        for option, value in (("--from", self.start), ("--to", self.end)):
+        for option, value in (("start time", self.start), ("end time", self.end)):
             if value is not None and math.isnan(value):
-                raise InputError(option, "nan", "seconds of the match's clock")
+                raise InputError(option, "not a number", "seconds of the match's clock")
         if self.start is not None and self.end is not None and self.end <= self.start:
-            raise InputError("--to", f"{told_time(self.end)} s", f"later than --from {told_time(self.start)} s")
+            raise InputError("end time", f"{told_time(self.end)} s", f"later than the start, {told_time(self.start)} s")
         if not WINDOWS[0] <= self.window <= WINDOWS[1]:
             raise InputError("window", f"{self.window:g} s", f"{WINDOWS[0]:g} to {WINDOWS[1]:g} s")
         if not 1.0 <= self.overlap <= self.window / 2.0:
             raise InputError("overlap", f"{self.overlap:g} s", f"1 s to half of the window, {self.window / 2.0:g} s")
-        for option, value in (("--events-meta", self.events_meta), ("--events-provider", self.events_provider)):
+        for option, value in (("events metadata", self.events_meta), ("events provider", self.events_provider)):
             if value and self.events is None:
-                raise InputError(option, f"{value}, without --events", "--events FILE too", "name the events")
+                raise InputError(option, f"{value}, without an events file", "an events file", "choose the events file")
         if self.events_provider and self.events_provider.lower() not in EVENT_PROVIDERS:
-            raise InputError("--events-provider", f"{self.events_provider!r}", f"one of {', '.join(EVENT_PROVIDERS)}")
+            raise InputError("events provider", f"{self.events_provider!r}", f"one of {', '.join(EVENT_PROVIDERS)}")
 
     def told(self) -> dict:
-        """The order as plain values, for people."""
+        """Convert the request to plain values, for match.json."""
         return {name: value.as_posix() if isinstance(value, Path) else value for name, value in asdict(self).items()}
 
 
@@ -96,10 +114,19 @@ _FILES = ("tracking", "meta", "events", "events_meta")
 
 
 def identity(order: MatchOrder, library_key: str) -> dict[str, object]:
-    """What decides the results of an order, by name: settings, and the content of its files by their digests. The
-    words' texts are not among them: they may be edited between runs. library_key: of the library's content and of the
-    seed that it was read with (`Library.kept`), last, so that another seed is told as such. InputError for a file that
-    cannot be read."""
+    """Build what determines the results of a request, by name: settings, and digests of the content of its files.
+
+    The label texts are not part of it: they may be edited between runs.
+
+    Args:
+        request: the request.
+        library_key: of the library's content and the seed it was read with (`Library.kept`); last, so that another seed
+            is reported as such.
+    Returns:
+        Values by name.
+    Raises:
+        InputError: if a file cannot be read.
+    """
     out: dict[str, object] = {"form": FORM, "software": __version__}
     out |= {name: getattr(order, name) for name in _RESULTS}
     for name in _FILES:
@@ -113,21 +140,30 @@ def identity(order: MatchOrder, library_key: str) -> dict[str, object]:
 
 
 def digest_of(*values: object) -> str:
-    """Hex digits that stand for the content of `values`: plain values, arrays, and dataclasses, tuples and mappings of
-    such, however deep. TypeError for anything else."""
+    """Compute hex digits for the content of `values`.
+
+    Args:
+        values: plain values, arrays, and dataclasses, tuples and mappings of them, at any depth.
+    Returns:
+        The digest.
+    Raises:
+        TypeError: for anything else.
+    """
     hashed = hashlib.blake2b(digest_size=_LENGTH)
     _feed(hashed, values)
     return hashed.hexdigest()
 
 
 def digest_of_file(path: str | os.PathLike) -> str:
-    """The same for the bytes of a file; OSError where it cannot be read."""
+    """Compute the digest of a file's bytes; OSError if it cannot be read."""
     with open(path, "rb") as stream:
         return hashlib.file_digest(stream, lambda: hashlib.blake2b(digest_size=_LENGTH)).hexdigest()
 
 
 def _feed(hashed, value: object) -> None:
-    """Every value begins with its kind and ends its text with a zero, so that no two contents give the same bytes."""
+    """Add a value to a hash. It starts with its kind and ends with a zero, so that different contents give different
+    bytes.
+    """
     if isinstance(value, np.ndarray):
         hashed.update(f"array {value.dtype.str} {value.shape}\0".encode())
         hashed.update(np.ascontiguousarray(value).tobytes())
@@ -151,7 +187,7 @@ def _feed_parts(hashed, value: object) -> None:
     elif isinstance(value, (tuple, list)):
         parts, kind = value, "row"
     else:
-        raise TypeError(f"{type(value).__name__} has no content that could be told")
+        raise TypeError(f"{type(value).__name__} has no content to hash")
     hashed.update(f"{kind} {len(parts)}\0".encode())
     for part in parts:
         _feed(hashed, part)

@@ -1,4 +1,6 @@
-"""What everybody is asked to do: words from touches, events or texts, and the plan of every stretch of a player."""
+"""What each player is requested to do: labels from touches, events or texts, and a plan for every stretch of a
+player.
+"""
 
 from __future__ import annotations
 
@@ -20,8 +22,14 @@ from .words import USER, MatchWords, Moment, edited, read_words, timeline_of, wr
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """A role with its orders. file: what the player's files are called; plans: one for each stretch, as files keep
-    them; () where he cannot be made (`role.reason`). unused: the user's words for times at which he is not there."""
+    """A role with its plans.
+
+    Attributes:
+        role: the player and their tracks.
+        file: base name of the player's files.
+        plans: one per stretch, as stored in files; () if the player cannot be synthesized (`role.reason`).
+        unused: the user's labels for times at which the player is absent.
+    """
 
     role: Role
     file: str
@@ -33,9 +41,22 @@ def parts_of(
     roles: tuple[Role, ...], files: Mapping[str, str], words: MatchWords, solved: SolvedBall | None,
     order: MatchOrder, folder: MatchFolder, known_words: frozenset[str],
 ) -> list[Part]:
-    """Everybody's orders. Words are read from the texts of `order.annotations`, else from those in the folder that have
-    been edited, and else are the automatic ones, which are written there. What is wrong with a player's text is the
-    reason why he is not made."""
+    """Build the plans of all players.
+
+    Labels are read from the texts of `request.annotations`, else from edited texts in the folder; else they are the
+    automatic ones, which are written there. An error in a player's text is the reason why this player fails.
+
+    Args:
+        roles: the players.
+        files: base name of files by id.
+        labels: automatic labels.
+        solved: the solved ball, None if it is not solved.
+        request: the request.
+        folder: the match's folder.
+        known_labels: labels beyond the vocabulary.
+    Returns:
+        One entry per role.
+    """
     out = []
     for role in roles:
         file = files[role.player.id]
@@ -51,41 +72,51 @@ def parts_of(
 
 
 def check_texts(annotations: Path | None) -> None:
-    """InputError where the folder with the user's words is named and not there."""
+    """Check that the folder with the user's labels exists, if one is named; InputError otherwise."""
     if annotations is not None and not annotations.is_dir():
         found = "is a file" if annotations.exists() else "no such folder"
         raise InputError(annotations, found, "a folder with a text ID.txt for players", "check the path")
 
 
 def strange_texts(annotations: Path | None, files: Iterable[str]) -> list[str]:
-    """A line for each text of the user's that is nobody's. files: what everybody's files are called."""
+    """List a message for each of the user's texts that belongs to no player. files: base names of all players'
+    files.
+    """
     known = {f"{file}.txt" for file in files}
     texts = [] if annotations is None else sorted(annotations.glob("*.txt"))
-    return [f"{text}: not used, since nobody of the match is called so" for text in texts if text.name not in known]
+    return [f"{text}: ignored, because no player of the match has this id" for text in texts if text.name not in known]
 
 
 def unused_lines(parts: Iterable[Part], order: MatchOrder, files: Mapping[str, str]) -> list[str]:
-    """A line for each player whose text has words of the user's for times at which he is not there, and one for texts
-    in `order.annotations` of players who are not there at all. files: id -> what the player's files are called."""
+    """List messages about labels that are not used.
+
+    Args:
+        parts: the players' plans.
+        request: the request.
+        files: base name of files by id.
+    Returns:
+        One line per player with labels for times at which they are absent, and one for texts of players who are absent
+        altogether.
+    """
     out, there = [], {part.role.player.id for part in parts}
     away = [] if order.players else [file for player, file in files.items() if player not in there]
     idle = [f"{file}.txt" for file in away if _own_text(order.annotations, file) is not None]
     if idle:
-        who = "he is" if len(idle) == 1 else "they are"
-        out.append(f"{', '.join(idle)}: not used, since {who} not there in that time")
+        who = "the player is" if len(idle) == 1 else "the players are"
+        out.append(f"{', '.join(idle)}: ignored, because {who} absent in that time")
     for part in parts:
         if part.unused:
             first = format_timeline(timeline_of(part.unused[:1])).strip()
             edges = [(track.times[0], track.times[-1]) for track in part.role.asked]
             times = ", ".join(f"{told_time(start)} to {told_time(end)} s" for start, end in edges)
             count = len(part.unused)
-            found = f"{count} of your lines {'is' if count == 1 else 'are'} not used ({first}{' ...' * (count > 1)})"
-            out.append(f"{part.file}.txt: {found}, since {part.role.player.id} is there from {times}")
+            found = f"{count} of your lines {'is' if count == 1 else 'are'} ignored ({first}{' ...' * (count > 1)})"
+            out.append(f"{part.file}.txt: {found}, because {part.role.player.id} is present from {times}")
     return out
 
 
 def _is_used(moment: Moment, role: Role) -> bool:
-    """Whether any stretch of a player's has it, or a part of it."""
+    """Say whether any of the player's stretches contains the moment, or a part of it."""
     cut = (timeline_of([moment], float(track.times[0]), float(track.times[-1])) for track in role.asked)
     return any(one.spans or one.keys for one in cut)
 
@@ -93,6 +124,7 @@ def _is_used(moment: Moment, role: Role) -> bool:
 def _moments(
     file: str, role: Role, words: MatchWords, order: MatchOrder, folder: MatchFolder, known_words: frozenset[str]
 ) -> tuple[Moment, ...]:
+    """Read a player's moments from their text, or write the automatic ones and return them."""
     automatic = words.players.get(role.player.id, ())
     text = _own_text(order.annotations, file)
     if text is None:
@@ -105,12 +137,13 @@ def _moments(
 
 
 def _own_text(annotations: Path | None, file: str) -> Path | None:
-    """The text that the user has for a player, None where he has none."""
+    """Find the user's text for a player; None if there is none."""
     text = None if annotations is None else annotations / f"{file}.txt"
     return text if text is not None and text.is_file() else None
 
 
 def _plan(role: Role, number: int, moments, solved: SolvedBall | None, order: MatchOrder) -> Plan:
+    """Build the plan of one stretch, as stored in files."""
     track = role.asked[number]
     start, end = float(track.times[0]), float(track.times[-1])
     timeline: Timeline = timeline_of(moments, start, end)

@@ -1,8 +1,9 @@
-"""All that is kept of a player of a match, and its file: what they were asked to do, and which clip is shown when;
-their motion is made of it whenever it is wanted (`expand`).
+"""Everything stored about a player of a match, and its file: what was requested, and which clip is used when. The
+motion is
+constructed from it when needed (`player_motion`).
 
-ID.take.npz (docs/match/match.md) is a zip of plain arrays of whole numbers and a few fractions, with one JSON text for
-what is no array. Places are in millimetres and times in microseconds, as differences of differences, which pack well.
+ID.take.npz (docs/match/match.md) is a zip of plain arrays of whole numbers and some fractions, with one JSON text for
+everything else. Positions are in millimetres and times in microseconds, as second differences, which compress well.
 """
 
 from __future__ import annotations
@@ -27,24 +28,24 @@ from .crowd.correction import Correction
 from .pieces.named_edit import NamedEdit, NamedKey
 
 COURSE_STEP = 0.02
-"""Seconds between the points of the ball's course that are kept; gravity bends it by half a millimetre in between, a
-bounce cuts its corner by some centimetres."""
+"""s between the stored points of the ball's trajectory; gravity bends it by half a millimetre in between, and a bounce
+is cut off by some centimetres."""
 
 LAYOUT = 30.0
-"""Seconds of the windows in which a player is laid out."""
+"""s of the windows in which a player is constructed."""
 
 _MOST_STEPS = 10_000_000
 VERSION = 1
 FORMAT = "Beyond Mocap player of a match"
 LARGEST = 200_000_000
-"""Bytes of a file above which it is none of ours."""
+"""Bytes: a larger file is rejected."""
 UNPACKED = 1_000_000_000
-"""Bytes of all its arrays together above which it is none of ours."""
+"""Bytes of all arrays together: a file with more is rejected."""
 _KIND = "a player of a match (ID.take.npz)"
 _PAGE = "docs/match/match.md"
 _TYPES = tuple(np.dtype(name) for name in ("<f8", "<i8", "<i4", "<i2", "|i1", "|u1"))
 _LONGEST = 24 * 3600.0
-"""Seconds of a stretch above which it is none of ours."""
+"""s: a longer stretch is rejected."""
 _MOST_FRAMES, _MOST_RATE = 1e7, 100.0
 _LEAST_WINDOW = 1.0  # s
 _DEFAULTS = {
@@ -56,9 +57,14 @@ _UNKNOWN = -(2**31)
 
 @dataclass(frozen=True, eq=False)
 class Stretch:
-    """A player's time on the pitch without a break. plan: his order, as `kept`. edit: at the library's rate, from the
-    track's first time on. warnings: what the library lacks of what is asked; short: (start, end) s that were searched
-    in a hurry."""
+    """A player's time on the pitch without interruption.
+
+    Attributes:
+        plan: as stored in files (`to_stored_plan`).
+        edit: at the library's rate, from the track's first time.
+        warnings: requested labels that the library lacks.
+        short: (start, end) s in which the search was shortened.
+    """
 
     plan: Plan
     edit: NamedEdit
@@ -68,8 +74,14 @@ class Stretch:
 
 @dataclass(frozen=True, eq=False)
 class PlayerEdit:
-    """A player of a match. player: his id. window: s of the windows in which he is laid out. stretches: in the order of
-    time. correction: what keeps him out of others' bodies when he is shown, None where that is not known yet."""
+    """A player of a match.
+
+    Attributes:
+        player: id.
+        window: s of the windows in which the motion is constructed.
+        stretches: in order of time.
+        correction: collision avoidance, None if not known yet.
+    """
 
     player: str
     window: float
@@ -78,10 +90,16 @@ class PlayerEdit:
 
 
 def kept(plan: Plan) -> Plan:
-    """The plan as files keep it, so that what is made of it does not depend on whether it has been in one.
+    """Convert a plan to what files store, so that results do not depend on whether it has been in a file.
 
-    Its touches are solved; the track's times are in whole microseconds, its places in whole
-    millimetres, and so is the ball's course, which has a point every COURSE_STEP and at each touch."""
+    Touches are solved; the track's times are whole microseconds and its positions whole millimetres; so is the ball's
+    trajectory, with a point every BALL_STEP and at each touch.
+
+    Args:
+        plan: the plan.
+    Returns:
+        The rounded plan.
+    """
     plan = solve_touches(plan)
     track = plan.track
     track = Track(
@@ -92,15 +110,21 @@ def kept(plan: Plan) -> Plan:
 
 
 def course_times(first: float, last: float, touches) -> np.ndarray:
-    """(M,) s of the points of a course that is kept, from `first` to `last` s."""
+    """Build the times (M,) s of the stored points of the ball's trajectory, from `first` to `last` s."""
     steps = min(max(int(np.ceil((last - first) / COURSE_STEP)), 1), _MOST_STEPS)
     inside = [touch.time for touch in touches if first <= touch.time <= last]
     return np.union1d(first + (last - first) / steps * np.arange(steps + 1), inside)
 
 
 def write_player(path: str | os.PathLike, edit: PlayerEdit) -> None:
-    """Write a player as `read_player` reads it, number for number; its plans are as `kept` has them. The same player
-    gives the same bytes. InputError where the file cannot be written."""
+    """Write a player; `read_player` gives back every number. The same player gives the same bytes.
+
+    Args:
+        path: the file.
+        edit: the player; plans as of `to_stored_plan`.
+    Raises:
+        InputError: if the file cannot be written.
+    """
     arrays, stretches = {}, []
     for index, stretch in enumerate(edit.stretches):
         stretches.append(_stretch_out(stretch))
@@ -119,8 +143,15 @@ def write_player(path: str | os.PathLike, edit: PlayerEdit) -> None:
 
 
 def read_player(path: str | os.PathLike) -> PlayerEdit:
-    """The player that a file holds. InputError, one line that begins with the file's name, for whatever is wrong with
-    it."""
+    """Read a player from a file.
+
+    Args:
+        path: the file.
+    Returns:
+        The player.
+    Raises:
+        InputError: one line that starts with the file's name, for anything that is wrong with it.
+    """
     data = content(path, _KIND, LARGEST)
     try:
         return _player(plain_arrays(data, _KIND, _TYPES, UNPACKED))
@@ -129,12 +160,12 @@ def read_player(path: str | os.PathLike) -> PlayerEdit:
 
 
 def packed_places(metres: np.ndarray) -> np.ndarray:
-    """Places (N, k) m, to the millimetre and NaN where they are not known, as `places` reads them."""
+    """Pack positions (N, k) m, NaN where unknown, to the millimetre, for `unpack_positions`."""
     return packed(np.where(np.isnan(metres), _UNKNOWN, np.round(np.nan_to_num(metres) * 1000.0)))
 
 
 def packed(values: np.ndarray) -> np.ndarray:
-    """Whole numbers (N, k) as differences of differences, in the smallest type that holds them."""
+    """Pack whole numbers (N, k) as second differences, in the smallest integer type that holds them."""
     once = np.diff(values.astype(np.int64), axis=0, prepend=0)
     twice = once.copy()
     twice[2:] = np.diff(once[1:], axis=0)
@@ -143,14 +174,13 @@ def packed(values: np.ndarray) -> np.ndarray:
 
 
 def places(values: np.ndarray, where: str) -> np.ndarray:
-    """(N, k) m of what `packed_places` has packed. InputError, with `where` before it, for other than whole numbers."""
+    """Unpack (N, k) m that `pack_positions` packed; InputError at `where` unless they are whole numbers."""
     whole = unpacked(values, where)
     return np.where(whole == _UNKNOWN, np.nan, whole / 1000.0)
 
 
 def unpacked(values: np.ndarray, where: str) -> np.ndarray:
-    """What `packed` has packed, as floating point numbers. InputError, with `where` before it, for other than whole
-    numbers."""
+    """Unpack what `pack_differences` packed, as floats; InputError at `where` unless they are whole numbers."""
     if values.dtype.kind != "i":
         raise InputError(where, f"values of type {values.dtype}", "whole numbers")
     once = values.astype(np.int64)
@@ -172,6 +202,7 @@ def _to_millimetres(places: np.ndarray) -> np.ndarray:
 
 
 def _stretch_out(stretch: Stretch) -> dict:
+    """Build the part of the JSON header for a stretch."""
     plan, course = stretch.plan, stretch.plan.solved
     return {
         "name": plan.track.name, "settings": {name: getattr(plan, name) for name in _DEFAULTS},
@@ -186,6 +217,7 @@ def _stretch_out(stretch: Stretch) -> dict:
 
 
 def _stretch_arrays(stretch: Stretch) -> dict[str, np.ndarray]:
+    """Build the arrays of a stretch; `flags` has the bits 1 ball height known, 2 filled in, 4 outlier."""
     track, course = stretch.plan.track, stretch.plan.solved
     flags = track.ball_height_known + 2 * track.filled + 4 * track.outlier
     arrays = {name: getattr(stretch.edit, name).astype(kind) for name, kind in _RUN_TYPES.items()}
@@ -200,12 +232,12 @@ def _stretch_arrays(stretch: Stretch) -> dict[str, np.ndarray]:
 
 
 def _player(arrays: dict[str, np.ndarray]) -> PlayerEdit:
-    """The player that arrays make; every array is used once, none is left over."""
+    """Parse a player from arrays; every array is used once and none is left over."""
     header = object_of(header_text(arrays, _PAGE), HEADER, _PAGE)
     if not isinstance(header, dict) or header.get("format") != FORMAT:
-        raise InputError(HEADER, "no player of a match", _KIND, "choose another file")
+        raise InputError(HEADER, "not a player of a match", _KIND, "choose another file")
     if header.get("version") != VERSION:
-        raise InputError("version", shown(header.get("version")), str(VERSION), "it is of another Beyond Mocap")
+        raise InputError("version", shown(header.get("version")), str(VERSION), "run the match again with this version")
     rows = ("format", "version", "player", "window", "stretches", "correction")
     check_names(header, HEADER, rows, rows)
     stretches = [_stretch(row, index, arrays) for index, row in enumerate(entries(header["stretches"], "stretches"))]
@@ -214,7 +246,7 @@ def _player(arrays: dict[str, np.ndarray]) -> PlayerEdit:
     if window < _LEAST_WINDOW:
         raise InputError("window", f"{window:g} s", f"{_LEAST_WINDOW:g} s or more")
     if arrays:
-        raise InputError("the arrays", f"{next(iter(arrays))[:40]!r}, which belongs to nothing", f"those of {_PAGE}")
+        raise InputError("the arrays", f"{next(iter(arrays))[:40]!r}, which is not used", f"those of {_PAGE}")
     return PlayerEdit(text(header["player"], "player"), window, tuple(stretches), apart)
 
 
@@ -224,11 +256,12 @@ def _correction(value, arrays: dict[str, np.ndarray]) -> Correction | None:
     fps, step = _row(value, "correction", 2)
     knots, values = arrays.pop("knots", None), arrays.pop("values", None)
     if knots is None or values is None or knots.dtype.kind != "i" or values.dtype != np.int16:
-        raise InputError("correction", "no knots, or no values of whole numbers", "both")
+        raise InputError("correction", "knots or values are missing or not whole numbers", "both")
     return Correction(knots, values, number(fps, "correction"), whole_number(step, "correction"))
 
 
 def _stretch(row, index: int, arrays: dict[str, np.ndarray]) -> Stretch:
+    """Parse a stretch from its header row and arrays."""
     where = f"stretch {index}"
     names = ("name", "settings", "spans", "keys", "pins", "touches", "clips", "placed", "warnings", "short")
     check_names(row, where, names, names)
@@ -267,6 +300,7 @@ def _words(value, where: str) -> tuple[str, ...]:
 
 
 def _plan(row, where: str, array) -> Plan:
+    """Parse the plan of a stretch."""
     track = _track(row, where, array)
     first, last = track.times[0], track.times[-1]
     spans, keys = [], []
@@ -293,7 +327,7 @@ def _pin(value, where: str) -> Pin:
 
 
 def _settings(value, where: str) -> dict:
-    """A plan's plain settings, each of the kind of its default; those that came later may be missing."""
+    """Parse a plan's plain settings, each of the type of its default; newer ones may be missing."""
     check_names(value, where, _DEFAULTS, ())
     kinds = {bool: truth, int: whole_number, float: number, str: text}
     out = {}
@@ -306,18 +340,19 @@ def _settings(value, where: str) -> dict:
 
 
 def _texts(value, where: str) -> tuple:
-    """Texts, or pairs of texts."""
+    """Parse texts, or pairs of texts."""
     rows = entries(value, where)
     return tuple(text(row, where) if isinstance(row, str) else _words(_row(row, where, 2), where) for row in rows)
 
 
 def _track(row, where: str, array) -> Track:
+    """Parse the track of a stretch."""
     times = unpacked(array("times", 1), f"{where}: times")[:, 0] / 1e6
     if len(times) < 2 or np.any(np.diff(times) <= 0.0) or times[-1] - times[0] > _LONGEST:
-        raise InputError(f"{where}: times", f"{len(times)} of them", "two or more that rise, within a day")
+        raise InputError(f"{where}: times", f"{len(times)} times", "two or more, ascending, within a day")
     positions = places(array("positions", 2, len(times)), f"{where}: positions")
     if np.isnan(positions).any():
-        raise InputError(f"{where}: positions", "one that is not known", "a cleaned track")
+        raise InputError(f"{where}: positions", "an unknown position", "a cleaned track")
     flags = array("flags", None, len(times)).astype(int)
     known, filled, outlier = ((flags & bit) > 0 for bit in (1, 2, 4))
     ball = places(array("ball", 3, len(times)), f"{where}: ball")
@@ -326,6 +361,7 @@ def _track(row, where: str, array) -> Track:
 
 
 def _course(row, where: str, array, first: float, last: float) -> SolvedCourse | None:
+    """Parse the ball's trajectory of a stretch; None if it is not solved."""
     if row["touches"] is None:
         return None
     touches = []
@@ -339,6 +375,7 @@ def _course(row, where: str, array, first: float, last: float) -> SolvedCourse |
 
 
 def _edit(row, where: str, array) -> NamedEdit:
+    """Parse the edit list of a stretch."""
     clips = [_row(value, f"{where}: clips", 2) for value in entries(row["clips"], f"{where}: clips")]
     clips = tuple((text(path, where), truth(mirrored, where)) for path, mirrored in clips)
     first = array("first")
@@ -349,7 +386,7 @@ def _edit(row, where: str, array) -> NamedEdit:
     if np.any(clip < 0) or np.any(clip >= len(clips)):
         raise InputError(f"{where}: clip", f"{clip.min()} to {clip.max()}", f"0 to {len(clips) - 1}")
     if np.abs(first).max() > _MOST_FRAMES or np.abs(runs["rate"]).max() > _MOST_RATE:
-        raise InputError(f"{where}: first, rate", "more than any clip has", f"frames to {_MOST_FRAMES:g}")
+        raise InputError(f"{where}: first, rate", "values too large for a clip", f"frames up to {_MOST_FRAMES:g}")
     keys = tuple(_named_key(value, len(clips), where) for value in entries(row["placed"], f"{where}: placed"))
     return NamedEdit(clips=clips, **runs, keys=keys)
 

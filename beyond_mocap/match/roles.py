@@ -1,5 +1,7 @@
-"""Who of a match is made, when he is there, and where he is asked to be: everybody's tracks, cleaned, on one clock of
-frames, and pushed apart where two would stand in each other."""
+"""Find which players of a match are synthesized, when they are present, and where they have to be: their tracks,
+cleaned,
+on one clock of frames, and separated where two would overlap.
+"""
 
 from __future__ import annotations
 
@@ -18,18 +20,26 @@ from .order import MatchOrder
 from .pieces.units import cut_track
 
 SHORTEST = 1.0
-"""Seconds; who is there for less is not made."""
+"""s: a player who is present for less is not synthesized."""
 
 NEAR_SAMPLES = 2.0
-"""Times a second at which it is looked who is near whom."""
+"""Samples per second at which neighbours are found."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Role:
-    """A player who is to be made. player: who; measured: his cleaned tracks, one for each stretch in which he is there,
-    each from a frame of the match's clock (a whole number of 1 / fps seconds) to another; asked: the same, pushed out
-    of others' ways. notes: lines on what was put right. reason: why he cannot be made, else "". number: his place in
-    the match, by which he differs from others. lag: s, of the clips that he likes (`Plan.lag`)."""
+    """A player to synthesize.
+
+    Attributes:
+        player: who.
+        measured: cleaned tracks, one per stretch the player is present, each from one frame of the match's clock (a
+            whole number of 1 / fps seconds) to another.
+        target_tracks: the same, moved away from other players.
+        notes: messages about what was corrected.
+        reason: why the player cannot be synthesized, else "".
+        number: index in the match; part of the seed, so that players differ.
+        lag: s, of the clips the player prefers (`Plan.lag`).
+    """
 
     player: MatchPlayer
     measured: tuple[Track, ...] = ()
@@ -41,38 +51,47 @@ class Role:
 
 
 def span_of(match: Match, order: MatchOrder) -> tuple[float, float]:
-    """(start, end) s of what is asked for, within the match. InputError where it has nothing of it."""
+    """Resolve the requested (start, end) s within the match; InputError if the match has no such time."""
     first, last = float(match.times[0]), float(match.times[-1])
     start = first if order.start is None else max(order.start, first)
     end = last if order.end is None else min(order.end, last)
     if end - start < SHORTEST:
         low, high = (told_time(value) if value is not None else "" for value in (order.start, order.end))
         expected = f"a second or more within {told_time(first)} to {told_time(last)} s"
-        raise InputError("--from, --to", f"{low} to {high} s", expected)
+        raise InputError("time range", f"{low} to {high} s", expected)
     return start, end
 
 
 def roles_of(match: Match, order: MatchOrder, span: tuple[float, float]) -> tuple[Role, ...]:
-    """Everybody who is there in `span` s, or of the order's players; those whose tracks cannot be cleaned with the
-    reason. InputError for an unknown player, and where nobody is there."""
+    """Build the roles of all players present in a span, or of the requested players.
+
+    Args:
+        match: the match.
+        request: the request.
+        span: (start, end) s.
+    Returns:
+        The roles; one whose tracks cannot be cleaned has a reason.
+    Raises:
+        InputError: for an unknown player, or if no player is present.
+    """
     known = {player.id: player for player in match.players}
     for wanted in order.players:
         if wanted not in known:
-            raise InputError("--players", f"{wanted!r}", f"some of {', '.join(known)}")
+            raise InputError("players", f"{wanted!r}", f"some of {', '.join(known)}")
     liked = lags(match.positions[:, _sampled(match, span)])
     found = [_role(match, number, player, span, order.fps) for number, player in enumerate(match.players)
              if not order.players or player.id in order.players]  # fmt: skip
     roles = [replace(role, lag=float(liked[role.number])) for role in found if role is not None]
     if not roles:
-        raise InputError("--from, --to", f"nobody is there {_from_to(span)}", "a time of play")
+        raise InputError("time range", f"no player is present {_from_to(span)}", "a time of play")
     return tuple(roles)
 
 
 def absent_lines(order: MatchOrder, roles: Sequence[Role], span: tuple[float, float]) -> list[str]:
-    """A line for each player whom the order names and who is not there in `span` s."""
+    """List a message for each requested player who is absent in `span` s."""
     there = {role.player.id for role in roles}
     away = [player for player in order.players if player not in there]
-    return [f"player {player} is not made: he is not there {_from_to(span)}" for player in away]
+    return [f"player {player} is left out: absent {_from_to(span)}" for player in away]
 
 
 def _from_to(span: tuple[float, float]) -> str:
@@ -80,19 +99,19 @@ def _from_to(span: tuple[float, float]) -> str:
 
 
 def _sampled(match: Match, span: tuple[float, float]) -> np.ndarray:
-    """Samples of the span, some NEAR_SAMPLES a second."""
+    """Select samples of the span, about NEIGHBOUR_RATE per second."""
     inside = np.flatnonzero((match.times >= span[0] - 1e-9) & (match.times <= span[1] + 1e-9))
     return inside[:: max(1, round(match.fps / NEAR_SAMPLES))]
 
 
 def _role(match: Match, number: int, player: MatchPlayer, span: tuple[float, float], fps: float) -> Role | None:
-    """The role of a player; None where he is not there for SHORTEST."""
+    """Build the role of a player; None if they are present for less than MIN_SECONDS."""
     tracks, notes = [], []
     try:
         for begin, end in match.stretches(player.id):
             begin, end = _on_frames(max(begin, span[0]), min(end, span[1]), fps)
             if end - begin >= SHORTEST:
-                step = 1.0 / match.fps  # to the feed's samples around them
+                step = 1.0 / match.fps  # up to the feed's samples around them
                 track, found = clean(match.track(player.id, begin - step, end + step))
                 begin, end = max(begin, track.times[0]), min(end, track.times[-1])
                 tracks.append(cut_track(track, *_on_frames(begin, end, fps)))
@@ -104,18 +123,23 @@ def _role(match: Match, number: int, player: MatchPlayer, span: tuple[float, flo
 
 
 def _on_frames(start: float, end: float, fps: float) -> tuple[float, float]:
-    """The first frame of the match's clock not before `start` and the last not behind `end`, s."""
+    """Limit a span to frames of the match's clock: the first not before `start`, the last not after `end`, s."""
     return float(np.ceil(start * fps - 1e-6) + 0.0) / fps, float(np.floor(end * fps + 1e-6)) / fps
 
 
 def pushed_apart(
     roles: Sequence[Role], times: np.ndarray, touches: Mapping[str, Sequence[float]]
 ) -> tuple[tuple[Role, ...], dict[str, float]]:
-    """The roles with tracks that keep out of each other (`match.crowd.spacing`), and what that took: `longest_m`,
-    `mean_m` where somebody is moved, `seconds` in which somebody is, all players' summed.
+    """Separate the target tracks of the players (`match.crowd.spacing`).
 
-    times (N,) s: of the feed's samples; touches: by id, seconds at which somebody touches the ball, who then keeps his
-    way."""
+    Args:
+        roles: the players.
+        times: (N,) s of the feed's samples.
+        touches: s by id, at which a player touches the ball and keeps their path.
+    Returns:
+        The roles, and figures: `longest_m`, `mean_m` where a player is moved, `seconds` in which a player is moved,
+            summed over all players.
+    """
     places = np.stack([_on_times(role.measured, times) for role in roles])
     step = float(np.median(np.diff(times)))
     keep = [keeping(len(times), (np.asarray(touches.get(role.player.id, ())) - times[0]) / step, 1.0 / step)
@@ -129,7 +153,7 @@ def pushed_apart(
 
 
 def _on_times(tracks: Sequence[Track], times: np.ndarray) -> np.ndarray:
-    """(N, 2) m where a player is at `times` (N,) s, NaN where he is away."""
+    """Sample a player's positions (N, 2) m at `times` (N,) s, NaN where absent."""
     out = np.full((len(times), 2), np.nan)
     for track in tracks:
         there = (times >= track.times[0] - 1e-9) & (times <= track.times[-1] + 1e-9)
@@ -139,7 +163,7 @@ def _on_times(tracks: Sequence[Track], times: np.ndarray) -> np.ndarray:
 
 
 def _shifted(role: Role, times: np.ndarray, shift: np.ndarray) -> Role:
-    """The role asked to be `shift` (N, 2) m beside what was measured; the very same where it is nothing."""
+    """Shift a role's target by (N, 2) m from what was measured; unchanged where the shift is zero."""
     if not shift.any():
         return role
     asked = (replace(track, positions=track.positions + interpolate(track.times, times, shift))

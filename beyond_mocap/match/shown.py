@@ -1,9 +1,10 @@
-"""A player of a made match as they are to be seen: the motion out of their edit list, kept out of others' bodies, the
-head after the ball, and what strikes it on it.
+"""Construct a player of a match as displayed: the motion from their edit list, with collision avoidance, gaze at the
+ball,
+and ball contact restored.
 
-Heads that follow one ball do not all turn as one. Each player looks at it in a way of their own: somewhat late, not at
-every moment as far round as it lies, and ahead while they sprint, unless the ball is near. What varies is a slow
-function of the match's clock and of the player's seed, so that any stretch of a match gives the same heads.
+Heads that follow one ball do not all turn together. Each player looks at it slightly late, not always fully, and ahead
+while sprinting unless the ball is close. The variation is a slow function of the match's clock and of the player's
+seed, so that any span of a match gives the same heads.
 """
 
 from __future__ import annotations
@@ -28,37 +29,46 @@ from .match_ball import at_ball
 from .player_edit import PlayerEdit
 
 AROUND = 3.0
-"""Seconds around what is asked for that are laid out too: what heads do is smoothed over less."""
+"""s around the requested span that are constructed too; head rotations are smoothed over less."""
 
 LEAST, MOST = 0.45, 1.0
-"""Shares of a turn to the ball that are made at the least and the most attentive moments."""
+"""Shares of the full rotation to the ball at the least and the most attentive moments."""
 
 DELAY = (0.08, 0.35)
-"""Seconds by which heads are behind the ball."""
+"""s by which heads lag behind the ball."""
 
 SPRINT = (4.5, 7.0)
-"""Metres per second from which on, and at which, a runner looks where he runs."""
+"""m/s: from the first a runner starts to look ahead, from the second they look ahead fully."""
 
 AHEAD = 0.65
-"""Share of the turn that a sprint takes away."""
+"""Share of the rotation to the ball that a sprint removes."""
 
 NEAR = (4.0, 12.0)
-"""Metres within which a ball is always looked at, and beyond which attention wanders as it likes."""
+"""m: a ball closer than the first is always looked at; beyond the second attention varies fully."""
 
-_PERIODS = (5.3, 8.9, 13.7)  # s of the waves that attention is made of: no common multiple within a match
+_PERIODS = (5.3, 8.9, 13.7)  # s, periods of the waves of attention: no common multiple within a match
 
 
 def shown(
     library: Library, edit: PlayerEdit, ball: BallPath | None, start: float, end: float,
     progress: Callable[[float, str], None] | None = None,
 ) -> tuple[Take, ...]:  # fmt: skip
-    """What a player does from `start` to `end` seconds, a take for each of his stretches there; a frame looks the same
-    whatever span is asked for.
+    """Construct what a player does in a span, as displayed; a frame is the same whatever span is requested.
 
-    ball: the match's, which every take has as its own; unknown in frames that it does not tell of. InputError as of
-    `expanded`."""
+    Args:
+        library: the clips.
+        edit: the player's edit list.
+        ball: the match's ball, which every take gets as its own; None: heads and ball contact are not changed.
+        start: s on the match's clock.
+        end: s on the match's clock.
+        progress: receives the share done and a text.
+    Returns:
+        One take per stretch in the span.
+    Raises:
+        InputError: as for `construct_player`.
+    """
     if not end > start:
-        raise InputError("times", f"{start:g} to {end:g} s", "an end behind the start")
+        raise InputError("times", f"{start:g} to {end:g} s", "an end after the start")
     takes = expanded(library, edit, start - AROUND, end + AROUND, progress)
     finished = (_finished(library, take, edit.correction, ball) for take in takes)
     inside = (_between(take, start, end) for take in finished)
@@ -68,17 +78,25 @@ def shown(
 def looking(
     motion: Motion, ball: np.ndarray, known: np.ndarray, look: np.ndarray, seed: int = 0, start: float = 0.0
 ) -> Motion:
-    """The motion with its head following the ball as one of many would.
+    """Add gaze at the ball: only chest, neck and head rotate.
 
-    ball (T, 3) m and whether it is known (T,) bool, at the motion's frames; look (3,): which way the head joint looks,
-    in its own frame (`synthesize.look_of`). seed: of the player's habits; start: seconds of the motion's first frame on
-    the match's clock. Only chest, neck and head are turned."""
+    Args:
+        motion: T frames.
+        ball: (T, 3) m, world frame.
+        known: (T,) bool, where the ball is known.
+        look: (3,) direction in which the head joint looks, in its own frame (`synthesize.look_of`).
+        seed: of the player's habits.
+        start: s of the motion's first frame on the match's clock.
+    Returns:
+        The motion with gaze.
+    """
     random = np.random.default_rng([seed, 9])
     delay = random.uniform(*DELAY)
     phases, weights = random.uniform(0.0, 2.0 * np.pi, len(_PERIODS)), random.uniform(0.5, 1.0, len(_PERIODS))
     places = np.where(np.reshape(known, (-1, 1)), ball, np.nan)
     late = places[np.maximum(np.arange(len(places)) - round(delay * motion.fps), 0)]
     times = start + np.arange(len(motion)) / motion.fps
+    # Attention: a sum of slow waves between MIN_ATTENTION and MAX_ATTENTION, full for a close ball, less in a sprint.
     waves = np.sin(2.0 * np.pi * times[:, None] / np.array(_PERIODS) + phases) @ weights / weights.sum()
     wander = LEAST + (MOST - LEAST) * (0.5 + 0.5 * np.clip(1.6 * waves + 0.4, -1.0, 1.0))
     away = np.linalg.norm(np.nan_to_num(late - motion.root_positions, nan=1e3)[:, :2], axis=1)
@@ -89,7 +107,7 @@ def looking(
 
 
 def _between(take: Take, start: float, end: float) -> Take | None:
-    """The frames of a take from `start` to `end` seconds, None where there are none."""
+    """Cut a take to the frames from `start` to `end` s; None if there are none."""
     fps = take.motion.fps
     first = max(int(np.ceil((start - take.start_time) * fps - 1e-6)), 0)
     last = min(int(np.floor((end - take.start_time) * fps + 1e-6)), len(take.motion) - 1)
@@ -101,6 +119,7 @@ def _between(take: Take, start: float, end: float) -> Take | None:
 
 
 def _finished(library: Library, take: Take, correction: Correction | None, ball: BallPath | None) -> Take:
+    """Apply collision avoidance, gaze and ball contact to a take."""
     first = round(take.start_time * take.motion.fps)
     if correction is not None and len(correction.knots):
         take = replace(take, motion=applied(take.motion, correction, first))
@@ -114,7 +133,7 @@ def _finished(library: Library, take: Take, correction: Correction | None, ball:
 
 
 def _cut(ball: BallPath, first: int, count: int, fps: float) -> BallPath:
-    """The match's ball at frames first .. first + count of the match's clock, unknown where it is not told of."""
+    """Cut the match's ball to frames first .. first + count of the match's clock, unknown outside its time."""
     at = np.arange(count) + first - round(float(ball.times[0]) * fps)
     told = (at >= 0) & (at < len(ball.times))
     times, places, measured = (first + np.arange(count)) / fps, np.full((count, 3), np.nan), np.zeros(count, bool)
@@ -124,6 +143,6 @@ def _cut(ball: BallPath, first: int, count: int, fps: float) -> BallPath:
 
 
 def _speed(motion: Motion) -> np.ndarray:
-    """(T,) m/s over the ground, without the sway of steps."""
+    """Measure the horizontal speed (T,) m/s, without the sway of steps."""
     ground = zero_phase_hann(motion.root_positions[:, :2], motion.fps, 0.6)
     return np.linalg.norm(np.gradient(ground, axis=0), axis=1) * motion.fps if len(motion) > 1 else np.zeros(1)

@@ -1,5 +1,6 @@
-"""What match.json says: the order, who is made and how far he is, what was told, and what it took
-(docs/match/match.md)."""
+"""The content of match.json: the request, the players and how far each is, messages, and costs
+(docs/match/match.md).
+"""
 
 from __future__ import annotations
 
@@ -15,12 +16,22 @@ from .parts import Part
 from .pieces.pool import Done, peak_memory
 
 EVERY = 1.0
-"""Seconds between two writings of a state in which only the number of done windows has changed."""
+"""s between two writes of a state in which only the number of finished windows has changed."""
 
 
 @dataclass(eq=False)
 class MatchState:
-    """The state while the match is made. players: by id, their rows, in the order of the feed."""
+    """The state while the match is synthesized.
+
+    Attributes:
+        folder: the match's folder.
+        report: values of match.json, except those below.
+        players: rows by id, in the order of the feed.
+        seconds: s of wall time by stage.
+        main_seconds: s of processor time of this process by stage.
+        worker_memory: MB, the highest peak of a worker.
+        worker_seconds: s of processor time of workers by stage.
+    """
 
     folder: MatchFolder
     told: dict
@@ -32,23 +43,23 @@ class MatchState:
     _written: float = 0.0
 
     def player(self, player: str, **news) -> None:
-        """News of a player."""
+        """Update a player's row and write the state."""
         self.players[player].update(news)
         self.write()
 
     def counted(self, player: str) -> None:
-        """One more of a player's windows is searched."""
+        """Count one more searched window of a player."""
         self.players[player]["units_done"] += 1
         if time.monotonic() - self._written > EVERY:
             self.write()
 
     def tell(self, **news) -> None:
-        """News of the match."""
+        """Update values of the match and write the state."""
         self.told.update(news)
         self.write()
 
     def write(self) -> None:
-        """Writes match.json."""
+        """Write match.json."""
         rows = [{name: value for name, value in row.items() if value is not None} for row in self.players.values()]
         memory = {"main": round(peak_memory(), 1), "worker": round(self.worker_memory, 1)}
         spent = {stage: round(seconds, 3) for stage, seconds in self.worker_seconds.items()}
@@ -57,7 +68,7 @@ class MatchState:
         self._written = time.monotonic()
 
     def spent(self, stage: str) -> Callable[[Done], None]:
-        """What is to be told of the pieces of a stage."""
+        """Build the function that adds the cost of each piece of a stage."""
 
         def told(done: Done) -> None:
             self.worker_memory = max(self.worker_memory, done.memory)
@@ -66,24 +77,34 @@ class MatchState:
         return told
 
     def took(self, stage: str, begun: tuple[float, float]) -> None:
-        """A stage that began at `begun` (`now`) is done."""
+        """Record a finished stage that started at `started` (`read_clocks`)."""
         self.seconds[stage], self.own_seconds[stage] = (round(b - a, 3) for a, b in zip(begun, now()))
 
     @property
     def failed(self) -> list[dict]:
-        """The rows of those who could not be made."""
+        """Rows of the players who could not be synthesized."""
         return [row for row in self.players.values() if row["status"] == "failed"]
 
 
 def now() -> tuple[float, float]:
-    """Seconds of the clock, and of this process's time on processors."""
+    """Read the wall clock and this process's processor time, s."""
     return time.perf_counter(), time.process_time()
 
 
 def begun(
     folder: MatchFolder, order: MatchOrder, identity: Mapping, match: Match, span: tuple[float, float]
 ) -> MatchState:
-    """The state of a match that is about to be made."""
+    """Build the state of a match before its work starts.
+
+    Args:
+        folder: the match's folder.
+        request: the request.
+        identity: what determines the results, by name.
+        match: the match.
+        span: (start, end) s.
+    Returns:
+        The state, without players.
+    """
     sides = [team.name for team in match.teams if team.name and team.ground != "referee"]
     return MatchState(folder, {
         "software": __version__, "status": "running", "title": " - ".join(sides[:2]) or order.tracking.stem,
@@ -96,7 +117,14 @@ def begun(
 
 
 def row_of(part: Part, finished: str | None = None) -> dict:
-    """A player's row when work begins. finished: what the files are made of that an earlier run has left of him."""
+    """Build a player's row at the start.
+
+    Args:
+        part: the player's plans.
+        finished: digest of the files that an earlier run has left.
+    Returns:
+        The row.
+    """
     player, role = part.role.player, part.role
     return {
         "id": player.id, "file": part.file, "team": player.team, "name": player.name, "number": player.number,

@@ -1,12 +1,12 @@
-"""What everybody does with the ball and when, as words: from solved touches, and from a provider's events.
+"""Label what each player does with the ball and when, from solved touches and from a provider's events.
 
-    words = words_of(match, solve_ball(match), read_events("events.xml", match=match))
-    timeline = timeline_of(words.players["home_7"], 0.0, 60.0)
+    labels = label_match(match, solve_ball(match), read_events("events.xml", match=match))
+    timeline = build_timeline(labels.players["home_7"], 0.0, 60.0)
 
-A player's words are kept as a text file that people may edit: the contract's form, with where each line comes from
-behind it.
+A player's labels are stored as a text file that people may edit: the contract's form, with the source of each line
+after it.
 
-    # words of home_7: edit freely. A file that was edited is kept and used, another made anew [5d0c3f2a]
+    # labels of home_7: edit freely. An edited file is kept and used, any other is regenerated [5d0c3f2a]
     12.31 kick running low  # touches 0.93
     20.5 23.2 dribble  # touches 0.97
 """
@@ -34,23 +34,23 @@ from ..motion.track.match_data import Match
 from .event_clock import AlignedEvents, aligned
 
 LEAST_CONFIDENCE = 0.3
-"""Touches of less make no key moment."""
+"""Touches with less confidence give no key moment."""
 
 NEAREST = 0.5
-"""Seconds; a player who touches the ball twice within them shows one of both."""
+"""s: of two touches of a player that are closer, one becomes a key moment."""
 
 TOUCHES, EVENTS, BOTH, USER = "touches", "events", "touches and events", "user"
-"""Where a moment comes from."""
+"""Sources of a moment."""
 
-_RUNNING = 2.0  # m/s, from which a touch is made running
+_RUNNING = 2.0  # m/s, from which the player is running at a touch
 _HIGH_FOOT, _HIGH_HAND, _LOW_HAND = 0.45, 1.5, 0.7  # m of the ball's centre
-_JUMP = 2.05  # m of the ball's centre, which nobody heads standing
-_CAUGHT = 3.0  # m/s of the ball after a save that held it
+_JUMP = 2.05  # m of the ball's centre, too high for a header without a jump
+_CAUGHT = 3.0  # m/s of the ball after a save: a slower ball was caught
 _CHAIN = 3.0  # s between touches of one dribble
 _SHORTEST = 0.8  # s of a dribble
-_FORGETS = 0.2  # of what is doubtful in a touch, with an event that tells of it too
-_TOLD = 0.4  # confidence in an event without a touch
-_SHOWN_BY = 0.5  # s from an event without a touch within which another moment of the player shows it
+_FORGETS = 0.2  # share of a touch's doubt that remains if an event confirms it
+_TOLD = 0.4  # confidence of an event without a touch
+_SHOWN_BY = 0.5  # s around an event without a touch in which another moment of the player stands for it
 _LIKE_EVENT = {kind.name: (kind.event, kind.details) for kind in kinds.TOUCH_KINDS}
 _DRIBBLE = next(kind for kind in kinds.TOUCH_KINDS if kind.name == kinds.DRIBBLE)
 _HEAD = re.compile(r"#.*\[([0-9a-f]{8})\]\s*")
@@ -58,8 +58,15 @@ _HEAD = re.compile(r"#.*\[([0-9a-f]{8})\]\s*")
 
 @dataclass(frozen=True, kw_only=True)
 class Moment:
-    """What a player does: time s on the match's clock; words; source: TOUCHES, EVENTS, BOTH or USER; confidence 0 to 1.
-    end: s, of a stretch that begins at `time`, None for a key moment."""
+    """What a player does.
+
+    Attributes:
+        time: s on the match's clock.
+        labels: the labels.
+        source: TOUCHES, EVENTS, BOTH or USER.
+        confidence: 0 to 1.
+        end: s, the end of a stretch that starts at `time`; None for a key moment.
+    """
 
     time: float
     words: tuple[str, ...]
@@ -70,8 +77,13 @@ class Moment:
 
 @dataclass(frozen=True)
 class MatchWords:
-    """players: id -> moments in order of time, for everybody, () for who never touches the ball. notes: lines for
-    people. figures: of the events' clock and how they fit, {} without events."""
+    """The labels of a match.
+
+    Attributes:
+        players: moments in order of time by id, for all players; () for a player who never touches the ball.
+        notes: messages for people.
+        figures: of the events' clock and how the events fit, {} without events.
+    """
 
     players: Mapping[str, tuple[Moment, ...]]
     notes: tuple[str, ...] = ()
@@ -79,7 +91,15 @@ class MatchWords:
 
 
 def timeline_of(moments: Iterable[Moment], start: float = -np.inf, end: float = np.inf) -> Timeline:
-    """Moments between two times (s) as a timeline, stretches cut there."""
+    """Build a timeline from moments, cut to a span.
+
+    Args:
+        moments: the moments.
+        start: s.
+        end: s.
+    Returns:
+        The timeline.
+    """
     spans, keys = [], []
     for moment in moments:
         if moment.end is None:
@@ -92,14 +112,23 @@ def timeline_of(moments: Iterable[Moment], start: float = -np.inf, end: float = 
 def words_of(
     match: Match, solved: SolvedBall | None, events: MatchEvents | None = None, table: EventWords | None = None
 ) -> MatchWords:
-    """Everybody's moments. solved: the ball, on the match's clock; None where it cannot be solved. events: what a
-    provider's people wrote down. table: from what happened to words, by default the one that comes with us.
+    """Label all players of a match.
 
-    A touch becomes a key moment with the words that the table has for it, or for the event that tells of it too; its
-    time is the touch's. Touches of one player in a row are a stretch of dribble. A pass, shot or save without a touch
-    becomes a key moment at its place on the corrected clock. Of two within NEAREST the surer one stays. What is not
-    known (the foot, a height without heights in the feed) is left out of the words. InputError where events fit no
-    better than by chance."""
+    A touch becomes a key moment with the labels that the table has for it, or for the event paired with it; its time is
+    the touch's. Consecutive touches of one player are a stretch of dribble. A pass, shot or save without a touch
+    becomes a key moment at its time on the corrected clock. Of two within MIN_DISTANCE_SECONDS the more certain one
+    stays. Unknown details (the foot, a height without heights in the feed) are left out of the labels.
+
+    Args:
+        match: the match.
+        solved: the ball, on the match's clock; None if it cannot be solved.
+        events: the provider's events; None: no events.
+        table: labels by event; None: the built-in table.
+    Returns:
+        The labels.
+    Raises:
+        InputError: if events fit no better than by chance.
+    """
     table = table or read_event_words()
     touches = solved.touches if solved else ()
     span = (float(solved.times[0]), float(solved.times[-1])) if solved else None
@@ -123,14 +152,22 @@ def words_of(
 
 
 def write_words(path: str | os.PathLike, player: str, moments: Iterable[Moment]) -> None:
-    """Writes one player's moments; InputError where that cannot be done."""
+    """Write one player's moments.
+
+    Args:
+        path: the text file.
+        player: id.
+        moments: in any order.
+    Raises:
+        InputError: if the file cannot be written.
+    """
     lines = [f"{_line(moment)}  # {moment.source} {moment.confidence:.2f}\n" for moment in ordered(moments)]
-    told = "edit freely. A file that was edited is kept and used, another made anew"
-    atomic_write(path, f"# words of {' '.join(player.split())}: {told} [{_digest(lines)}]\n{''.join(lines)}")
+    told = "edit freely. An edited file is kept and used, any other is regenerated"
+    atomic_write(path, f"# labels of {' '.join(player.split())}: {told} [{_digest(lines)}]\n{''.join(lines)}")
 
 
 def edited(path: str | os.PathLike) -> bool:
-    """Whether there is such a file, and a person has changed it since it was written, or written it."""
+    """Say whether the file exists and a person wrote it or has changed it since it was written."""
     if not Path(path).is_file():
         return False
     lines = read_text(path).splitlines(keepends=True)
@@ -141,9 +178,17 @@ def edited(path: str | os.PathLike) -> bool:
 def read_words(
     path: str | os.PathLike, automatic: Sequence[Moment] = (), known_words: Iterable[str] = ()
 ) -> tuple[Moment, ...]:
-    """The moments in a file. automatic: lines that say what one of these says are that one; the others are the user's.
+    """Read the moments in a file.
 
-    known_words: beyond the vocabulary. InputError, with the line, for what is no timeline or has unknown words."""
+    Args:
+        path: the text file.
+        automatic: moments; a line equal to one of them is that moment, the others are the user's.
+        known_labels: labels beyond the vocabulary.
+    Returns:
+        The moments in order.
+    Raises:
+        InputError: with the line, if it is not a timeline or has unknown labels.
+    """
     timeline = parse_timeline(read_text(path), str(path))
     validate(timeline, known_words, where=str(path))
     known = {_line(moment): moment for moment in automatic}
@@ -154,8 +199,7 @@ def read_words(
 
 
 def _untouched(player: str, onto: AlignedEvents, span, times, path, table, beside) -> list[Moment]:
-    """Moments of one player's events that are touches for certain and have none, but where another moment of his
-    shows the same."""
+    """Label one player's certain events without a touch, unless another of their moments stands for the event."""
     out = []
     for index, event in enumerate(onto.events):
         time = float(onto.times[index])
@@ -170,7 +214,7 @@ def _untouched(player: str, onto: AlignedEvents, span, times, path, table, besid
 
 
 def _figures(onto: AlignedEvents, touches, span) -> dict[str, object]:
-    """How the events fit: counts, and each period's clock."""
+    """Measure how the events fit: counts, and each period's clock."""
     inside = [i for i, time in enumerate(onto.times) if span[0] <= time <= span[1] and onto.events[i].played]
     certain = [i for i in inside if onto.events[i].kind in CERTAIN]
     off = [touches[onto.touches[i]].time - onto.times[i] for i in inside if onto.touches[i] >= 0]
@@ -183,7 +227,7 @@ def _figures(onto: AlignedEvents, touches, span) -> dict[str, object]:
 
 
 def has_heights(match: Match) -> bool:
-    """Whether the feed has heights of the ball."""
+    """Say whether the feed has heights of the ball."""
     seen = np.isfinite(match.ball[:, :2]).all(axis=1)
     return bool(seen.any() and np.isfinite(match.ball[seen, 2]).mean() > 0.8)
 
@@ -192,8 +236,18 @@ def moment_of(
     touch: SolvedTouch, times: np.ndarray, path: np.ndarray, heights: bool, table: EventWords,
     event: MatchEvent | None = None,
 ) -> Moment | None:  # fmt: skip
-    """The key moment of a touch, None where it makes none. times (N,) s and path (N, 2) m of its player; heights:
-    whether the touch's is known. event: what tells of the same touch; its words count before the touch's own."""
+    """Build the key moment of a touch.
+
+    Args:
+        touch: the solved touch.
+        times: (N,) s of the player's path.
+        path: (N, 2) m of the player.
+        heights: whether the touch's height is known.
+        table: labels by event.
+        event: the event paired with the touch; its labels take precedence.
+    Returns:
+        The key moment, None if the table has no labels for it.
+    """
     kind, details = _LIKE_EVENT[touch.kind]
     if touch.kind == kinds.SAVE and np.linalg.norm(touch.after) > _CAUGHT:
         details = (*details, "parried")
@@ -215,7 +269,7 @@ def _moment(touch: SolvedTouch, words: tuple[str, ...], source: str, sure: float
 
 
 def seen_words(time: float, times: np.ndarray, path: np.ndarray) -> dict[str, str]:
-    """The gait at a moment, from a player's path (N, 2) m at `times` (N,) s."""
+    """Find the gait label at a moment, from a player's path (N, 2) m at `times` (N,) s."""
     near = slice(*np.searchsorted(times, [time - 0.3, time + 0.3]))
     there = np.isfinite(path[near]).all(axis=1)
     seen, when = path[near][there], times[near][there]
@@ -226,7 +280,7 @@ def seen_words(time: float, times: np.ndarray, path: np.ndarray) -> dict[str, st
 
 
 def height_words(part: str, height: float, known: bool) -> dict[str, str]:
-    """The height word of a touch with the ball's centre at `height` m, and jump."""
+    """Find the height and jump labels of a touch with the ball's centre at `height` m."""
     if not known:
         return {}
     if part == "hand":
@@ -235,7 +289,9 @@ def height_words(part: str, height: float, known: bool) -> dict[str, str]:
 
 
 def apart(moments: Iterable[Moment]) -> list[Moment]:
-    """Of key moments (of one player) within NEAREST the surest: events before touches, sent before taken balls."""
+    """Select moments of one player at least MIN_DISTANCE_SECONDS apart, the most certain first: events before
+    touches, sent before received balls.
+    """
     kept: list[Moment] = []
     for moment in sorted(moments, key=_weight, reverse=True):
         if all(abs(moment.time - other.time) >= NEAREST for other in kept):
@@ -249,7 +305,7 @@ def _weight(moment: Moment) -> tuple[float, float]:
 
 
 def dribbles(touches: list[SolvedTouch]) -> list[Moment]:
-    """The stretches in which one player drives the ball: touches in a row, one of them a dribble's."""
+    """Find the stretches in which one player dribbles: consecutive touches, at least one of them a dribble's."""
     out, first = [], 0
     for index in range(1, len(touches) + 1):
         if index < len(touches) and touches[index].time - touches[index - 1].time < _CHAIN:
@@ -265,26 +321,27 @@ def dribbles(touches: list[SolvedTouch]) -> list[Moment]:
 
 
 def ordered(moments: Iterable[Moment]) -> tuple[Moment, ...]:
-    """Moments by time, stretches before key moments."""
+    """Sort moments by time, stretches before key moments."""
     return tuple(sorted(moments, key=lambda moment: (moment.time, moment.end is None)))
 
 
 def _notes(touches, left_out: Counter) -> list[str]:
+    """Describe how many touches are left out, and why."""
     strangers = sum(not touch.player for touch in touches)
     told = [
-        (strangers, "touches of the ball by nobody who is tracked"),
-        (left_out["doubtful"], f"touches of less than {LEAST_CONFIDENCE:g} confidence make no key moment"),
-        (left_out["close"], f"touches within {NEAREST:g} s of a surer one of the same player make no key moment"),
+        (strangers, "touches of the ball by untracked players"),
+        (left_out["doubtful"], f"touches are ignored, with confidence below {LEAST_CONFIDENCE:g}"),
+        (left_out["close"], f"touches are ignored, within {NEAREST:g} s of a more certain one of the same player"),
     ]
     return [f"{count} {what}" for count, what in told if count]
 
 
 def _line(moment: Moment) -> str:
-    """The contract's line for a moment."""
+    """Format a moment as the contract's line."""
     return format_timeline(timeline_of([moment])).rstrip("\n")
 
 
 def _digest(lines: Iterable[str]) -> str:
-    """Of what lines say, however they end."""
+    """Compute the digest of lines, without their ends."""
     said = "\n".join(line.rstrip() for line in lines if line.strip())
     return hex_digest(said, digits=8)

@@ -1,1 +1,1 @@
-"""Skeletons, quaternions, motions, tracks, contacts, retargeting. Needs numpy and scipy only."""
+"""Skeletons, quaternions, motions, tracks, contacts and retargeting. Needs numpy and scipy only."""

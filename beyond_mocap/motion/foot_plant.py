@@ -1,12 +1,12 @@
-"""Feet held where they stand: each stance's slide is taken out by moving the foot, and the leg follows by two-bone IK.
+"""Foot planting: each stance's slide is removed by moving the foot, and the leg follows by two-bone inverse kinematics.
 
-Which frames are stance is known from the recording and carried along (../shared/metrics.md); here nothing is guessed
-from the motion itself. A stance is not pinned to one point and blended in and out; instead each foot's shift over the
-ground is one smooth curve D(t) that cancels the velocity of the point that carries the foot while it stands and may do
-anything gentle in between: the least squares problem of `shift`, one banded system for the whole motion.
+Which frames are in contact is known from the recording and carried along (../shared/metrics.md); nothing is guessed
+from the motion itself. A stance is not pinned to one point and blended in and out. Instead each foot's shift over the
+ground is one smooth curve D(t) that cancels the velocity of the point that carries the foot while it is in contact and
+changes gently in between: the least squares problem of `solve_shift`, one banded system for the whole motion.
 
 A foot rolls: first the heel carries it, then the toe, on which the heel rises while it is still low and slow. Where a
-leg does not reach, people rise on their toes; so does the foot here, then the pelvis sinks, and then the foot slides.
+leg does not reach, people rise on their toes; so does the foot here, then the pelvis is lowered, then the foot slides.
 """
 
 from __future__ import annotations
@@ -27,33 +27,40 @@ from .motion import pose_kinematics
 from .skeleton import Skeleton
 
 SMOOTH, PULL = 0.005, 3e-4
-"""Weights of `shift`."""
+"""Weights of `solve_shift`: of the third difference of the shift, and of the shift itself."""
 
 HEEL_SHARE = 0.2
-"""How firmly a heel is held while its toe stands too, against the toe's 1."""
+"""Weight of a heel while its toe is in contact too, against the toe's 1."""
 
 MOST_DROP, MOST_RISE = 0.04, 0.35
 """Metres that the pelvis is lowered, and radians that a heel is raised about its toe, at most."""
 
 HOLD = 1e6
-"""Weight of a shift that is given: so much more than all else that it stays."""
+"""Weight of a shift that is given: so much larger than all others that it stays."""
 
 MOST_SHIFT = 0.25
 EASE, SPARE, SPARE_ALOFT = 0.012, 0.004, 0.02
-"""Metres below full length from which a leg eases (`limb.soft_distance`), and which are left of it where it stands and
-in the air: a leg that is nearly straight pops at the knee. A leg that was straighter in the recording may be so."""
+"""Metres below full length from which a leg eases (`limb.soften_distance`), and reserves of length that are left in
+contact and in the air: a leg that is nearly straight pops at the knee. A leg that was straighter in the recording may
+be as straight."""
 
 LEAST_EASE, LEAST_SPARE = 0.003, 0.002
 """The same of legs that were straight in the recording."""
 
-_EASED_ROUNDS, _SLIDES_FROM = 3, 0.004  # rounds of holding stances less firmly; m of sliding that need none
-_BEHIND = 3  # frames at 30 per second by which a rise or drop is spread
+_EASED_ROUNDS, _SLIDES_FROM = 3, 0.004  # rounds of relaxing the contact weights; metres of sliding that need none
+_BEHIND = 3  # frames at 30 per second over which a rise or drop is spread
 
 
 @dataclass(frozen=True, eq=False)
 class Planted:
-    """root (T, 3) m; rotations (T, J, 4) local; correction (T, 2) m by which each foot was moved; miss (T, 2) m that IK
-    was short of its target."""
+    """A motion with planted feet.
+
+    Attributes:
+        root: (T, 3) metres, world.
+        rotations: (T, J, 4) local rotations.
+        correction: (T, 2) metres by which each foot was moved.
+        miss: (T, 2) metres between each ankle and its target after inverse kinematics.
+    """
 
     root: np.ndarray
     rotations: np.ndarray
@@ -63,9 +70,17 @@ class Planted:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Foot:
-    """One foot laid out: hip, heel (the ankle joint) and toe (T, 3) m, rotation (T, 4) in the world, left (T, 3) level
-    across it, weight (T, 2) of heel and toe, length (T,) m of its leg and `own`,
-    what it was short of that in the pose that was given."""
+    """One foot over T frames.
+
+    Attributes:
+        limb: the joints of its side.
+        hip, heel, toe: (T, 3) metres, world; the heel is the ankle joint.
+        rotation: (T, 4) world rotation of the foot.
+        left: (T, 3) level unit vector across the foot.
+        weight: (T, 2) contact weights of heel and toe, from 0 to 1.
+        length: (T,) metres, thigh plus shank.
+        recorded_slack: (T,) metres that the leg was short of that length in the given pose.
+    """
 
     limb: Limb
     hip: np.ndarray
@@ -79,11 +94,11 @@ class Foot:
 
     @property
     def moves(self) -> np.ndarray:
-        """(T - 1, 2, 2) metres that heel and toe go over the ground from frame to frame."""
+        """(T - 1, 2, 2) metres that heel and toe move over the ground from frame to frame."""
         return np.stack([np.diff(self.heel[:, :2], axis=0), np.diff(self.toe[:, :2], axis=0)], axis=1)
 
     def moved(self, by: np.ndarray) -> Foot:
-        """The foot moved by (T, 3) m."""
+        """Return the foot moved by `shift` (T, 3) m."""
         return replace(self, heel=self.heel + by, toe=self.toe + by)
 
     @property
@@ -93,12 +108,12 @@ class Foot:
 
     @property
     def longest(self) -> np.ndarray:
-        """(T,) metres that the leg is long at most where it stands."""
+        """(T,) metres, the leg's greatest length in contact."""
         return self.length - np.clip(self.own, LEAST_SPARE, SPARE)
 
     @property
     def carries(self) -> np.ndarray:
-        """(T,) how firmly the foot stands at all."""
+        """(T,) contact weight of the foot, the larger one of heel and toe."""
         return self.weight.max(axis=1)
 
 
@@ -106,15 +121,29 @@ def plant(
     skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray, standing: np.ndarray, fps: float,
     sinks: float = MOST_DROP, moves: np.ndarray | None = None, levels: bool = True,
 ) -> Planted:
-    """The motion with its feet held on the ground, z = 0, wherever `standing` (T, 2, 2) says that heels and toes stand.
+    """Plant the feet of a motion on the ground, z = 0, where they are in contact.
 
-    root (T, 3) m and rotations (T, J, 4) local: the motion laid out. The feet keep their own rotation but for a turn
-    about the vertical that holds a flat foot's direction, and for heels that rise where a leg could not reach; the
-    pelvis is lowered where that is not enough, by at most `sinks` metres. moves (T, 2, 4): metres by which each foot is
-    moved before that, and radians that its heel is turned up about its toe (`synthesis.construct.steps`). levels:
-    standing feet are
-    brought to the height of the ground and none goes below it; without, all keep the heights they have (a recording's
-    own floor is uneven by centimetres, and to press its feet onto z = 0 costs more jerk than it is worth)."""
+    The feet keep their own rotation except for a rotation about the vertical that holds a flat foot's direction, and
+    for
+    heels that rise where a leg could not reach. The pelvis is lowered where that is not enough.
+
+    Args:
+        skeleton: J joints.
+        root: (T, 3) root positions of the constructed motion, metres, world.
+        rotations: (T, J, 4) local rotations.
+        heel_toe_contacts: (T, 2, 2) bool, left and right, heel and toe in contact with the ground.
+        fps: frames per second.
+        max_drop: metres by which the pelvis is lowered at most.
+        foot_moves: (T, 2, 4) metres by which each foot is moved first, and radians that its heel is raised about its
+            toe (`synthesis.construct.steps`); None for none.
+        level_feet: bring feet in contact to the height of the ground and let none go below it. False keeps all heights:
+            a recording's own floor is uneven by centimetres, and pressing its feet onto z = 0 costs more jerk than it
+            is worth.
+    Returns:
+        The planted motion with what it took.
+    Raises:
+        InputError: if the skeleton has no legs.
+    """
     body = identify(skeleton)
     places, world = pose_kinematics(skeleton, root, rotations)
     scale, spread = 30.0 / fps, int(round(_BEHIND * fps / 30.0))
@@ -123,6 +152,7 @@ def plant(
     feet = [turned_flat(foot.moved(moves[:, side, :3]), scale) for side, foot in enumerate(feet)]
     lifts = [lift_to_ground(foot, sole_height(skeleton), scale) if levels else np.zeros(len(root)) for foot in feet]
     firm = [foot.weight for foot in feet]
+    # solve with full weights first; stances that the legs cannot reach are relaxed and solved again
     for turn in range(_EASED_ROUNDS + 1):
         goals = [
             _goal(foot, weight, lift, tilt=tilt, scale=scale, spread=spread)
@@ -146,8 +176,16 @@ def plant(
 
 
 def laid_foot(places: np.ndarray, world: np.ndarray, limb: Limb, stands: np.ndarray) -> Foot:
-    """One foot of a body whose joints' places (T, J, 3) m and world rotations (T, J, 4) are known; stands (T, 2) bool
-    of its heel and toe."""
+    """Build one foot of a body.
+
+    Args:
+        places: (T, J, 3) joint positions, metres, world.
+        world: (T, J, 4) world rotations.
+        limb: the joints of its side.
+        contacts: (T, 2) bool, heel and toe in contact.
+    Returns:
+        The foot.
+    """
     hip, knee, heel, toe = (places[:, j] for j in (limb.upper_leg, limb.lower_leg, limb.foot, limb.toe_or_foot))
     weight = firmness(stands)
     length = np.linalg.norm(knee - hip, axis=1) + np.linalg.norm(heel - knee, axis=1)
@@ -160,8 +198,11 @@ def laid_foot(places: np.ndarray, world: np.ndarray, limb: Limb, stands: np.ndar
 
 
 def firmness(stands: np.ndarray) -> np.ndarray:
-    """(T, 2) how firmly heel and toe stand: 1, half in a stance's first and last frame, while it arrives, else 0.
-    The heel gives way to a toe that stands."""
+    """Compute the contact weights (T, 2) of heel and toe from contacts (T, 2) bool.
+
+    1 inside a stance, 0.5 in its first and last frame, while the foot arrives, else 0. The heel yields to a toe in
+    contact.
+    """
     padded = np.pad(stands, ((1, 1), (0, 0)), mode="edge")
     inner = stands & padded[:-2] & padded[2:]
     weight = np.where(inner, 1.0, np.where(stands, 0.5, 0.0))
@@ -170,7 +211,8 @@ def firmness(stands: np.ndarray) -> np.ndarray:
 
 
 def turned_flat(foot: Foot, scale: float) -> Foot:
-    """The foot turned about its heel and the vertical so that it keeps its direction while it lies flat."""
+    """Rotate a foot about its heel and the vertical so that it keeps its direction while it is flat; scale: 30 / rate.
+    """
     yaw = np.unwrap(arctan2(-foot.left[:, 0], foot.left[:, 1]))
     flat = np.minimum(foot.weight[:, 0] / HEEL_SHARE, foot.weight[:, 1]).clip(0.0, 1.0)
     spin = quaternion.about_up(shift(np.diff(yaw)[:, None], flat[:, None], scale)[:, 0])
@@ -182,7 +224,8 @@ def turned_flat(foot: Foot, scale: float) -> Foot:
 def _goal(
     foot: Foot, weight: np.ndarray, lift: np.ndarray, tilt: np.ndarray, scale: float, spread: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Where the ankle goes (T, 3) and the foot's world rotation (T, 4); lift (T,) m, tilt (T,) radians of the heel."""
+    """Compute the ankle's goal (T, 3) and the foot's world rotation (T, 4); lift (T,) m, tilt (T,) radians of the heel.
+    """
     ground, weight = held_shift(foot.moves, weight, scale)
     moved = np.column_stack([ground, lift])
     rise = spread_over(heel_rise(foot, moved) * foot.weight[:, 1], spread) + tilt
@@ -192,12 +235,20 @@ def _goal(
 
 
 def heel_rise(foot: Foot, moved: np.ndarray) -> np.ndarray:
-    """(T,) least radians, at most MOST_RISE, by which a heel turns up about its toe so that the leg reaches its ankle.
+    """Solve the smallest angle by which a heel rises about its toe so that the leg reaches its ankle.
 
-    With u from toe to hip, a from toe to heel, n the foot's left: |u - R a|^2 = L^2 is A cos r + B sin r = K."""
+    With u from toe to hip, a from toe to heel, n the foot's left: |u - R a|^2 = L^2 is A cos r + B sin r = K.
+
+    Args:
+        foot: the foot before its shift.
+        shift: (T, 3) metres by which the foot is shifted.
+    Returns:
+        (T,) radians, at most MAX_HEEL_RISE.
+    """
     u, a, n = foot.hip - foot.toe - moved, foot.heel - foot.toe, foot.left
     across = np.sum(a * n, axis=1, keepdims=True)
     level = a - across * n
+    # even, odd and target are A, B and K of the docstring; `level` is the part of a that rotates
     even, odd = np.sum(u * level, axis=1), np.sum(u * cross(n, level), axis=1)
     length = foot.longest
     asked = 0.5 * (np.sum(u * u, axis=1) + np.sum(a * a, axis=1) - length**2) - across[:, 0] * np.sum(u * n, axis=1)
@@ -209,8 +260,18 @@ def heel_rise(foot: Foot, moved: np.ndarray) -> np.ndarray:
 def held_shift(
     velocity: np.ndarray, weight: np.ndarray, scale: float, most: float = MOST_SHIFT
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The shift (T, 2), and the weights (T, 2) with which it was found: stances that would need more than `most` metres
-    are held less firmly, since a foot that slides looks better than a leg torn after it (../shared/metrics.md)."""
+    """Solve the shift of a foot with stances relaxed that would need too large a shift.
+
+    A foot that slides looks better than a leg stretched after it (../shared/metrics.md).
+
+    Args:
+        velocity: (T - 1, 2, 2) metres per frame of heel and toe.
+        weight: (T, 2) contact weights.
+        scale: 30 over the rate.
+        max_shift: metres of shift above which a stance is relaxed.
+    Returns:
+        The shift (T, 2) in metres, and the weights (T, 2) with which it was found.
+    """
     ground = shift(velocity, weight, scale)
     for _ in range(4):
         far = np.where(weight.max(axis=1) > 0, np.linalg.norm(ground, axis=1), 0.0)
@@ -222,8 +283,10 @@ def held_shift(
 
 
 def held_less(weight: np.ndarray, excess: np.ndarray) -> np.ndarray:
-    """Weights (T, 2) with those stances held less firmly in which `excess` (T,) m is above 0: a third at 10 cm."""
+    """Relax the weights (T, 2) of those stances in which `excess` (T,) metres is above 0: to a third or less at 10 cm.
+    """
     stance = weight.max(axis=1) > 0
+    # label numbers the stances from 1; frames without contact have 0 and collect nothing
     label = run_numbers(stance)
     worst = np.zeros(label.max(initial=0) + 1)
     np.maximum.at(worst, label, np.where(stance, np.maximum(excess, 0.0), 0.0))
@@ -231,12 +294,19 @@ def held_less(weight: np.ndarray, excess: np.ndarray) -> np.ndarray:
 
 
 def shift(velocity: np.ndarray, weight: np.ndarray, scale: float = 1.0, kept: np.ndarray | None = None) -> np.ndarray:
-    """The smooth shift D (T, K) that cancels velocities where they carry weight.
+    """Solve the smooth shift D that cancels velocities where they carry weight.
 
-    velocity (T - 1, P, K) or, for one point, (T - 1, K): movement per frame of P points; weight (T, P): how firmly each
-    point stands. Minimizes sum w |D' + v|^2 + SMOOTH |D'''|^2 + PULL |D|^2 with differences per frame at 30 frames per
-    second; `scale` is 30 over the rate, which keeps the balance at other rates. kept: (T, K) shifts that are given,
-    rows of NaN where D is free."""
+    Minimizes sum w |D' + v|^2 + SMOOTH_WEIGHT |D'''|^2 + PULL_WEIGHT |D|^2, with differences per frame at 30 frames per
+    second.
+
+    Args:
+        velocity: (T - 1, P, K) movement per frame of P points, or (T - 1, K) of one point.
+        weight: (T, P) contact weight of each point.
+        scale: 30 over the rate, which keeps the balance at other rates.
+        fixed_shifts: (T, K) given shifts, rows of NaN where D is free.
+    Returns:
+        (T, K), in the unit of the velocity.
+    """
     count = len(weight)
     if velocity.ndim == 2:
         velocity = velocity[:, None, :]
@@ -244,6 +314,7 @@ def shift(velocity: np.ndarray, weight: np.ndarray, scale: float = 1.0, kept: np
     total = firm.sum(axis=1)
     pushed = np.einsum("tp,tpk->tk", firm, velocity)
     squares = BandedLeastSquares(count, columns=velocity.shape[2])
+    # row t of the normal equations: D[t + 1] - D[t] = -v[t] adds -w v to equation t + 1 and +w v to equation t
     squares.right[1:] -= pushed
     squares.right[:-1] += pushed
     squares.add_difference(1, total)
@@ -256,8 +327,18 @@ def shift(velocity: np.ndarray, weight: np.ndarray, scale: float = 1.0, kept: np
 
 
 def lift_to_ground(foot: Foot, sole: float, scale: float) -> np.ndarray:
-    """(T,) metres up: brings the carrying point to the height it has when the foot is flat, toes `sole` m above the
-    ground, and keeps both above it at all times."""
+    """Compute the lift that brings a foot to the ground.
+
+    The carrying point gets the height that it has when the foot is flat; both points stay above the ground at all
+    times.
+
+    Args:
+        foot: the foot.
+        sole: metres from the ground to the toe joint of a flat foot.
+        scale: 30 over the rate.
+    Returns:
+        (T,) metres up.
+    """
     heel, toe, weight = foot.heel[:, 2] - sole, foot.toe[:, 2] - sole, np.ceil(foot.weight) * [HEEL_SHARE, 1.0]
     flat = weight.min(axis=1) > 0
     rest = float(np.median((heel - toe)[flat])) if np.any(flat) else float(np.percentile(heel, 5))
@@ -273,7 +354,7 @@ def lift_to_ground(foot: Foot, sole: float, scale: float) -> np.ndarray:
 
 
 def settled(right: np.ndarray, weight: np.ndarray, scale: float, smooth: float = SMOOTH) -> np.ndarray:
-    """The smooth curve (T,) that is `right` / `weight` where weight is large, and small elsewhere."""
+    """Fit the smooth curve (T,) that is `weighted_values` / `weight` where the weight is large, and small elsewhere."""
     squares = BandedLeastSquares(len(weight))
     squares.add_difference(3, smooth / scale**6)
     squares.add_value(weight + 2e-2)
@@ -282,7 +363,16 @@ def settled(right: np.ndarray, weight: np.ndarray, scale: float, smooth: float =
 
 
 def pelvis_drop(feet: list[Foot], goals: list[np.ndarray], spread: int, most: float) -> np.ndarray:
-    """(T,) metres to lower the pelvis so that standing ankles can be reached, at most `most`, without a jerk."""
+    """Compute how far the pelvis is lowered so that ankles in contact can be reached.
+
+    Args:
+        feet: both feet.
+        goals: their ankle goals (T, 3), metres, world.
+        spread: frames over which the drop is spread.
+        most: metres at most.
+    Returns:
+        (T,) metres, smooth.
+    """
     need = np.zeros(len(goals[0]))
     for foot, goal in zip(feet, goals):
         length = foot.longest
@@ -294,18 +384,20 @@ def pelvis_drop(feet: list[Foot], goals: list[np.ndarray], spread: int, most: fl
 
 
 def spread_over(need: np.ndarray, reach: int) -> np.ndarray:
-    """A smooth curve (T,) that is nowhere below `need` (T,), widened by `reach` frames."""
+    """Build a smooth curve (T,) that is nowhere below `need` (T,), widened by `reach` frames."""
     return hann_smooth(maximum_filter1d(need, 2 * reach + 1, mode="nearest"), reach)
 
 
 def lacking(foot: Foot, goal: np.ndarray, drop: np.ndarray) -> np.ndarray:
-    """(T,) metres that a standing foot's leg lacks."""
+    """Measure the metres (T,) that the leg of a foot in contact is too short for its goal (T, 3); drop (T,) of the
+    pelvis.
+    """
     reach = goal - foot.hip + drop[:, None] * [0.0, 0.0, 1.0]
     return np.where(foot.carries > 0, np.linalg.norm(reach, axis=1) - foot.longest, 0.0)
 
 
 def _within_reach(foot: Foot, goal: np.ndarray, drop: np.ndarray) -> np.ndarray:
-    """Goals (T, 3) with those of feet in the air brought as near as the leg is long, or was in the recording."""
+    """Limit the goals (T, 3) of feet in the air to the leg's length, or to its length in the recording."""
     hip = foot.hip - drop[:, None] * [0.0, 0.0, 1.0]
     reach = goal - hip
     far = np.linalg.norm(reach, axis=1)

@@ -1,4 +1,4 @@
-"""Where a hand is, frame by frame, by its joint of a motion."""
+"""The position and orientation of a hand, frame by frame, from the joints of a motion."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from .humanoid import identify
 from .motion import Motion, forward_kinematics
 
 USUAL_ALONG, USUAL_OFF = 0.62, 0.035
-"""The centre of a ball that is held ready to be thrown: as a share of the way from wrist to fingertip, and metres out
-of the palm; it lies on the fingers' middle parts."""
+"""The centre of a ball that is held ready to be thrown: as a share of the distance from wrist to fingertip, and metres
+out of the palm; it lies on the fingers' middle parts."""
 _HAND_OF_ARM = 0.72  # wrist to fingertip against elbow to wrist: 0.108 and 0.146 of the height, Drillis & Contini 1966
 
 
@@ -21,10 +21,17 @@ _HAND_OF_ARM = 0.72  # wrist to fingertip against elbow to wrist: 0.108 and 0.14
 class Hand:
     """One hand over T frames.
 
-    side: "left" or "right". fps. origin: (T, 3) m, the wrist. rotation: (T, 3, 3), from the hand's frame to the world.
-    finger: (3,) unit, along the stretched fingers, and reach: m, from the wrist to their tips, both in the hand's
-    frame. elbow: (T, 3) m. markers: labels that sharpen it. shift: (3,) m, from the motion to where its markers are,
-    which the origin has in it."""
+    Attributes:
+        side: "left" or "right".
+        fps: frames per second.
+        origin: (T, 3) metres, the wrist, world.
+        rotation: (T, 3, 3) from the hand's frame to the world.
+        finger: (3,) unit vector along the stretched fingers, hand frame.
+        reach: metres from the wrist to the fingertips.
+        elbow: (T, 3) metres, world.
+        markers: labels of the markers that refine it.
+        shift: (3,) metres from the motion to where its markers are; the origin contains it.
+    """
 
     side: str
     fps: float
@@ -45,16 +52,25 @@ class Hand:
         return np.arange(len(self)) / self.fps
 
     def carried(self, place: np.ndarray) -> np.ndarray:
-        """(T, 3) m: where a point `place` (3,) m of the hand's frame is."""
+        """Return the world positions (T, 3), metres, of a point (3,) of the hand's frame."""
         return self.origin + np.einsum("tij,j->ti", self.rotation, np.asarray(place, float))
 
     def taken_back(self, points: np.ndarray) -> np.ndarray:
-        """(T, 3) m in the hand's frame of points (T, 3) m of the world, one a frame."""
+        """Return points (T, 3) m of the world, one a frame, in the hand's frame: (T, 3) metres."""
         return np.einsum("tji,tj->ti", self.rotation, points - self.origin)
 
 
 def hand_of(motion: Motion, side: str) -> Hand:
-    """The hand of a solved motion. InputError where the skeleton has none."""
+    """Build the hand of a solved motion.
+
+    Args:
+        motion: T frames.
+        side: "left" or "right".
+    Returns:
+        The hand over all frames.
+    Raises:
+        InputError: if the skeleton has no such hand or forearm.
+    """
     limb = getattr(identify(motion.skeleton), side)
     if limb.hand is None or limb.lower_arm is None:
         raise InputError("release", f"a skeleton without a {side} hand", "joints for the hand and the forearm")
@@ -66,9 +82,10 @@ def hand_of(motion: Motion, side: str) -> Hand:
 
 
 def _finger(motion: Motion, limb) -> tuple[np.ndarray, float]:
-    """Unit direction (3,) of the fingers in the hand's frame, and how far their tips are from the wrist, m.
+    """Measure the unit direction (3,) of the fingers in the hand's frame, and metres from the wrist to their tips.
 
-    The skeleton's own tip where it has a likely one, else straight on from the forearm."""
+    Uses the skeleton's own tip where it has a plausible one, else continues the forearm.
+    """
     skeleton, hand = motion.skeleton, limb.hand
     forearm = float(np.linalg.norm(skeleton.offsets[hand]))
     usual = _HAND_OF_ARM * forearm
@@ -81,7 +98,7 @@ def _finger(motion: Motion, limb) -> tuple[np.ndarray, float]:
 
 
 def _tips(skeleton, hand: int) -> np.ndarray:
-    """(N, 3) m at rest, in the hand's frame: the joints and end sites below the hand."""
+    """Collect the positions (N, 3) m of the joints and end sites below the hand, at rest, in the hand's frame."""
     at = {hand: np.zeros(3)}
     for joint in range(hand + 1, len(skeleton)):
         if skeleton.parents[joint] in at:
@@ -91,5 +108,13 @@ def _tips(skeleton, hand: int) -> np.ndarray:
 
 
 def usual_centre(finger: np.ndarray, reach: float, palm: np.ndarray | None = None) -> np.ndarray:
-    """(3,) m: where balls usually lie in a hand. finger (3,), reach: as of `Hand`. palm: (3,) unit, out of the palm."""
+    """Estimate where the centre of a ball lies in a hand.
+
+    Args:
+        finger: (3,) as of `Hand`.
+        reach: metres, as of `Hand`.
+        palm: (3,) unit vector out of the palm, hand frame; None leaves the offset from the palm out.
+    Returns:
+        (3,) metres, hand frame.
+    """
     return USUAL_ALONG * reach * finger + (0.0 if palm is None else USUAL_OFF * np.asarray(palm, float))

@@ -1,9 +1,9 @@
-"""Which joint is what: hips, legs, arms, head, of any humanoid skeleton, by name, and where names say nothing by
-structure.
+"""Which joint is what (hips, legs, arms, head) in any humanoid skeleton: by name, or by structure where names say
+nothing.
 
 Covers the names of CMU (.bvh and .asf), LAFAN1, Mixamo, Bandai-Namco, Rigify, Unreal, MVN (Xsens), MakeHuman, VRM, 3ds
-Max Biped, Daz, Character Creator and SMPL. Every measure that speaks of feet, heading or sides asks here, so a new
-family of names is one line in a table. What no name tells is found in the tree (`structure`).
+Max Biped, Daz, Character Creator and SMPL. Every measure of feet, heading or sides uses this module, so a new family of
+names is one line in a table. What no name shows is found in the tree of joints (`structure`).
 """
 
 from __future__ import annotations
@@ -44,7 +44,13 @@ _PARTS = {name for names in _LIMB_NAMES.values() for name in names}
 
 @dataclass(frozen=True)
 class Limb:
-    """Joint indices of one side. `shoulder` and `toe` may be missing (None); the others too on bodies without arms."""
+    """Joint indices of one side.
+
+    Attributes:
+        shoulder, upper_arm, lower_arm, hand: the arm; None on bodies without it, the shoulder also on bodies with arms.
+        upper_leg, lower_leg, foot: the leg, always there.
+        toe: None where the skeleton has no toe joint.
+    """
 
     shoulder: int | None
     upper_arm: int | None
@@ -63,7 +69,15 @@ class Limb:
 
 @dataclass(frozen=True, kw_only=True)
 class Humanoid:
-    """Joint indices by meaning. `spine`: the joints between hips and neck, from below."""
+    """Joint indices by meaning.
+
+    Attributes:
+        hips: the joint that carries legs and trunk.
+        spine: the joints between hips and neck, from below.
+        neck, head: None where the skeleton has none.
+        left, right: the limbs of each side.
+        mirror: for each joint the one on the other side, itself where there is none.
+    """
 
     hips: int
     spine: tuple[int, ...]
@@ -85,12 +99,12 @@ class Humanoid:
 
     @property
     def head_or_neck(self) -> int:
-        """The joint that turns the head: the head, or the neck or chest where there is none."""
+        """The joint that rotates the head: the head, or the neck or chest where there is none."""
         return self.neck_or_chest if self.head is None else self.head
 
 
 def side_and_part(name: str) -> tuple[str, str]:
-    """Side ("left", "right", "") and the rest of a joint's name, prefix, blanks and case removed."""
+    """Split a joint's name into its side ("left", "right", "") and the rest without prefix, blanks and case."""
     plain = re.sub(r"^.*[:|]", "", name)
     while _PREFIX.search(plain):
         plain = _PREFIX.sub("", plain)
@@ -107,17 +121,31 @@ def side_and_part(name: str) -> tuple[str, str]:
 
 
 def identify(skeleton: Skeleton) -> Humanoid:
-    """The meaning of a skeleton's joints, by names, else by the structure of its rest pose.
+    """Identify the meaning of a skeleton's joints, by names, else by the structure of its rest pose.
 
-    InputError where no legs can be found."""
+    Args:
+        skeleton: J joints.
+    Returns:
+        The joints by meaning.
+    Raises:
+        InputError: if no legs can be found.
+    """
     tips = (skeleton.end_parents, skeleton.end_offsets.tobytes())
     return _identify(skeleton.names, skeleton.parents, skeleton.offsets.tobytes(), tips)
 
 
 def identify_posed(motion: Motion) -> Humanoid:
-    """As `identify`, but where names say nothing left and right are told from the recorded poses.
+    """Identify joints as `identify_joints` does, but tell left from right by recorded poses where names say nothing.
 
-    A rest pose may be folded up; recorded feet point forward and knees bend backward. InputError as there."""
+    A rest pose may be folded up; recorded feet point forward and knees bend backward.
+
+    Args:
+        motion: T frames on the skeleton.
+    Returns:
+        The joints by meaning.
+    Raises:
+        InputError: if no legs can be found.
+    """
     skeleton = motion.skeleton
     parts = [side_and_part(name) for name in skeleton.names]
     roles = _named(parts)
@@ -129,6 +157,7 @@ def identify_posed(motion: Motion) -> Humanoid:
 
 @lru_cache(maxsize=256)
 def _identify(names: tuple[str, ...], parents: tuple[int, ...], offsets: bytes, tips: tuple) -> Humanoid:
+    """Identify joints from hashable parts of a skeleton, so that results can be cached."""
     roles = _named([side_and_part(name) for name in names])
     if not _has_legs(roles):
         ends = np.frombuffer(tips[1]).reshape(-1, 3)
@@ -138,7 +167,7 @@ def _identify(names: tuple[str, ...], parents: tuple[int, ...], offsets: bytes, 
 
 
 def _found(skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray) -> dict[str, int] | None:
-    """Roles by structure from poses: root (T, 3) metres, local rotations (T, J, 4)."""
+    """Find roles by structure from poses: root (T, 3) metres, local rotations (T, J, 4)."""
     places, world = pose_kinematics(skeleton, root, rotations)
     tips = places.copy()
     for joint, offset in zip(skeleton.end_parents, skeleton.end_offsets):
@@ -147,15 +176,25 @@ def _found(skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray) -> dict[
 
 
 def _fitting(found: dict[str, int] | None, named: dict[str, int]) -> dict[str, int]:
-    """Roles found by structure, or those that names tell where it found none, or took a named arm for a leg."""
+    """Choose the roles found by structure, or the named ones if structure finds none or takes a named arm for a leg."""
     arms = {joint for role, joint in named.items() if role.endswith(("arm", "hand"))}
     return named if not found or arms & {found[role] for role in _LEG_ROLES} else found
 
 
 def assemble(names: tuple[str, ...], parents: tuple[int, ...], roles: Mapping[str, int]) -> Humanoid:
-    """A body from what is known about it. roles: "hips", "neck", "head", "left upper_leg" and the like -> joint.
+    """Build a humanoid from known roles.
 
-    Hips, spine, neck and head that are not named are found from where legs and arms hang. InputError without legs."""
+    Hips, spine, neck and head that are not named are found from where legs and arms hang.
+
+    Args:
+        names: J joint names.
+        parents: J indices, -1 for the root.
+        roles: "hips", "neck", "head", "left upper_leg" and the like -> joint.
+    Returns:
+        The joints by meaning.
+    Raises:
+        InputError: if a leg's joint is missing.
+    """
     roles = dict(roles)
     if not _has_legs(roles):
         missing = [part for part in _LEG_ROLES if part not in roles]
@@ -185,7 +224,7 @@ def assemble(names: tuple[str, ...], parents: tuple[int, ...], roles: Mapping[st
 
 
 def roles_of(body: Humanoid) -> dict[str, int]:
-    """The inverse of `assemble`: every part that the body has, without its spine."""
+    """List every role that the body has with its joint, without the spine: the inverse of `build_humanoid`."""
     found = {"hips": body.hips, "neck": body.neck, "head": body.head}
     for side, limb in (("left", body.left), ("right", body.right)):
         found.update({f"{side} {part}": getattr(limb, part) for part in _LIMB_NAMES})
@@ -200,7 +239,7 @@ def _has_legs(roles: Mapping[str, int]) -> bool:
 
 
 def _named(parts) -> dict[str, int]:
-    """Roles that names tell."""
+    """Find the roles that names show."""
     roles: dict[str, int | None] = {centre: _centre(parts, centre) for centre in _CENTRE_NAMES}
     for side in ("left", "right"):
         roles.update({f"{side} {part}": joint for part, joint in _limb(parts, side).items()})
@@ -208,6 +247,7 @@ def _named(parts) -> dict[str, int]:
 
 
 def _limb(parts, side: str) -> dict[str, int | None]:
+    """Find the joints of one side's limb parts by name; None for a part without a name."""
     places = {rest: i for i, (s, rest) in reversed(list(enumerate(parts))) if s == side}
     found = {part: next((places[o] for o in names if o in places), None) for part, names in _LIMB_NAMES.items()}
     if found["upper_arm"] is None and "shoulder" in places:  # collar, shoulder, elbow, wrist: the joints' own names
@@ -224,7 +264,7 @@ def _centre(parts, part: str) -> int | None:
 
 
 def _mirror(parts, parents, roles: Mapping[str, int]) -> tuple[int, ...]:
-    """For each joint the one on the other side (itself where there is none)."""
+    """Find for each joint the one on the other side (itself where there is none)."""
     other = {"left": "right", "right": "left", "": ""}
     places = {part: i for i, part in reversed(list(enumerate(parts)))}
     if any(side for side, _ in parts):
@@ -234,10 +274,20 @@ def _mirror(parts, parents, roles: Mapping[str, int]) -> tuple[int, ...]:
 
 
 def heading_from_positions(skeleton: Skeleton, positions: np.ndarray) -> np.ndarray:
-    """Facing about Z, radians, 0 along +X: (..., J, 3) world positions -> (...,).
+    """Compute the heading of a body about Z.
 
-    Across = from right to left upper legs plus from right to left upper arms, so that neither a twisted pelvis nor
-    twisted shoulders alone decide; facing is across x up."""
+    The axis across the body is the sum of the vectors from right to left upper legs and from right to left upper arms,
+    so
+    that neither a twisted pelvis nor twisted shoulders alone decide; the heading is across x up.
+
+    Args:
+        skeleton: J joints.
+        positions: (..., J, 3) world positions, metres.
+    Returns:
+        (...,) radians, 0 along +X.
+    Raises:
+        InputError: if the skeleton has no legs.
+    """
     body = identify(skeleton)
     across = positions[..., body.left.upper_leg, :] - positions[..., body.right.upper_leg, :]
     if body.left.upper_arm is not None and body.right.upper_arm is not None:
@@ -246,7 +296,7 @@ def heading_from_positions(skeleton: Skeleton, positions: np.ndarray) -> np.ndar
 
 
 def heading(motion: Motion) -> np.ndarray:
-    """Facing about Z per frame, radians, unwrapped: (T,)."""
+    """Compute the heading about Z of every frame: (T,) radians, unwrapped."""
     positions, _ = forward_kinematics(motion)
     return np.unwrap(heading_from_positions(motion.skeleton, positions))
 
@@ -256,12 +306,13 @@ LEG_SHARE = 0.485
 
 
 def stature(skeleton: Skeleton) -> float:
-    """Metres that a body with these legs is tall; recordings seldom have a joint at the top of the head."""
+    """Estimate the stature in metres of a body with these legs; recordings seldom have a joint at the top of the head.
+    """
     return leg_length(skeleton) / LEG_SHARE
 
 
 def leg_length(skeleton: Skeleton) -> float:
-    """Mean length in metres of upper plus lower legs."""
+    """Measure the mean length in metres of upper plus lower legs."""
     body = identify(skeleton)
     lengths = [
         np.linalg.norm(skeleton.offsets[limb.lower_leg]) + np.linalg.norm(skeleton.offsets[limb.foot])

@@ -1,10 +1,11 @@
-"""Limbs of two bones that reach: where the middle joint goes when the end joint is asked to be somewhere, and two-bone
-inverse kinematics on a skeleton, over all frames at once, without stretching a bone.
+"""Two-bone inverse kinematics: limbs reach for targets over all frames at once, without stretching a bone.
 
-Tolani, Goswami and Badler 2000 ("Real-time inverse kinematics techniques for anthropomorphic limbs"): the triangle of
-upper bone, lower bone and the line to the target leaves one freedom, the direction in which the middle joint points
-(the pole). The knee keeps the plane in which it bends in the pose that is given; where the limb is so straight that it
-shows none, the plane comes from the frames where it is bent."""
+The triangle of upper bone, lower bone and the line to the target leaves one degree of freedom: the direction in which
+the middle joint points (the pole). The knee keeps the plane in which it bends in the given pose. Where the limb is too
+straight to show a plane, the plane comes from the frames in which it is bent.
+
+Source: Tolani, Goswami and Badler 2000, "Real-time inverse kinematics techniques for anthropomorphic limbs".
+"""
 
 from __future__ import annotations
 
@@ -20,28 +21,37 @@ from .motion import pose_kinematics
 from .retargeting.structure import list_between, path
 from .skeleton import Skeleton
 
-# below this distance from the line hip-ankle (share of the limb's length) a knee's direction is taken from other frames
+# below this distance of the knee from the line hip-ankle (share of the limb's length) its direction comes from other
+# frames
 CLEAR_BEND = 0.06
 
 
 def soft_distance(distance: np.ndarray, longest: np.ndarray, soft: float | np.ndarray, xp=np) -> np.ndarray:
-    """The reach that is played for an asked one, metres: exact up to `soft` below the limb's length, then nearing it.
+    """Soften a limb's reach near full extension, so that a knee does not snap straight.
 
-    distance (...,) asked, longest (...,) upper plus lower bone, soft one or (...,); C1, so that a knee does not snap
-    straight. xp: array module, numpy or jax.numpy."""
+    The result equals the requested distance up to `soft` below the limb's length and then approaches that length (C1).
+
+    Args:
+        distance: (...,) requested distance from the limb's first to its last joint, metres.
+        longest: (...,) length of upper plus lower bone, metres.
+        soft: one value or (...,), metres below full length at which softening starts.
+        xp: array module, numpy or jax.numpy.
+    Returns:
+        (...,) the distance to use, metres.
+    """
     start = longest - soft
     beyond = xp.maximum(distance - start, 0.0)
     return xp.where(distance > start, longest - soft * xp.exp(-beyond / soft), distance)
 
 
 def inner_angle(upper, lower, length) -> np.ndarray:
-    """The angle between two bones at the joint between them, by the law of cosines.
+    """Compute the angle between two bones at the joint between them, by the law of cosines.
 
     Args:
-        upper, lower: (...,), lengths of the bones, m.
-        length: (...,), distance between their far ends, m.
+        upper, lower: (...,) lengths of the bones, metres.
+        length: (...,) distance between their far ends, metres.
     Returns:
-        (...,), rad, from 0 folded to pi straight.
+        (...,) radians, from 0 folded to pi straight.
     """
     return np.arccos(np.clip((upper**2 + lower**2 - length**2) / (2.0 * upper * lower), -1.0, 1.0))
 
@@ -50,12 +60,21 @@ def bend(
     top: np.ndarray, target: np.ndarray, upper: np.ndarray, lower: np.ndarray, pole: np.ndarray,
     soft: float | np.ndarray = 0.01,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Middle joint (..., 3), end joint (..., 3) and hinge axis (..., 3) of a limb that reaches for `target`.
+    """Solve the middle and end joint of a limb that reaches for a target.
 
-    top, target (..., 3) metres, world. upper, lower (...,) bone lengths, metres. pole (..., 3): roughly where the
-    middle joint points. soft: metres of soft reach. The hinge is the unit axis about which the middle joint bends:
-    direction of the limb x pole. A target out of reach is neared along its line; one too near is kept away by the
-    difference of the bones."""
+    A target out of reach is approached along its line; one that is too near is kept away by the difference of the
+    bones.
+
+    Args:
+        top: (..., 3) the limb's first joint, metres, world.
+        target: (..., 3) where the end joint should be, metres, world.
+        upper, lower: (...,) bone lengths, metres.
+        pole: (..., 3) direction in which the middle joint roughly points, world.
+        soft: metres of soft reach, see `soften_distance`.
+    Returns:
+        Middle joint (..., 3), end joint (..., 3), and hinge (..., 3): the unit axis about which the middle joint bends,
+        direction of the limb x pole.
+    """
     line = target - top
     asked = np.linalg.norm(line, axis=-1)
     direction = unit_vectors(line, np.array([0.0, 0.0, -1.0]))
@@ -63,6 +82,7 @@ def bend(
     reach = np.maximum(soft_distance(asked, upper + lower, soft), nearest)
     across = pole - np.sum(pole * direction, axis=-1, keepdims=True) * direction
     across = _unit_across(across, direction)
+    # position of the middle joint along the line and its height off it, from the triangle's three sides
     along = (upper**2 - lower**2 + reach**2) / (2.0 * reach)
     height = np.sqrt(np.maximum(upper**2 - along**2, 0.0))
     middle = top + along[..., None] * direction + height[..., None] * across
@@ -70,9 +90,16 @@ def bend(
 
 
 def bone_frame(direction: np.ndarray, hinge: np.ndarray) -> np.ndarray:
-    """Rotations (..., 4) that turn -Z onto `direction` (..., 3) and +Y onto the part of -`hinge` that is square to it.
+    """Build the rotations (..., 4) that turn -Z onto a bone and +Y onto the part of -hinge that is square to it.
 
-    A leg that hangs straight down with its knee pointing along +X has direction -Z and hinge -Y: the identity."""
+    A leg that hangs straight down with its knee pointing along +X has direction -Z and hinge -Y: the identity.
+
+    Args:
+        direction: (..., 3) unit direction of the bone, world.
+        hinge: (..., 3) axis about which the joint bends, world.
+    Returns:
+        (..., 4) unit quaternions.
+    """
     left = -(hinge - np.sum(hinge * direction, axis=-1, keepdims=True) * direction)
     left = _unit_across(left, direction)
     forward = cross(left, -direction)
@@ -81,7 +108,12 @@ def bone_frame(direction: np.ndarray, hinge: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class Reached:
-    """What came of it. rotations (T, J, 4) local, miss (T,) metres between the end joint and its target."""
+    """The result of two-bone inverse kinematics.
+
+    Attributes:
+        rotations: (T, J, 4) local rotations.
+        miss: (T,) metres between the end joint and its target.
+    """
 
     rotations: np.ndarray
     miss: np.ndarray
@@ -92,17 +124,28 @@ def two_bone(
     end_rotation: np.ndarray | None = None, keep_end_rotation: bool = True, pole: np.ndarray | None = None,
     soft: float | np.ndarray = 0.01,
 ) -> Reached:
-    """Local rotations with which a limb's end joint is at `target`.
+    """Solve the local rotations with which a limb's end joint is at a target.
 
-    root (T, 3) metres, world; rotations (T, J, 4) local; joints: upper, middle and end joint (hip, knee, ankle or
-    shoulder, elbow, wrist), each below the one before, further joints between allowed; target (T, 3) metres, world.
-    end_rotation (T, 4): world rotation that the end joint gets; without it the end joint keeps its own, or (with
-    keep_end_rotation false) turns rigidly with the lower bone. pole (T, 3): world direction in which the middle joint
-    points; without it the pose's own. soft, one or (T,): metres below full extension from where the limb eases, see
-    `soft_distance`: the miss is at most soft / e = 0.37 soft where the target is in reach.
+    Bones are never stretched; a target out of reach is approached along the line from the upper joint.
 
-    Bones are never stretched; a target out of reach is neared along the line from the upper joint.
-    Raises InputError where a joint does not hang below the one before. Source: Tolani, Goswami and Badler 2000."""
+    Args:
+        skeleton: J joints.
+        root: (T, 3) root positions, metres, world.
+        rotations: (T, J, 4) local rotations.
+        joints: upper, middle and end joint (hip, knee, ankle or shoulder, elbow, wrist), each below the one before;
+            further joints may lie between them.
+        target: (T, 3) metres, world.
+        end_rotation: (T, 4) world rotation that the end joint gets; None keeps its own.
+        keep_end_rotation: without `end_rotation`, False rotates the end joint rigidly with the lower bone.
+        pole: (T, 3) world direction in which the middle joint points; None keeps the pose's own.
+        soft: one value or (T,), metres below full extension from where the limb eases, see `soften_distance`. Where the
+            target is in reach the miss is at most soft / e = 0.37 soft.
+    Returns:
+        The rotations and the remaining distances.
+    Raises:
+        InputError: if a joint does not hang below the one before.
+    Source: Tolani, Goswami and Badler 2000.
+    """
     _check_chain(skeleton, joints)
     places, world = pose_kinematics(skeleton, root, rotations)
     end: dict[str, Any] = {"end_rotation": end_rotation, "keep_end_rotation": keep_end_rotation}
@@ -118,9 +161,18 @@ def bent_limb(
     end_rotation: np.ndarray | None = None, keep_end_rotation: bool = True, pole: np.ndarray | None = None,
     soft: float | np.ndarray = 0.01, clear: float | np.ndarray = CLEAR_BEND,
 ) -> tuple[dict[int, np.ndarray], np.ndarray]:
-    """As `two_bone`, of a body whose joints' places (T, J, 3) m and world rotations (T, J, 4) are known, those of the
-    limb at least: the new local rotations (T, 4) by joint, and the miss (T,) m. clear, one or (T,): share of the limb's
-    length by which a knee has to be off the line hip-ankle for its direction to be believed."""
+    """Solve a limb as `solve_two_bone` does, for a body whose joint positions and world rotations are known.
+
+    Args:
+        skeleton: J joints.
+        places: (T, J, 3) joint positions, metres, world; those of the limb at least.
+        world: (T, J, 4) world rotations; those of the limb at least.
+        joints, target, end_rotation, keep_end_rotation, pole, soft: as for `solve_two_bone`.
+        min_bend: one value or (T,), share of the limb's length by which a knee has to be off the line hip-ankle for its
+            direction to be trusted.
+    Returns:
+        The new local rotations (T, 4) by joint, and the miss (T,) in metres.
+    """
     upper, middle, end = joints
     target = np.asarray(target, dtype=float)
     top, knee, ankle = places[:, upper], places[:, middle], places[:, end]
@@ -130,6 +182,7 @@ def bent_limb(
     new_pole = quaternion.rotate(swing, old_pole) if pole is None else np.asarray(pole, dtype=float)
     new_knee, new_ankle, new_hinge = bend(top, target, *lengths, new_pole, soft)
     old_hinge = cross(unit_vectors(ankle - top, np.array([0.0, 0.0, -1.0])), old_pole)
+    # how much each bone rotates: its new frame (direction, hinge) times the inverse of its old one
     turns = [
         quaternion.multiply(_frame_bone(b - a, new_hinge), quaternion.inverse(_frame_bone(d - c, old_hinge)))
         for a, b, c, d in ((top, new_knee, top, knee), (new_knee, new_ankle, knee, ankle))
@@ -147,7 +200,7 @@ def bent_limb(
 
 
 def _unit_across(v: np.ndarray, direction: np.ndarray) -> np.ndarray:
-    """Vectors (..., 3) at length one; any square to `direction` (..., 3) where they have none."""
+    """Normalize vectors (..., 3); where they have no length take any unit vector square to `direction` (..., 3)."""
     length = np.linalg.norm(v, axis=-1, keepdims=True)
     return v / length if np.all(length > 1e-9) else unit_vectors(v, _any_normal(direction))
 
@@ -159,6 +212,7 @@ def _any_normal(direction: np.ndarray) -> np.ndarray:
 
 
 def _check_chain(skeleton: Skeleton, joints: tuple[int, int, int]) -> None:
+    """Check that each of the joints hangs below the one before (InputError)."""
     upper, middle, end = joints
     for high, low in ((upper, middle), (middle, end)):
         if high == low or high not in path(skeleton.parents, low):
@@ -166,27 +220,31 @@ def _check_chain(skeleton: Skeleton, joints: tuple[int, int, int]) -> None:
 
 
 def _turn_chain(skeleton: Skeleton, world: np.ndarray, high: int, low: int, turn: np.ndarray) -> None:
-    """Turns all joints from `high` (included) down to `low` (not included) in `world` (T, J, 4)."""
+    """Rotate all joints from `high` (included) down to `low` (not included) in `world` (T, J, 4)."""
     for joint in (high, *list_between(skeleton.parents, high, low)):
         world[:, joint] = quaternion.multiply(turn, world[:, joint])
 
 
 def _compute_local(skeleton: Skeleton, world: np.ndarray, joint: int) -> np.ndarray:
+    """Return the local rotation (T, 4) of a joint from world rotations (T, J, 4)."""
     parent = skeleton.parents[joint]
     return world[:, joint] if parent < 0 else quaternion.multiply(quaternion.inverse(world[:, parent]), world[:, joint])
 
 
 def _frame_bone(direction: np.ndarray, hinge: np.ndarray) -> np.ndarray:
+    """Build the frame of a bone of any length (..., 3)."""
     return bone_frame(unit_vectors(direction, np.array([0.0, 0.0, -1.0])), hinge)
 
 
 def _own_pole(
     top: np.ndarray, knee: np.ndarray, ankle: np.ndarray, upper_world: np.ndarray, clear: float | np.ndarray
 ) -> np.ndarray:
-    """Direction (T, 3) in which the middle joint points in the given pose, unit, square to the line top-ankle.
+    """Estimate the direction (T, 3) in which the middle joint points in the given pose, unit, square to the line top-
+    ankle.
 
-    A nearly straight limb says little: there the direction is mixed with the mean one of all frames, carried by the
-    upper bone (a knee is a hinge), weighted by how clearly each frame shows it."""
+    A nearly straight limb shows little. There the direction is mixed with the mean one of all frames, carried by the
+    upper bone (a knee is a hinge), weighted by how clearly each frame shows it.
+    """
     line = unit_vectors(ankle - top, np.array([0.0, 0.0, -1.0]))
     off = knee - top - np.sum((knee - top) * line, axis=-1, keepdims=True) * line
     length = np.linalg.norm(knee - top, axis=-1) + np.linalg.norm(ankle - knee, axis=-1)
@@ -198,7 +256,7 @@ def _own_pole(
         return unit_vectors(off, across)
     steady = quaternion.rotate(upper_world, mean / np.linalg.norm(mean))
     steady = unit_vectors(steady - np.sum(steady * line, axis=-1, keepdims=True) * line, off)
-    # a frame that bends the other way, as blended poses may, is not believed: its knee would flip
+    # a frame that bends the other way, as blended poses may, gets no weight: its knee would flip
     right_way = np.sum(unit_vectors(off, steady) * steady, axis=-1, keepdims=True)
     weight = np.clip(bent / np.reshape(clear, (-1, 1)), 0.0, 1.0) ** 2 * np.clip(2.0 * right_way, 0.0, 1.0)
     mixed = weight * unit_vectors(off, steady) + (1.0 - weight) * steady

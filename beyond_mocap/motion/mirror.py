@@ -1,10 +1,9 @@
 """Mirroring: left becomes right, so that each recording serves twice (Faustino §3.1.2).
 
-Faustino mirrors joint by joint in the world: a bone points where the mirrored child lies (his X axis, eq. in A), and a
-second axis takes the mirrored direction of the body's facing (his Y or Z axis, B). That fits the one skeleton he had,
-whose X axes all point along the bones; CMU's, LAFAN1's and Bandai-Namco's axes lie otherwise, and differ from joint to
-joint and from left to right. The same idea without axes: a body segment is a rigid thing, and its mirror image is the
-partner's segment.
+Faustino mirrors joint by joint in the world: a bone points where the mirrored child lies (its X axis, eq. in A), and a
+second axis takes the mirrored direction of the body's facing (the Y or Z axis, B). That fits one skeleton whose X axes
+all point along the bones. The axes of CMU, LAFAN1 and Bandai-Namco differ from joint to joint and from left to right.
+This module uses the same idea without axes: a body segment is rigid, and its mirror image is the partner's segment.
 
 Let M = diag(1, -1, 1) mirror the world, R_p the world rotation of joint j's partner p (itself on the centre line), and
 C_j the orthogonal matrix of determinant -1 that takes a point of segment j, in j's axes, to the matching point of
@@ -14,14 +13,14 @@ segment p, in p's. Then the mirrored body has, for every joint,
 
 two improper matrices and a rotation, hence a rotation. C_j follows from the skeleton: it takes the bones that start in
 j to those that start in p (orthogonal Procrustes; left and right may differ in length and, by some degrees, in
-direction; lengths stay those of the skeleton). One bone leaves the turn about itself open, so C_j is pulled slightly
-towards a usual matrix D_j. Where the rest pose is its own mirror image (nearly all rigs), D is that mirror for all
-joints. Where it is not (Bandai-Namco's limbs have axes of mirrored behaviour, left bones along +X, right ones along
--X), D_j is a mirror along an axis or the inversion -1: the one that carries bones to bones and makes the joint's mean
-rotation relative to its parent come out alike left and right; the candidates differ by half turns, far more than left
+direction; lengths stay those of the skeleton). One bone leaves the rotation about itself open, so C_j is pulled
+slightly towards a preferred matrix D_j. Where the rest pose is its own mirror image (nearly all rigs), D is that mirror
+for all joints. Where it is not (Bandai-Namco's limbs have mirrored axes, left bones along +X, right ones along -X), D_j
+is a mirror along an axis or the inversion -1: the candidate that carries bones to bones and makes the joint's mean
+rotation relative to its parent come out alike left and right. The candidates differ by half turns, far more than left
 and right do in any movement.
 
-C_p is the inverse of C_j, therefore mirroring twice gives back the motion, on any skeleton, to rounding.
+C_p is the inverse of C_j, so mirroring twice gives back the motion, on any skeleton, to rounding.
 """
 
 from __future__ import annotations
@@ -36,21 +35,31 @@ from .skeleton import Skeleton
 
 _FLIPS = np.stack([np.diag(signs) for signs in ((-1.0, 1, 1), (1.0, -1, 1), (1.0, 1, -1), (-1.0, -1, -1))])
 _WORLD = _FLIPS[1]
-_PULL = 1e-3  # of D_j against the bones: decides what bones leave open, and moves them by less than 0.01 degrees
+_PULL = 1e-3  # weight of D_j against the bones: decides what bones leave open, and moves them by less than 0.01 degrees
 _SYMMETRIC = 0.1  # squared misfit of the rest pose with its mirror image, over its bones' squared lengths
 _GEOMETRY_WEIGHT = 4.0
-_CHANGE = 3.0  # by how much another D than the parent's has to be better
-_FRAMES = 256  # of a motion that are looked at
+_CHANGE = 3.0  # lower cost that another D than the parent's needs to be chosen
+_FRAMES = 256  # frames of a motion that are looked at
 
 
 def mirror(motion: Motion) -> Motion:
-    """The same skeleton doing with its left what `motion` does with its right, mirrored at the plane y = 0.
+    """Mirror a motion at the plane y = 0: the skeleton does with its left what it did with its right.
 
-    Travel along X and heights stay, Y turns its sign. Bones keep their lengths; where left and right ones differ, feet
-    and hands end up off the exact mirror image by that difference. Raises InputError where the skeleton has no legs."""
+    Bones keep their lengths. Where left and right bones differ, feet and hands are off the exact mirror image by that
+    difference.
+
+    Args:
+        motion: the motion to mirror, world frame, Z up.
+    Returns:
+        The mirrored motion on the same skeleton at the same rate: X and heights stay, Y changes its sign.
+    Raises:
+        InputError: if the skeleton has no legs.
+    Source: Faustino 2024, section 3.1.2.
+    """
     body = identify(motion.skeleton)
     corrections = quaternion.from_matrix(_WORLD @ _correspondence(motion, body))
     _, world = pose_kinematics(motion.skeleton, motion.root_positions, motion.rotations)
+    # quaternion form (w, x, y, z) of M R M:
     # M R M keeps the angle; its axis, a pseudovector, keeps its y and turns the others
     turned = world[:, list(body.mirror)] * (1.0, -1.0, 1.0, -1.0)
     world = quaternion.multiply(turned, corrections)
@@ -59,7 +68,7 @@ def mirror(motion: Motion) -> Motion:
 
 
 def _correspondence(motion: Motion, body: Humanoid) -> np.ndarray:
-    """C_j for all joints: (J, 3, 3), orthogonal, determinant -1."""
+    """Solve C_j for all joints: (J, 3, 3), orthogonal, determinant -1."""
     pairs = [_bone_pairs(motion.skeleton, body, joint) for joint in range(len(motion.skeleton))]
     rest = _rest_mirror(motion.skeleton, body)
     bones, images = (np.concatenate(side) for side in zip(*pairs))
@@ -71,7 +80,7 @@ def _correspondence(motion: Motion, body: Humanoid) -> np.ndarray:
 
 
 def _rest_mirror(skeleton: Skeleton, body: Humanoid) -> np.ndarray:
-    """The mirror (3, 3) of the rest pose: across the line from hip to hip."""
+    """Return the mirror (3, 3) of the rest pose: the reflection across the line from hip to hip."""
     rest, _ = pose_kinematics(skeleton, np.zeros(3), quaternion.identity(len(skeleton)))
     across = rest[body.left.upper_leg] - rest[body.right.upper_leg]
     across = unit_vector(across)
@@ -79,7 +88,7 @@ def _rest_mirror(skeleton: Skeleton, body: Humanoid) -> np.ndarray:
 
 
 def _chosen(motion: Motion, body: Humanoid, rest: np.ndarray, pairs) -> list[np.ndarray]:
-    """D_j (3, 3) for all joints where the rest pose does not tell; `pairs` as of `_bone_pairs`."""
+    """Choose D_j (3, 3) for all joints where the rest pose is not symmetric; `pairs` as from `_collect_bone_pairs`."""
     usual = np.stack([rest, *_FLIPS])
     frames = np.unique(np.linspace(0, len(motion) - 1, _FRAMES).astype(int))
     mean = quaternion.to_matrix(motion.rotations[frames]).mean(axis=0)
@@ -94,7 +103,8 @@ def _chosen(motion: Motion, body: Humanoid, rest: np.ndarray, pairs) -> list[np.
 
 
 def _bone_pairs(skeleton: Skeleton, body: Humanoid, joint: int) -> tuple[np.ndarray, np.ndarray]:
-    """Offsets (B, 3) in metres of the bones that start in `joint`, and of the matching ones of its partner."""
+    """Collect the offsets (B, 3) in metres of the bones that start in `joint`, and of the matching ones of its partner.
+    """
     partner = body.mirror[joint]
     pairs = [
         (skeleton.offsets[child], skeleton.offsets[body.mirror[child]])
@@ -108,10 +118,19 @@ def _bone_pairs(skeleton: Skeleton, body: Humanoid, joint: int) -> tuple[np.ndar
 
 
 def _choose(usual, pair, before, mean, partner_mean) -> np.ndarray:
-    """The D (3, 3) of a joint from `usual` (D, 3, 3): how it carries bones to bones (`pair`), and mean rotations.
+    """Choose the D (3, 3) of one joint from the candidates (D, 3, 3).
 
-    In the mirrored body a local rotation is C_parent^-1 L_p C_j, which should look like L_j on average. `before`: the
-    parent's D, None at the root, whose rotation has no parent to be compared with."""
+    In the mirrored body a local rotation is C_parent^-1 L_p C_j, which should look like L_j on average.
+
+    Args:
+        candidates: (D, 3, 3) candidate reflections.
+        pair: offsets (B, 3) of the joint's bones and of its partner's, metres.
+        parent_reflection: (3, 3) the parent's D; None at the root, whose rotation has no parent to be compared with.
+        mean: (3, 3) mean local rotation matrix of the joint.
+        partner_mean: (3, 3) the same of its partner.
+    Returns:
+        The candidate of lowest cost: misfit of the bones, of the mean rotations, and of a change against the parent.
+    """
     bones, images = pair
     length = max(np.sum(bones**2), 1e-12)
     misfit = np.sum((bones @ usual.transpose(0, 2, 1) - images) ** 2, axis=(1, 2)) / length
@@ -123,8 +142,10 @@ def _choose(usual, pair, before, mean, partner_mean) -> np.ndarray:
 
 
 def _procrustes(bones: np.ndarray, images: np.ndarray, pull: np.ndarray) -> np.ndarray:
-    """The orthogonal matrix of determinant -1 that carries bones (B, 3) to images best; `pull` decides the rest."""
-    # the same scale for joint and partner, so that theirs are inverse to each other
+    """Fit the orthogonal matrix of determinant -1 that carries bones (B, 3) to images (B, 3); `preferred` decides the
+    rest.
+    """
+    # the same scale for a joint and its partner, so that their matrices are inverse to each other
     scale = np.sqrt(np.sum(bones**2) * np.sum(images**2)) or 1.0
     u, _, v = np.linalg.svd(images.T @ bones / scale + _PULL * pull)
     return u @ np.diag([1.0, 1.0, -np.linalg.det(u) * np.linalg.det(v)]) @ v

@@ -1,4 +1,4 @@
-"""A motion: one skeleton moving; and the few things everyone does to motions (forward kinematics, sampling, placing).
+"""A motion: one skeleton moving; with forward kinematics, sampling and placing.
 
 `Motion` is frozen and its arrays are read-only; every function returns a new one.
 """
@@ -14,15 +14,20 @@ from . import quaternion
 from .skeleton import Skeleton, frozen_array
 
 _CUBIC_REACH = 8
-"""Frames to either side that a place between two frames depends on; a spline forgets at 0.27 a frame."""
+"""Frames to either side on which a value between two frames depends; a spline's memory fades by 0.27 a frame."""
 
 
 @dataclass(frozen=True, eq=False)
 class Motion:
     """A skeleton's movement (Faustino §2.3.1 eq. 4).
 
-    root_positions: (T, 3) metres, world, Z up. rotations: (T, J, 4) unit quaternions, each relative to its parent (the
-    root's to the world), sign-continuous over time. fps: frames per second."""
+    Attributes:
+        skeleton: J joints.
+        root_positions: (T, 3) metres, world, Z up.
+        rotations: (T, J, 4) unit quaternions, each relative to its parent (the root's to the world), sign-continuous
+            over time.
+        fps: frames per second.
+    """
 
     skeleton: Skeleton
     root_positions: np.ndarray
@@ -51,25 +56,34 @@ class Motion:
         return (len(self) - 1) / self.fps
 
     def frames(self, start: int, stop: int) -> "Motion":
-        """Frames start .. stop-1."""
+        """Return frames start .. stop-1 as a motion."""
         return replace(self, root_positions=self.root_positions[start:stop], rotations=self.rotations[start:stop])
 
 
 def _unit(q: np.ndarray) -> np.ndarray:
-    """Unit quaternions, untouched where they already are: dividing again would change the last bits at every copy."""
+    """Normalize quaternions, but leave unit ones as they are: dividing again would change the last bits at every copy.
+    """
     q = np.asarray(q, dtype=float)
     return q if np.all(np.abs(np.sum(q * q, axis=-1) - 1.0) < 1e-12) else quaternion.normalized(q)
 
 
 def forward_kinematics(motion: Motion) -> tuple[np.ndarray, np.ndarray]:
-    """World positions (T, J, 3) in metres and world rotations (T, J, 4) of all joints."""
+    """Compute world positions (T, J, 3) in metres and world rotations (T, J, 4) of all joints."""
     return pose_kinematics(motion.skeleton, motion.root_positions, motion.rotations)
 
 
 def pose_kinematics(skeleton: Skeleton, root: np.ndarray, local: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """World positions (..., J, 3) and rotations (..., J, 4) from roots (..., 3) and local rotations (..., J, 4).
+    """Compute world positions and rotations of poses.
 
-    Works joint by joint on component-first arrays: one contiguous run per component is what makes numpy fast here."""
+    Works joint by joint on component-first arrays: one contiguous run per component is what makes numpy fast here.
+
+    Args:
+        skeleton: J joints.
+        root: (..., 3) root positions, metres, world.
+        local: (..., J, 4) local rotations.
+    Returns:
+        Positions (..., J, 3) in metres and rotations (..., J, 4), world.
+    """
     lead = local.shape[:-2]
     flat = np.ascontiguousarray(local.reshape(-1, len(skeleton), 4).transpose(1, 2, 0))
     world = np.empty_like(flat)
@@ -81,6 +95,7 @@ def pose_kinematics(skeleton: Skeleton, root: np.ndarray, local: np.ndarray) -> 
             continue
         aw, ax, ay, az = world[parent]
         bw, bx, by, bz = flat[joint]
+        # the quaternion product parent x local, written out by component
         world[joint, 0] = aw * bw - ax * bx - ay * by - az * bz
         world[joint, 1] = aw * bx + ax * bw + ay * bz - az * by
         world[joint, 2] = aw * by - ax * bz + ay * bw + az * bx
@@ -93,7 +108,7 @@ def pose_kinematics(skeleton: Skeleton, root: np.ndarray, local: np.ndarray) -> 
 
 
 def _turn(q: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """One constant vector (3,) turned by component-first rotations (4, N): (3, N)."""
+    """Rotate one constant vector (3,) by component-first rotations (4, N): (3, N)."""
     w, x, y, z = q
     vx, vy, vz = v
     tx, ty, tz = 2 * (y * vz - z * vy), 2 * (z * vx - x * vz), 2 * (x * vy - y * vx)
@@ -101,13 +116,13 @@ def _turn(q: np.ndarray, v: np.ndarray) -> np.ndarray:
 
 
 def local_rotations(skeleton: Skeleton, world: np.ndarray) -> np.ndarray:
-    """Each joint's rotation against its parent's.
+    """Compute each joint's rotation relative to its parent's.
 
     Args:
         skeleton: J joints, the root first.
-        world: (..., J, 4), world rotations.
+        world: (..., J, 4) world rotations.
     Returns:
-        (..., J, 4), local rotations.
+        (..., J, 4) local rotations.
     """
     local, parents = world.copy(), list(skeleton.parents[1:])
     local[..., 1:, :] = quaternion.multiply(quaternion.inverse(world[..., parents, :]), world[..., 1:, :])
@@ -115,7 +130,7 @@ def local_rotations(skeleton: Skeleton, world: np.ndarray) -> np.ndarray:
 
 
 def world_rotation(skeleton: Skeleton, local: np.ndarray, joint: int) -> np.ndarray:
-    """World rotation (T, 4) of one joint, from local rotations (T, J, 4)."""
+    """Compute the world rotation (T, 4) of one joint from local rotations (T, J, 4)."""
     world = local[:, joint]
     while (joint := skeleton.parents[joint]) >= 0:
         world = quaternion.multiply(local[:, joint], world)
@@ -123,16 +138,22 @@ def world_rotation(skeleton: Skeleton, local: np.ndarray, joint: int) -> np.ndar
 
 
 def end_positions(motion: Motion) -> np.ndarray:
-    """World positions (T, E, 3) in metres of the skeleton's tips (BVH End Sites)."""
+    """Compute the world positions (T, E, 3) in metres of the skeleton's tips (BVH End Sites)."""
     positions, rotations = forward_kinematics(motion)
     parents = list(motion.skeleton.end_parents)
     return positions[:, parents] + quaternion.rotate(rotations[:, parents], motion.skeleton.end_offsets)
 
 
 def at_frames(motion: Motion, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Root positions (N, 3) and local rotations (N, J, 4) at fractional frames (N,), clamped to the motion.
+    """Sample a motion at fractional frames: positions linear, rotations slerped.
 
-    Positions linear, rotations slerped: Faustino §3.3.2."""
+    Args:
+        motion: T frames.
+        frames: (N,) fractional frames, clamped to the motion.
+    Returns:
+        Root positions (N, 3) in metres and local rotations (N, J, 4).
+    Source: Faustino 2024, section 3.3.2.
+    """
     frames = np.clip(np.asarray(frames, dtype=float), 0.0, len(motion) - 1)
     low = np.minimum(np.floor(frames).astype(int), max(len(motion) - 2, 0))
     high = np.minimum(low + 1, len(motion) - 1)
@@ -144,15 +165,24 @@ def at_frames(motion: Motion, frames: np.ndarray) -> tuple[np.ndarray, np.ndarra
 
 
 def cubic_at(motion: Motion, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Root positions (N, 3) m and local rotations (N, J, 4) at fractional frames (N,), clamped to the motion, on cubic
-    splines through the frames.
+    """Sample a motion at fractional frames on cubic splines through its frames.
 
-    Linear steps (`at_frames`) go round corners at every frame. Joints that turn fast are followed much better by
-    splines of their rotations than by splines of where they are: a hand that throws at 20 m/s, given 30 times a second,
-    has its velocity within 1 %; by places it would lose 10 %."""
+    Linear steps (`sample_frames`) have a corner at every frame. Joints that rotate fast are followed much better by
+    splines
+    of their rotations than by splines of their positions: a hand that throws at 20 m/s, sampled 30 times a second, has
+    its
+    velocity within 1 %; by positions it would lose 10 %.
+
+    Args:
+        motion: T frames.
+        frames: (N,) fractional frames, clamped to the motion.
+    Returns:
+        Root positions (N, 3) in metres and local rotations (N, J, 4).
+    """
     from scipy.interpolate import CubicSpline
 
     frames = np.clip(np.asarray(frames, dtype=float), 0.0, len(motion) - 1)
+    # a spline through the frames near the samples only: frames further away have no influence
     low = max(int(np.floor(frames.min())) - _CUBIC_REACH, 0)
     high = min(int(np.ceil(frames.max())) + _CUBIC_REACH, len(motion) - 1)
     if high == low:
@@ -164,7 +194,14 @@ def cubic_at(motion: Motion, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray
 
 
 def resample(motion: Motion, fps: float) -> Motion:
-    """The motion at another rate: frame 0 stays, the last frame is the last that lies within the old duration."""
+    """Resample a motion to another rate: frame 0 stays, the last frame is the last one within the old duration.
+
+    Args:
+        motion: T frames.
+        fps: frames per second of the result.
+    Returns:
+        The motion at that rate.
+    """
     if abs(fps - motion.fps) < 1e-9:
         return motion
     count = int(np.floor(motion.duration * fps + 1e-6)) + 1
@@ -173,7 +210,15 @@ def resample(motion: Motion, fps: float) -> Motion:
 
 
 def place(motion: Motion, angle: float | np.ndarray = 0.0, offset=(0.0, 0.0, 0.0)) -> Motion:
-    """The motion turned by `angle` radians (one, or one per frame) about the world's Z, moved by `offset` metres."""
+    """Rotate a motion about the world's Z axis and move it.
+
+    Args:
+        motion: T frames.
+        angle: radians, one or (T,).
+        offset: (3,) or (T, 3) metres, added after the rotation.
+    Returns:
+        The placed motion.
+    """
     turn = quaternion.about_up(np.broadcast_to(angle, (len(motion),)))
     rotations = motion.rotations.copy()
     rotations[:, 0] = quaternion.multiply(turn, rotations[:, 0])
@@ -181,7 +226,7 @@ def place(motion: Motion, angle: float | np.ndarray = 0.0, offset=(0.0, 0.0, 0.0
 
 
 def concatenate(motions: list[Motion]) -> Motion:
-    """One motion after the other, same skeleton and rate; nothing is aligned or blended."""
+    """Concatenate motions of one skeleton and rate; nothing is aligned or blended."""
     first = motions[0]
     return replace(
         first,

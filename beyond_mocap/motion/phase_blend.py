@@ -1,10 +1,10 @@
-"""Locomotion between two recorded speeds, blended from both in phase (Faustino §6.2).
+"""Locomotion between two recorded speeds, blended in phase from both recordings (Faustino §6.2).
 
-Two recordings of steady locomotion are laid side by side step by step: every landing of a foot is a whole (left) or
-half (right) stride, so that at the same phase both bodies do the same thing. Joint rotations, the pelvis's height and
-sway are then mixed; so is the way travelled *per stride*, while a stride's duration is mixed in the logarithm: a foot
-that stands still in both recordings then hardly slides in the mixture. (Park, Shin and Shin 2002, "On-line locomotion
-generation based on motion blending", mix parameterized recordings in this manner.)
+Two recordings of steady locomotion are aligned step by step: every landing of a foot is a whole (left) or half (right)
+stride, so that at the same phase both bodies do the same thing. Joint rotations, the pelvis's height and its sway are
+then mixed. So is the distance travelled *per stride*, while a stride's duration is mixed in the logarithm: a foot that
+is still in both recordings then hardly slides in the mixture. Park, Shin and Shin 2002, "On-line locomotion generation
+based on motion blending", mix parameterized recordings in this manner.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from .motion import Motion, at_frames, forward_kinematics
 from .track import zero_phase_hann
 
 _SWAY_SECONDS = 0.7
-# two landings of one foot are at least this far apart, seconds: nearer ones are one landing that flickers
+# two landings of one foot are at least this far apart, seconds: nearer ones are one landing whose label flickers
 _NEAREST = 0.25
 _LEFT, _RIGHT = 0, 1
 
@@ -30,9 +30,14 @@ _LEFT, _RIGHT = 0, 1
 class Strides:
     """A stretch of steady locomotion that begins and ends with a landing.
 
-    motion: T frames. landings (K,): fractional frames at which feet land in turn, the first one's side in `first` (0
-    left, 1 right). standing (T, 2, 2) bool: left and right, heel and toe on the ground. facing (T,) radians; path (T,
-    2) m: the pelvis's way without its sway."""
+    Attributes:
+        motion: T frames.
+        landings: (K,) fractional frames at which the feet land in turn.
+        first_side: side of the first landing, 0 left, 1 right.
+        heel_toe_contacts: (T, 2, 2) bool, left and right, heel and toe on the ground.
+        facing: (T,) heading, radians, unwrapped.
+        path: (T, 2) metres, the pelvis's path over the ground without its sway.
+    """
 
     motion: Motion
     landings: np.ndarray
@@ -43,33 +48,41 @@ class Strides:
 
     @property
     def steps(self) -> int:
-        """Steps from the first landing to the last."""
+        """Number of steps from the first landing to the last."""
         return len(self.landings) - 1
 
     @property
     def seconds(self) -> np.ndarray:
-        """(K - 1,) how long each step lasts."""
+        """(K - 1,) duration of each step, seconds."""
         return np.diff(self.landings) / self.motion.fps
 
     @property
     def metres(self) -> np.ndarray:
-        """(K - 1,) how far the body goes with each step."""
+        """(K - 1,) distance that the body travels with each step, metres."""
         return np.diff(_at(distance_along(self.path), self.landings))
 
     @property
     def speed(self) -> float:
-        """Metres per second over all steps."""
+        """Mean speed over all steps, m/s."""
         return float(self.metres.sum() / self.seconds.sum())
 
     def later(self) -> "Strides":
-        """The same without the first step."""
+        """Return the same strides without the first step."""
         return Strides(motion=self.motion, landings=self.landings[1:], first=1 - self.first, standing=self.standing,
                        facing=self.facing, path=self.path)
 
 
 def strides(motion: Motion, standing: np.ndarray) -> Strides | None:
-    """The longest stretch of `motion` in which feet land in turn, by `standing` (T, 2, 2); None below two steps."""
+    """Find the longest stretch of a motion in which the feet land in turn.
+
+    Args:
+        motion: T frames of locomotion.
+        heel_toe_contacts: (T, 2, 2) bool, left and right, heel and toe on the ground.
+    Returns:
+        The stretch, or None if it has fewer than two steps.
+    """
     sides, frames = _landings(standing, motion.fps)
+    # runs of landings whose sides alternate; the longest one wins
     edges = np.flatnonzero(np.diff(sides) == 0) + 1
     first, last = max(zip([0, *edges], [*edges, len(sides)]), key=lambda run: run[1] - run[0])
     if last - first < 3:
@@ -82,7 +95,7 @@ def strides(motion: Motion, standing: np.ndarray) -> Strides | None:
 
 
 def _landings(standing: np.ndarray, fps: float) -> tuple[np.ndarray, np.ndarray]:
-    """Sides (K,) and frames (K,) of all landings in order of time: heel or toe comes down after none of them stood."""
+    """Detect all landings in order of time: sides (K,) and frames (K,); heel or toe touches down after both were up."""
     sides, frames = [], []
     for side in (_LEFT, _RIGHT):
         down = np.flatnonzero(np.diff(standing[:, side].any(axis=1).astype(np.int8)) == 1) + 0.5
@@ -94,16 +107,26 @@ def _landings(standing: np.ndarray, fps: float) -> tuple[np.ndarray, np.ndarray]
 
 
 def blend(slow: Strides, fast: Strides, speed: float, fps: float) -> tuple[Motion, np.ndarray]:
-    """Locomotion at `speed` m/s, in the mean, mixed from two recordings on one skeleton; from the origin along +X.
+    """Blend two recordings of locomotion to a mean speed, from the origin along +X.
 
-    Gives the motion at `fps` and standing (T, 2, 2) bool. As many steps as the shorter recording has, each mixed from
-    another one of both. A speed outside the two recordings' is brought to the nearer one."""
+    The result has as many steps as the shorter recording, each mixed from another step of both.
+
+    Args:
+        slow, fast: recordings on one skeleton.
+        speed: wanted mean speed, m/s; limited to the range between the two recordings.
+        fps: frames per second of the result.
+    Returns:
+        The motion, and the contacts (T, 2, 2) bool of left and right, heel and toe.
+    Source: Faustino 2024, section 6.2; Park, Shin and Shin 2002.
+    """
     slow, fast = _in_step(slow, fast)
     steps = min(slow.steps, fast.steps)
     weight = _weight(slow, fast, steps, speed)
+    # durations are mixed in the logarithm, so that a step of half and one of double duration average to the same one
     seconds = np.exp((1.0 - weight) * np.log(slow.seconds[:steps]) + weight * np.log(fast.seconds[:steps]))
     ends = np.concatenate([[0.0], np.cumsum(seconds)])
     times = np.arange(int(ends[-1] * fps + 1e-6) + 1) / fps
+    # phase counts steps: 0 at the first landing, 1 at the second, ...; `rate` is its derivative, steps per second
     phase = PchipInterpolator(ends, np.arange(steps + 1.0))(times)
     rate = PchipInterpolator(ends, np.arange(steps + 1.0)).derivative()(times)
     a, b = (_sampled(one, phase, steps) for one in (slow, fast))
@@ -118,14 +141,14 @@ def blend(slow: Strides, fast: Strides, speed: float, fps: float) -> tuple[Motio
 
 
 def _in_step(a: Strides, b: Strides) -> tuple[Strides, Strides]:
-    """Both beginning with the same foot: the longer one loses its first step where they do not."""
+    """Make both begin with the same foot: the longer one loses its first step where they do not."""
     if a.first == b.first:
         return a, b
     return (a.later(), b) if a.steps > b.steps else (a, b.later())
 
 
 def _weight(slow: Strides, fast: Strides, steps: int, speed: float) -> float:
-    """The share of `fast` with which the mixture goes at `speed` m/s in the mean."""
+    """Solve the share of `fast` with which the mixture has a mean speed of `speed` m/s."""
     share = np.linspace(0.0, 1.0, 65)
     metres = (1.0 - share) * slow.metres[:steps].sum() + share * fast.metres[:steps].sum()
     logs = (1.0 - share)[:, None] * np.log(slow.seconds[:steps]) + share[:, None] * np.log(fast.seconds[:steps])
@@ -133,8 +156,12 @@ def _weight(slow: Strides, fast: Strides, steps: int, speed: float) -> float:
 
 
 def _sampled(one: Strides, phase: np.ndarray, steps: int) -> dict[str, np.ndarray]:
-    """A recording at `phase` (T,) steps: pose (T, J, 4) relative to facing, height (T,), sway (T, 2) in the facing
-    frame, turn (T,) radians and way (T, 2) metres per step, and how far inside a stance each point is (T, 2, 2)."""
+    """Sample a recording at phases (T,), counted in steps.
+
+    Returns:
+        pose (T, J, 4) relative to the heading, height (T,) metres, sway (T, 2) metres in the heading frame, turn (T,)
+        radians and way (T, 2) metres per step, and inside (T, 2, 2): steps from each point's nearest stance boundary.
+    """
     curve = PchipInterpolator(np.arange(steps + 1.0), one.landings[: steps + 1])
     frames, pace = curve(phase), curve.derivative()(phase)
     root, pose = at_frames(one.motion, frames)
@@ -149,10 +176,11 @@ def _sampled(one: Strides, phase: np.ndarray, steps: int) -> dict[str, np.ndarra
 
 
 def _inside(standing: np.ndarray, frames: np.ndarray) -> np.ndarray:
-    """How many frames (T, 2, 2) away the nearest begin or end of a stance is, negative outside of stances.
+    """Measure how many frames (T, 2, 2) away the nearest start or end of a stance is, negative outside of stances.
 
-    Mixing these distances moves begin and end of a stance from one recording's to the other's; mixing the labels would
-    let it jump halfway."""
+    Mixing these distances moves a stance's start and end from one recording's to the other's; mixing the labels would
+    make them jump halfway.
+    """
     out = np.empty((len(frames), 2, 2))
     for side in (_LEFT, _RIGHT):
         for point in (0, 1):
@@ -164,13 +192,13 @@ def _inside(standing: np.ndarray, frames: np.ndarray) -> np.ndarray:
 
 
 def _at(values: np.ndarray, frames: np.ndarray) -> np.ndarray:
-    """Values (T, ...) at fractional frames (N,), linear: (N, ...)."""
+    """Interpolate values (T, ...) linearly at fractional frames (N,): (N, ...)."""
     low = np.clip(np.floor(frames).astype(int), 0, max(len(values) - 2, 0))
     share = (frames - low).reshape(-1, *[1] * (values.ndim - 1))
     return values[low] * (1.0 - share) + values[np.minimum(low + 1, len(values) - 1)] * share
 
 
 def _integral(values: np.ndarray, fps: float) -> np.ndarray:
-    """The running integral (T, ...) of values (T, ...) per second, 0 at the first frame."""
+    """Integrate values (T, ...) per second over time, 0 at the first frame: (T, ...)."""
     total = np.cumsum(0.5 * (values[1:] + values[:-1]), axis=0) / fps
     return np.concatenate([np.zeros_like(values[:1]), total])

@@ -1,8 +1,8 @@
-"""Rotations as unit quaternions (w, x, y, z); every function takes free leading axes.
+"""Rotations as unit quaternions (w, x, y, z); every function takes any leading axes.
 
-Conventions: `multiply(a, b)` rotates by b first, then by a; `rotate(q, v)` turns column vectors; angles are radians.
-Euler angles are intrinsic, in the order of their letters ("ZXY": about Z, then the turned X, then the turned Y), which
-is how BVH channels are read (Faustino §4.2.1 eq. 30-31 is the case "ZXY").
+Conventions: `multiply(a, b)` rotates by b first, then by a; `rotate(q, v)` rotates column vectors; angles are radians.
+Euler angles are intrinsic, in the order of their letters ("ZXY": about Z, then the rotated X, then the rotated Y),
+which is how BVH channels are read (Faustino §4.2.1 eq. 30-31 is the case "ZXY").
 """
 
 from __future__ import annotations
@@ -17,14 +17,21 @@ _AXES = {"X": 0, "Y": 1, "Z": 2}
 
 
 def identity(*shape: int) -> np.ndarray:
-    """Unit rotations: (*shape, 4)."""
+    """Build identity rotations: (*shape, 4)."""
     out = np.zeros((*shape, 4))
     out[..., 0] = 1.0
     return out
 
 
 def multiply(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """The rotation b followed by a: (..., 4) x (..., 4) -> (..., 4)."""
+    """Compose rotations.
+
+    Args:
+        a: (..., 4) the rotation applied second.
+        b: (..., 4) the rotation applied first.
+    Returns:
+        (..., 4) b followed by a.
+    """
     aw, ax, ay, az = np.moveaxis(np.asarray(a), -1, 0)
     bw, bx, by, bz = np.moveaxis(np.asarray(b), -1, 0)
     return np.stack(
@@ -39,17 +46,24 @@ def multiply(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def inverse(q: np.ndarray) -> np.ndarray:
-    """The opposite rotation of unit quaternions: (..., 4)."""
+    """Invert unit quaternions: (..., 4) -> (..., 4)."""
     return np.asarray(q) * np.array([1.0, -1.0, -1.0, -1.0])
 
 
 def normalized(q: np.ndarray) -> np.ndarray:
-    """The same rotations with length one; a zero quaternion becomes the identity: (..., 4)."""
+    """Scale quaternions (..., 4) to length one; a zero quaternion becomes the identity."""
     return unit_vectors(np.asarray(q, dtype=float), IDENTITY, 1e-12)
 
 
 def rotate(q: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """Vectors turned by rotations: (..., 4), (..., 3) -> (..., 3)."""
+    """Rotate vectors.
+
+    Args:
+        q: (..., 4) rotations.
+        v: (..., 3) vectors.
+    Returns:
+        (..., 3).
+    """
     q, v = np.asarray(q), np.asarray(v)
     w, u = q[..., :1], q[..., 1:]
     t = 2.0 * cross(u, v)
@@ -57,32 +71,39 @@ def rotate(q: np.ndarray, v: np.ndarray) -> np.ndarray:
 
 
 def about_axis(axis: np.ndarray, angle: float | np.ndarray) -> np.ndarray:
-    """Rotation by `angle` (...,) radians about unit `axis` (..., 3): (..., 4)."""
+    """Build rotations about an axis.
+
+    Args:
+        axis: (..., 3) unit axes.
+        angle: (...,) radians.
+    Returns:
+        (..., 4).
+    """
     half = 0.5 * np.asarray(angle, dtype=float)
     return np.concatenate([np.cos(half)[..., None], np.sin(half)[..., None] * np.asarray(axis, dtype=float)], axis=-1)
 
 
 def about_up(angle: np.ndarray) -> np.ndarray:
-    """Rotation by `angle` (...,) radians about the world's up axis Z: (..., 4)."""
+    """Build rotations (..., 4) by `angle` (...,) radians about the world's up axis Z."""
     half = 0.5 * np.asarray(angle, dtype=float)
     zero = np.zeros_like(half)
     return np.stack([np.cos(half), zero, zero, np.sin(half)], axis=-1)
 
 
 def turned_level(v: np.ndarray, angle: np.ndarray) -> np.ndarray:
-    """Vectors on the ground (..., 2) turned by `angle` (...,) radians about the world's up axis: (..., 2)."""
+    """Rotate vectors on the ground (..., 2) by `angle` (...,) radians about the world's up axis: (..., 2)."""
     cosine, sine = np.cos(angle), np.sin(angle)
     x, y = v[..., 0], v[..., 1]
     return np.stack([cosine * x - sine * y, sine * x + cosine * y], axis=-1)
 
 
 def turned_about_up(v: np.ndarray, angle: np.ndarray) -> np.ndarray:
-    """Vectors (..., 3) turned by `angle` (...,) radians about the world's up axis: (..., 3)."""
+    """Rotate vectors (..., 3) by `angle` (...,) radians about the world's up axis: (..., 3)."""
     return np.concatenate([turned_level(v[..., :2], angle), v[..., 2:]], axis=-1)
 
 
 def from_rotation_vector(v: np.ndarray) -> np.ndarray:
-    """The exponential map: rotation vectors (..., 3) in radians -> (..., 4)."""
+    """Convert rotation vectors (..., 3) in radians to quaternions (..., 4): the exponential map."""
     v = np.asarray(v, dtype=float)
     angle = np.linalg.norm(v, axis=-1, keepdims=True)
     half = 0.5 * angle
@@ -91,7 +112,9 @@ def from_rotation_vector(v: np.ndarray) -> np.ndarray:
 
 
 def to_rotation_vector(q: np.ndarray) -> np.ndarray:
-    """The logarithm map on the short way round: (..., 4) -> rotation vectors (..., 3) of at most pi radians."""
+    """Convert quaternions (..., 4) to rotation vectors (..., 3) of at most pi radians: the logarithm map, shorter
+    direction.
+    """
     q = np.asarray(q, dtype=float)
     q = np.where(q[..., :1] < 0.0, -q, q)
     length = np.linalg.norm(q[..., 1:], axis=-1, keepdims=True)
@@ -101,7 +124,14 @@ def to_rotation_vector(q: np.ndarray) -> np.ndarray:
 
 
 def from_euler(angles: np.ndarray, order: str) -> np.ndarray:
-    """Intrinsic Euler angles (..., n) in radians about the axes named in `order` (n letters of XYZ): (..., 4)."""
+    """Convert intrinsic Euler angles to quaternions.
+
+    Args:
+        angles: (..., n) radians.
+        order: n letters of XYZ, the axes in their order.
+    Returns:
+        (..., 4).
+    """
     angles = np.asarray(angles, dtype=float)
     out = None
     for index, letter in enumerate(order):
@@ -114,10 +144,15 @@ def from_euler(angles: np.ndarray, order: str) -> np.ndarray:
 
 
 def to_euler(q: np.ndarray, order: str) -> np.ndarray:
-    """Intrinsic Tait-Bryan angles (..., 3) in radians of rotations (..., 4); `order` is a permutation of XYZ.
+    """Convert quaternions to intrinsic Tait-Bryan angles.
 
-    The middle angle is within +-90 degrees. At the pole, where only the sum of the outer angles is determined, the
-    third is zero; the rotation is the same."""
+    Args:
+        q: (..., 4) rotations.
+        order: a permutation of XYZ.
+    Returns:
+        (..., 3) radians; the middle angle within +-90 degrees. At the pole, where only the sum of the outer angles is
+        determined, the third is zero; the rotation is the same.
+    """
     i, j, k = (_AXES[letter] for letter in order)
     sign = 1.0 if (j - i) % 3 == 1 else -1.0
     m = to_matrix(q)
@@ -128,14 +163,14 @@ def to_euler(q: np.ndarray, order: str) -> np.ndarray:
     first = arctan2(-sign * m[..., j, k], m[..., k, k])
     pole = cosine < 1e-9
     first = np.where(pole, arctan2(sign * m[..., k, j], m[..., j, j]), first)
-    # from what is left when the first turn is taken back: near the pole both outer angles are noise, their sum is not
+    # from what remains after undoing the first rotation: near the pole both outer angles are noise, their sum is not
     left = np.cos(first)[..., None] * m[..., j, :] + sign * np.sin(first)[..., None] * m[..., k, :]
     third = np.where(pole, 0.0, arctan2(sign * left[..., i], left[..., j]))
     return np.stack([first, middle, third], axis=-1)
 
 
 def to_matrix(q: np.ndarray) -> np.ndarray:
-    """Rotation matrices (..., 3, 3) of unit quaternions (..., 4)."""
+    """Convert unit quaternions (..., 4) to rotation matrices (..., 3, 3)."""
     w, x, y, z = np.moveaxis(np.asarray(q, dtype=float), -1, 0)
     rows = [
         [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
@@ -146,7 +181,7 @@ def to_matrix(q: np.ndarray) -> np.ndarray:
 
 
 def from_matrix(m: np.ndarray) -> np.ndarray:
-    """Unit quaternions (..., 4), w >= 0, of rotation matrices (..., 3, 3)."""
+    """Convert rotation matrices (..., 3, 3) to unit quaternions (..., 4) with w >= 0."""
     m = np.asarray(m, dtype=float)
     trace = m[..., 0, 0] + m[..., 1, 1] + m[..., 2, 2]
     # four ways to solve, each safe where its own component is the largest (Shepperd 1978)
@@ -167,7 +202,8 @@ def from_matrix(m: np.ndarray) -> np.ndarray:
 
 
 def between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """The shortest rotation that turns vectors a onto b: (..., 3), (..., 3) -> (..., 4); opposites about any axis."""
+    """Compute the shortest rotation that turns vectors a (..., 3) onto b (..., 3): (..., 4); opposites about any axis.
+    """
     a = np.asarray(a, dtype=float)
     b = np.asarray(b, dtype=float)
     a = unit_vectors(a, least=1e-12)
@@ -180,7 +216,7 @@ def between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def continuous(q: np.ndarray) -> np.ndarray:
-    """The same rotations (T, ..., 4) with signs chosen so that neighbours in time are close (q and -q rotate alike)."""
+    """Choose the signs of rotations (T, ..., 4) so that neighbours in time are close (q and -q rotate alike)."""
     q = np.asarray(q, dtype=float)
     if len(q) < 2:
         return q.copy()
@@ -192,12 +228,20 @@ def continuous(q: np.ndarray) -> np.ndarray:
 
 
 def signed_like(q: np.ndarray, like: np.ndarray) -> np.ndarray:
-    """The same rotations (..., 4) with the signs that lie nearer to `like` (..., 4)."""
+    """Choose the signs of rotations (..., 4) that are nearer to `reference` (..., 4)."""
     return np.where(np.sum(q * like, axis=-1, keepdims=True) < 0.0, -q, q)
 
 
 def slerp(a: np.ndarray, b: np.ndarray, weight: float | np.ndarray) -> np.ndarray:
-    """Spherical interpolation on the short way (Faustino eq. 8): (..., 4), (..., 4), (...,) -> (..., 4)."""
+    """Interpolate rotations on the sphere along the shorter arc.
+
+    Args:
+        a, b: (..., 4) rotations at weights 0 and 1.
+        weight: (...,).
+    Returns:
+        (..., 4).
+    Source: Faustino 2024, equation (8).
+    """
     a, b = np.asarray(a, dtype=float), np.asarray(b, dtype=float)
     weight = np.asarray(weight, dtype=float)
     dot = np.sum(a * b, axis=-1)
@@ -211,11 +255,11 @@ def slerp(a: np.ndarray, b: np.ndarray, weight: float | np.ndarray) -> np.ndarra
 
 
 def yaw(q: np.ndarray) -> np.ndarray:
-    """The turn about Z that is nearest to the rotation (its twist): (..., 4) -> (...,) radians."""
+    """Return the angle (...,) in radians of the rotation about Z nearest to rotations (..., 4) (their twist)."""
     q = np.asarray(q)
     return 2.0 * arctan2(q[..., 3], q[..., 0])
 
 
 def wrapped(angle):
-    """Angles (...) in radians without their full turns: from -pi up to pi."""
+    """Wrap angles (...) in radians to the range from -pi up to pi."""
     return (angle + np.pi) % (2.0 * np.pi) - np.pi

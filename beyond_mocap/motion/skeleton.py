@@ -12,7 +12,7 @@ from ..base.errors import InputError
 
 
 def frozen_array(values, dtype=float) -> np.ndarray:
-    """A read-only copy of `values`."""
+    """Copy values into a read-only array."""
     out = np.array(values, dtype=dtype)
     out.setflags(write=False)
     return out
@@ -22,9 +22,13 @@ def frozen_array(values, dtype=float) -> np.ndarray:
 class Skeleton:
     """Joints of one body.
 
-    names: J joint names. parents: J indices, -1 for the one root, which is joint 0; parents stand before children.
-    offsets: (J, 3) metres, from the parent's joint to this one while no joint is rotated, Z up; the root's is zero.
-    end_parents (E,), end_offsets (E, 3): tips (BVH End Sites), which carry no rotation of their own."""
+    Attributes:
+        names: J joint names.
+        parents: J indices, -1 for the one root, which is joint 0; parents come before children.
+        offsets: (J, 3) metres from the parent's joint to this one while no joint is rotated, Z up; the root's is zero.
+        end_parents: E joints that carry a tip (BVH End Site).
+        end_offsets: (E, 3) metres from those joints to their tips, which have no rotation of their own.
+    """
 
     names: tuple[str, ...]
     parents: tuple[int, ...]
@@ -42,30 +46,41 @@ class Skeleton:
         if not (count and len(self.parents) == len(self.offsets) == count):
             raise InputError("skeleton", f"{count} names, {len(self.parents)} parents, {len(self.offsets)} offsets")
         if self.parents[0] != -1 or any(not 0 <= p < i for i, p in enumerate(self.parents) if i):
-            raise InputError("skeleton", "parents out of order", "one root first, then parents before children")
+            raise InputError("skeleton", "joints out of order", "one root first, then parents before children")
         if len(set(self.names)) != count:
-            raise InputError("skeleton", "two joints of one name", "unique joint names")
+            raise InputError("skeleton", "two joints with the same name", "unique joint names")
 
     def __len__(self) -> int:
         return len(self.names)
 
     def index(self, name: str) -> int:
-        """The joint's index; InputError if there is none of that name."""
+        """Return the joint's index.
+
+        Raises:
+            InputError: if no joint has that name.
+        """
         try:
             return self.names.index(name)
         except ValueError:
             raise InputError("skeleton", f"no joint {name!r}", f"one of {', '.join(self.names)}") from None
 
     def children(self, joint: int) -> tuple[int, ...]:
-        """Indices of the joints that hang on `joint`."""
+        """Return the indices of the joints that hang on `joint`."""
         return tuple(i for i, p in enumerate(self.parents) if p == joint)
 
     def tip(self, joint: int) -> np.ndarray:
-        """From a joint to its first end site (3,) m, in the joint's own axes; zero where it has none."""
+        """Return the vector from a joint to its first end site (3,) m, in the joint's own axes; zero where it has none.
+        """
         return next((o for p, o in zip(self.end_parents, self.end_offsets) if p == joint), np.zeros(3))
 
     def part(self, joints: Collection[int]) -> tuple["Skeleton", list[int]]:
-        """These joints and all above them as a skeleton without tips, and their indices in this one."""
+        """Select joints and all above them.
+
+        Args:
+            joints: indices in this skeleton.
+        Returns:
+            A skeleton without tips, and the indices of its joints in this one.
+        """
         found: set[int] = set()
         for joint in joints:
             while joint >= 0:
@@ -76,7 +91,7 @@ class Skeleton:
         return Skeleton(tuple(self.names[joint] for joint in kept), tuple(parents), self.offsets[kept]), kept
 
     def scaled(self, size: float) -> "Skeleton":
-        """The skeleton of a body `size` times as large."""
+        """Return the skeleton of a body `factor` times as large."""
         return replace(self, offsets=self.offsets * size, end_offsets=self.end_offsets * size)
 
     def same_bones(self, other: "Skeleton", tolerance: float = 1e-3) -> bool:
@@ -89,7 +104,7 @@ class Skeleton:
 
     @property
     def rest_positions(self) -> np.ndarray:
-        """Where the joints are while none is turned, (J, 3) m from the root."""
+        """(J, 3) metres from the root, joint positions in the rest pose."""
         places = np.zeros((len(self), 3))
         for joint, parent in enumerate(self.parents):
             if parent >= 0:

@@ -1,4 +1,4 @@
-"""A critically damped follower of third order: what is off its goal fades smoothly from any place, speed, acceleration.
+"""A critically damped spring of third order: an offset from its goal decays smoothly from any state.
 
 Offsets are vectors (rotation vectors, metres). All three poles lie at -rate, so that nothing overshoots from rest and
 the acceleration is continuous wherever the goal changes.
@@ -13,14 +13,27 @@ import numpy as np
 
 @dataclass(frozen=True, eq=False)
 class Offset:
-    """Off the goal: place, speed (per second) and acceleration (per second squared), (..., K) each."""
+    """An offset from the goal.
+
+    Attributes:
+        place: (..., K) offset.
+        speed: (..., K) its rate of change per second.
+        acceleration: (..., K) per second squared.
+    """
 
     place: np.ndarray
     speed: np.ndarray
     acceleration: np.ndarray
 
     def faded(self, seconds: np.ndarray, rate: float) -> "Offset":
-        """The offset after `seconds` (T,), each (T, ..., K); `rate` per second: after 6 / rate about 6 % are left."""
+        """Evaluate the decaying offset over time.
+
+        Args:
+            seconds: (T,) times from now.
+            rate: per second; after 6 / rate about 6 % are left.
+        Returns:
+            The offset with arrays (T, ..., K).
+        """
         t = np.asarray(seconds, dtype=float).reshape(-1, *[1] * np.ndim(self.place))
         a = self.place
         b = self.speed + rate * a

@@ -1,7 +1,7 @@
-"""How natural motions look to people: a study with raters (Faustino §5.1).
+"""Rating studies of how natural motions look (Faustino §5.1).
 
-- `order`     clips under neutral names, in which order each rater sees them, and study.json
-- `form`      what a rater is asked and fills in: a page that works without a network
-- `answers`   what came back
-- `analysis`  one-sided t-tests and effect sizes; `page` all of it with pictures for a browser
+- `order`     clips under neutral names, each rater's order, and study.json
+- `form`      the questions and the page that a rater fills in, which needs no network
+- `answers`   reads the raters' answers
+- `analysis`  one-sided t-tests and effect sizes; `page` presents them with plots for a browser
 """

@@ -1,7 +1,7 @@
-"""Whether one system's motions look more natural than another's: one-sided tests and effect sizes (Faustino §5.1.2).
+"""Test whether one system's motions look more natural than another's: one-sided tests, effect sizes (Faustino §5.1.2).
 
-He tests all ratings as if each came from another person. They do not: one rater gives many. So the test that counts
-here takes each rater's mean difference as one value, scenario against scenario; his is told beside it (`pooled_p`).
+Faustino tests all ratings as if each came from another person, but one rater gives many. The main test here takes each
+rater's mean difference as one value, scenario by scenario; Faustino's is reported beside it (`pooled_p`).
 """
 
 from __future__ import annotations
@@ -17,12 +17,18 @@ from .answers import Answers
 from .form import SAME, SCALE
 from .order import Study
 
-ALPHA = 0.05
+ALPHA = 0.05  # significance level, for all hypotheses of a study together
 
 
 @dataclass(frozen=True, eq=False)
 class Shares:
-    """How a group of answers is spread: counts (5,) of the ratings 1 to 5, mean and standard deviation (n - 1)."""
+    """The distribution of a group of answers.
+
+    Attributes:
+        name: name of the group.
+        counts: (5,) number of each rating, 1 to 5.
+        mean, sd: mean and standard deviation (divided by n - 1).
+    """
 
     name: str
     counts: np.ndarray
@@ -32,15 +38,24 @@ class Shares:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Finding:
-    """Whether `new` looks more natural than `old`.
+    """The result of one hypothesis: `new` looks more natural than `old`. NaN where there is too little data.
 
-    differences (N,): each rater's mean of new - old over the scenarios in which he answered to both: points of the
-    scale, or, of pairs, 1 where he chose new, -1 old, 0 neither. mean, low, high: of them, with its 95 % interval
-    (Student). t, degrees: the paired statistic. p: its one-sided p that new is no better; holm_p: raised for the number
-    of findings (Holm 1979). wilcoxon_p: by signed ranks. normal_p: Shapiro and Wilk's of the differences. pooled_p: of
-    all answers as if each had a rater of its own, by Welch's t, of pairs by the binomial distribution of choices. d:
-    Cohen's d of the differences; delta: Cliff's, the share of pairs of ratings in which new is higher less that in
-    which it is lower. NaN where there are too few."""
+    Attributes:
+        new, old: the two systems.
+        differences: (N,) each rater's mean of new - old over the scenarios in which they answered to both: points of
+            the
+            scale or, in a study of pairs, 1 for new chosen, -1 for old, 0 for neither.
+        mean, low, high: mean of the differences with its 95 % interval (Student).
+        t, degrees: the paired statistic and its degrees of freedom.
+        p: one-sided p that new is no better.
+        wilcoxon_p: the same by signed ranks.
+        normal_p: p of Shapiro and Wilk's test of the differences.
+        pooled_p: p of all answers as if each had a rater of its own: Welch's t, or for pairs the binomial distribution
+            of choices.
+        d: Cohen's d of the differences.
+        delta: Cliff's delta, the share of pairs of ratings with new higher minus the share with new lower.
+        holm_p: p adjusted for the number of hypotheses (Holm 1979).
+    """
 
     new: str
     old: str
@@ -66,8 +81,15 @@ class Finding:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Analysis:
-    """All that is found: by_system and by_scenario (title and its rows) of ratings, empty in a study of pairs;
-    findings; notes: what to know of the raters."""
+    """All results of a study.
+
+    Attributes:
+        study, answers: the study and the raters' answers.
+        by_system: ratings of each system; empty in a study of pairs.
+        by_scenario: each scenario's title and its ratings of each system; empty in a study of pairs.
+        findings: one for each hypothesis.
+        notes: what to know about the raters, one line each.
+    """
 
     study: Study
     answers: Answers
@@ -78,15 +100,24 @@ class Analysis:
 
 
 def analysed(study: Study, answers: Answers, better: Sequence[tuple[str, str]] = ()) -> Analysis:
-    """The analysis. better: (new, old) systems of each hypothesis that new looks more natural; without any, the first
-    system of the table against each other one; one that is named twice counts once. InputError for a system that the
-    study has not."""
+    """Analyse the answers to a study.
+
+    Args:
+        study: the study.
+        answers: the raters' answers.
+        better: (new, old) systems of each hypothesis that new looks more natural; without any, the first system of the
+            table against each other one. Duplicates count once.
+    Returns:
+        The analysis.
+    Raises:
+        InputError: if the study lacks a system, or a hypothesis names one system twice.
+    """
     hypotheses = list(dict.fromkeys(better)) or [(study.systems[0], other) for other in study.systems[1:]]
     for system in [name for pair in hypotheses for name in pair]:
         if system not in study.systems:
-            raise InputError("--better", system, f"one of {', '.join(study.systems)}", "correct the name")
+            raise InputError("system", system, f"one of {', '.join(study.systems)}", "correct the name")
     if same := next((new for new, old in hypotheses if new == old), None):
-        raise InputError("--better", f"{same} against itself", "two systems", "name another one")
+        raise InputError("hypothesis", f"{same} against itself", "two systems", "name another one")
     find = _of_pairs if study.pairs else _of_ratings
     findings = [find(study, answers, new, old) for new, old in hypotheses]
     raised = holm([finding.p for finding in findings])
@@ -98,7 +129,14 @@ def analysed(study: Study, answers: Answers, better: Sequence[tuple[str, str]] =
 
 
 def holm(p: Sequence[float]) -> list[float]:
-    """p values raised so that all together err as rarely as one (Holm 1979), in their order; NaN stays."""
+    """Adjust p values so that all hypotheses together have the error rate of one (Holm 1979).
+
+    Args:
+        p: the p values; NaN stays NaN.
+    Returns:
+        The adjusted values, in the same order.
+    """
+    # From the smallest p up: multiply by the number of hypotheses left, never below a previous one.
     known = sorted((place for place, value in enumerate(p) if np.isfinite(value)), key=lambda place: p[place])
     out, least = [float("nan")] * len(p), 0.0
     for order, place in enumerate(known):
@@ -108,16 +146,29 @@ def holm(p: Sequence[float]) -> list[float]:
 
 
 def cliffs_delta(new: np.ndarray, old: np.ndarray) -> float:
-    """(share of pairs with new above old) - (share below), of values (N,) and (M,): -1 to 1, 0 where nothing tells them
-    apart (Cliff 1993)."""
+    """Compute Cliff's delta: the share of pairs with new above old minus the share below (Cliff 1993).
+
+    Args:
+        new: (N,) ratings.
+        old: (M,) ratings.
+    Returns:
+        -1 to 1, 0 for no difference; NaN without ratings.
+    """
     if not len(new) or not len(old):
         return float("nan")
     return float(np.sign(np.subtract.outer(np.asarray(new, float), np.asarray(old, float))).mean())
 
 
 def welch(new: np.ndarray, old: np.ndarray) -> float:
-    """One-sided p that the mean of `new` (N,) is no larger than that of `old` (M,), which may scatter otherwise (Welch
-    1947); NaN where one has fewer than two values or neither scatters."""
+    """Compute the one-sided p that the mean of `new` is no larger than that of `old`, with unequal variances (Welch
+    1947).
+
+    Args:
+        new: (N,) values.
+        old: (M,) values.
+    Returns:
+        p; NaN where one has fewer than two values or neither varies.
+    """
     from scipy.stats import t as student
 
     if min(len(new), len(old)) < 2 or max(np.ptp(new), np.ptp(old)) <= 0.0:
@@ -128,6 +179,7 @@ def welch(new: np.ndarray, old: np.ndarray) -> float:
 
 
 def _of_ratings(study: Study, answers: Answers, new: str, old: str) -> Finding:
+    """Build the finding of two systems from ratings."""
     table = {clip.name: clip for clip in study.clips}
     each, every = [], {new: [], old: []}
     for rater in answers.raters:
@@ -142,6 +194,7 @@ def _of_ratings(study: Study, answers: Answers, new: str, old: str) -> Finding:
 
 
 def _of_pairs(study: Study, answers: Answers, new: str, old: str) -> Finding:
+    """Build the finding of two systems from choices between pairs."""
     from scipy.stats import binomtest
 
     table = {clip.name: clip for clip in study.clips}
@@ -161,14 +214,14 @@ def _of_pairs(study: Study, answers: Answers, new: str, old: str) -> Finding:
 
 
 def _finding(new: str, old: str, off: np.ndarray, pooled: float, delta: float) -> Finding:
-    """The paired tests of raters' differences (N,)."""
+    """Build a finding from the raters' differences (N,) by paired tests."""
     from scipy.stats import t as student
 
     count = len(off)
     mean = float(off.mean()) if count else np.nan
     sd = float(off.std(ddof=1)) if count > 1 else np.nan
     varies = count > 1 and np.ptp(off) > 1e-12
-    tests = judged(-off)  # of what is to be smaller
+    tests = judged(-off)  # the tests expect negative differences
     half = float(student.ppf(0.975, count - 1)) * sd / np.sqrt(count) if varies else np.nan
     return Finding(new=new, old=old, differences=off, mean=mean, low=mean - half, high=mean + half,
                    t=mean / (sd / np.sqrt(count)) if varies else np.nan, degrees=max(count - 1, 0), p=tests.t_p,
@@ -183,7 +236,7 @@ def _shares(name: str, values: list[int]) -> Shares:
 
 
 def _by_system(study: Study, answers: Answers, scenario: str | None = None) -> tuple[Shares, ...]:
-    """All ratings of each system, of one scenario or of all."""
+    """Count the ratings of each system, in one scenario or in all."""
     out = []
     for system in study.systems:
         names = {clip.name for clip in study.clips if clip.system == system and scenario in (None, clip.scenario)}
@@ -193,15 +246,15 @@ def _by_system(study: Study, answers: Answers, scenario: str | None = None) -> t
 
 
 def _notes(study: Study, answers: Answers) -> list[str]:
-    """What to know of the raters: how many, who is missing, who always says the same."""
+    """List what to know about the raters: how many answered, who is missing, who always gives the same answer."""
     silent = [rater for rater in study.orders if rater not in answers.raters]
     notes = [f"{len(answers.raters)} of {len(study.orders)} raters answered"]
     if silent:
         notes.append(f"without an answer: {', '.join(silent)}")
     if answers.missing:
-        notes.append(f"{answers.missing} answers that count are missing; what is there is used")
+        notes.append(f"{answers.missing} answers are missing; the others are used")
     if len(answers.raters) < 6:
-        notes.append("fewer than six raters: the tests say little")
+        notes.append("fewer than six raters: the tests have little power")
     for rater in answers.raters:
         given = [*answers.ratings[rater].values(), *answers.choices[rater].values()]
         if len(given) > 4 and len(set(given)) == 1:

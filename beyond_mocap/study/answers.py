@@ -1,4 +1,4 @@
-"""What came back from raters: files that the form saved, or tables that were typed."""
+"""Read the raters' answers: files that the form saved, or tables that were typed."""
 
 from __future__ import annotations
 
@@ -18,9 +18,14 @@ _LARGEST = 5_000_000
 
 @dataclass(frozen=True)
 class Answers:
-    """The answers to a study. background: rater -> question -> key of the choice. ratings: rater -> neutral name -> 1
-    to 5. choices: rater -> (left, right) -> the chosen name, or SAME. missing: how many answers that count are not
-    there of the raters who answered at all."""
+    """The answers to a study.
+
+    Attributes:
+        background: rater -> question -> key of the choice.
+        ratings: rater -> neutral name -> 1 to 5.
+        choices: rater -> (left, right) -> the chosen name, or SAME.
+        missing: number of missing answers of the raters who answered at all, training clips left out.
+    """
 
     background: Mapping[str, Mapping[str, str]]
     ratings: Mapping[str, Mapping[str, int]]
@@ -29,15 +34,22 @@ class Answers:
 
     @property
     def raters(self) -> tuple[str, ...]:
-        """Who answered, by name."""
+        """The raters who answered, by name."""
         return tuple(sorted(self.background))
 
 
 def read_answers(study: Study, paths: Sequence[Path]) -> Answers:
-    """The answers in files and folders of files (.csv, .json). Empty answers are left out.
+    """Read the answers in files and folders of files (.csv, .json). Empty answers are left out.
 
-    InputError, with the line, for answers to another study, of a rater or to a question that it has not, or that are no
-    choice; where one rater answered a question in two ways; and where nobody answered."""
+    Args:
+        study: the study.
+        paths: files and folders.
+    Returns:
+        The answers.
+    Raises:
+        InputError: with the line, for answers to another study, of an unknown rater, to an unknown question or with an
+            unknown choice; if one rater answers a question in two ways; or without any answer.
+    """
     found: dict[str, dict[str, tuple[str, str]]] = {}
     for path in answer_files(paths):
         for place, mark, rater, question, answer in _rows(path):
@@ -46,14 +58,15 @@ def read_answers(study: Study, paths: Sequence[Path]) -> Answers:
             answer = _checked(study, place, mark, rater=rater, question=question, answer=answer)
             before = found.setdefault(rater, {}).setdefault(question, (answer, place))
             if before[0] != answer:
-                told = f"{rater} says {answer} to {question} here and {before[0]} in {before[1]}"
+                told = f"{rater} answers {answer} to {question} here and {before[0]} in {before[1]}"
                 raise InputError(place, told, "one answer", "remove one of the two")
     if not found:
-        raise InputError(paths[0] if paths else "answers", "no answers", "files that the form saved", "add them")
+        raise InputError(paths[0] if paths else "answers", "no answers", "files saved by the form", "add them")
     return _sorted_out(study, found)
 
 
 def _sorted_out(study: Study, found: Mapping[str, Mapping[str, tuple[str, str]]]) -> Answers:
+    """Sort the answers by rater into background, ratings and choices."""
     asked = {question.key for question in BACKGROUND}
     background, ratings, choices = {}, {}, {}
     missing = 0
@@ -69,23 +82,29 @@ def _sorted_out(study: Study, found: Mapping[str, Mapping[str, tuple[str, str]]]
 
 
 def _checked(study: Study, place: str, mark: str, rater: str, question: str, answer: str) -> str:
-    """The answer, where it is one of this study."""
+    """Check that an answer belongs to this study, and return it."""
     if mark != study.id:
-        raise InputError(place, f"answers to study {mark or 'without a name'}", study.id, "choose this study's answers")
+        raise InputError(place, f"answers to study {mark or 'without an id'}", study.id, "choose this study's answers")
     if rater not in study.orders:
         raise InputError(place, f"rater {rater!r}", f"one of {', '.join(list(study.orders)[:12])}", "correct the name")
     possible = {one.key: [key for key, _ in one.choices] for one in BACKGROUND}
     scale = [str(value) for value in range(1, len(SCALE) + 1)]
     possible |= {"/".join(row): [*row, SAME] if study.pairs else scale for row in study.orders[rater]}
     if question not in possible:
-        raise InputError(place, f"question {question!r}", f"one that {rater} was asked", "correct the name")
+        raise InputError(place, f"question {question!r}", f"a question for {rater}", "correct the name")
     if answer not in possible[question]:
         raise InputError(place, f"answer {answer!r}", f"one of {', '.join(possible[question])}", "correct it")
     return answer
 
 
 def answer_files(paths: Sequence[Path]) -> list[Path]:
-    """The files, and those in the folders (.csv, .json), that answers are read from."""
+    """List the files that answers are read from.
+
+    Args:
+        paths: files, and folders with .csv and .json files.
+    Returns:
+        The files.
+    """
     out = []
     for path in map(Path, paths):
         inside = sorted(path.iterdir()) if path.is_dir() else [path]
@@ -94,7 +113,7 @@ def answer_files(paths: Sequence[Path]) -> list[Path]:
 
 
 def _rows(path: Path) -> Iterable[tuple[str, ...]]:
-    """(place, study, rater, question, answer) of one file."""
+    """Iterate over (place, study, rater, question, answer) of one file."""
     if path.suffix.lower() != ".json":
         for place, row in read_rows(path, ANSWER_COLUMNS, separators=",;\t"):
             yield place, *(row[column] for column in ANSWER_COLUMNS)
@@ -103,6 +122,6 @@ def _rows(path: Path) -> Iterable[tuple[str, ...]]:
         told = json.loads(utf8(path, "answers in JSON", _LARGEST))
         answers = told["answers"].items()
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
-        raise InputError(path, "no answers in JSON", "what the form saves", "save it again") from None
+        raise InputError(path, "not answers in JSON", "a file saved by the form", "save it again") from None
     for question, answer in answers:
         yield str(path), str(told.get("study", "")), str(told.get("rater", "")), str(question), str(answer).strip()

@@ -1,7 +1,7 @@
-"""What raters are asked, about themselves and of every clip (after Faustino App. C), and the page that they fill in.
+"""The questions to raters, about themselves and about every clip (after Faustino App. C), and the page with them.
 
-The page needs no network and sends nothing; the answers are saved as a file. It knows neutral names only. Raters
-without a browser for it type into a table with the same questions.
+The page needs no network and sends nothing; it saves the answers as a file. It has neutral names only. Raters whose
+browser cannot run it type into a table with the same questions.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from ..evaluation.html_page import Html, build_page, build_section, element, fra
 from .order import Study
 
 MOVIES = (".mp4", ".webm", ".m4v", ".mov", ".gif")
-"""What browsers show."""
+"""File types that browsers play."""
 ANSWER_COLUMNS = ("study", "rater", "question", "answer")
 _STYLE = """
 body { font-size: 17px; line-height: 1.5; max-width: 900px } p { margin: .8em 0 }
@@ -82,8 +82,14 @@ show(0);
 
 @dataclass(frozen=True)
 class Question:
-    """One question about the rater. key: in the answers. needed: whether it has to be answered. choices: (key,
-    text)."""
+    """One question about the rater.
+
+    Attributes:
+        key: its name in the answers.
+        text: the question.
+        choices: (key, text) of each choice.
+        needed: whether an answer is required.
+    """
 
     key: str
     text: str
@@ -108,16 +114,23 @@ RATE = "How natural does the movement look?"
 COMPARE = "Which movement looks more natural?"
 SAME = "same"
 INTRODUCTION = (
-    "You will see short clips of one football player each. Look only at how the body moves, and tell how natural that "
-    "looks to you. There are no right or wrong answers, and nobody asks for your name.",
-    "Every clip may be watched as often as you like. The first two are there to get used to the task; their answers do "
-    "not count.",
+    "You will see short clips of one football player each. Look only at how the body moves, and rate how natural it "
+    "looks to you. There are no right or wrong answers, and you do not give your name.",
+    "You can watch every clip as often as you like. The first two help you get used to the task; their answers do not "
+    "count.",
 )
 
 
 def form_page(study: Study, rater: str, sources: Mapping[str, str]) -> str:
-    """The form of one rater as HTML text. sources: neutral name -> address of the clip as the page finds it: a path
-    from where the page lies, or the clip itself as a data address."""
+    """Build the form of one rater as HTML.
+
+    Args:
+        study: the study.
+        rater: the rater's name.
+        sources: neutral name -> address of the clip: a path relative to the page, or a data URL.
+    Returns:
+        The page as text.
+    """
     pages = [_introduction(study), _background()]
     order, what = study.orders[rater], "Pair" if study.pairs else "Clip"
     for number, shown in enumerate(order, 1):
@@ -128,14 +141,21 @@ def form_page(study: Study, rater: str, sources: Mapping[str, str]) -> str:
     return build_page(
         "How natural does it look?", element("progress", max=len(pages) - 1, value=0), *pages,
         element("p", _button("back", "Back"), _button("next", "Next")),
-        element("noscript", element("p", f"This form needs JavaScript; {rater}.csv can be filled in instead.")),
+        element("noscript", element("p", f"This form needs JavaScript; fill in {rater}.csv instead.")),
         Html(f'<script type="application/json" id="study">{data}</script>'), element("script", Html(_SCRIPT)),
         style=_STYLE,
     )  # fmt: skip
 
 
 def form_table(study: Study, rater: str) -> str:
-    """The same questions as a CSV to type into: an empty answer for each, in the rater's order."""
+    """Build the same questions as a CSV to type into, with an empty answer for each, in the rater's order.
+
+    Args:
+        study: the study.
+        rater: the rater's name.
+    Returns:
+        The table as text.
+    """
     text = io.StringIO(newline="")
     table = csv.writer(text, lineterminator="\r\n")
     table.writerow(ANSWER_COLUMNS)
@@ -144,12 +164,26 @@ def form_table(study: Study, rater: str) -> str:
 
 
 def questions_of(study: Study, rater: str) -> list[str]:
-    """The keys of all questions in a rater's order; a pair is its two names with a stroke between."""
+    """List the keys of all questions in a rater's order; the key of a pair is both names with a slash between.
+
+    Args:
+        study: the study.
+        rater: the rater's name.
+    Returns:
+        The keys.
+    """
     return [question.key for question in BACKGROUND] + ["/".join(shown) for shown in study.orders[rater]]
 
 
 def clip_source(folder: Path, name: str) -> Path | None:
-    """The movie of a neutral name in a folder; None where there is none."""
+    """Find the movie of a clip in a folder.
+
+    Args:
+        folder: the folder.
+        name: the clip's neutral name.
+    Returns:
+        The file; None if there is none.
+    """
     return next((path for suffix in MOVIES if (path := folder / f"{name}{suffix}").is_file()), None)
 
 
@@ -165,6 +199,7 @@ def _background() -> Html:
 
 
 def _clip_page(study: Study, shown: tuple[str, ...], sources: Mapping[str, str], title: str) -> Html:
+    """Build the page of one clip or of a pair with its question."""
     name = "/".join(shown)
     training = () if study.counts(shown) else (" ", element("span", "(to get used to it)", class_="quiet"))
     sides = ("Left", "Right") if len(shown) == 2 else ("",)
@@ -185,7 +220,7 @@ def _clip(source: str) -> Html:
 
 
 def _choices(key: str, text: str, choices: tuple[tuple[str, str], ...], needed: bool) -> Html:
-    """A question with one choice."""
+    """Build a question with one choice."""
     inputs = [element("label", element("input", type="radio", name=key, value=value), f" {said}")
               for value, said in choices]  # fmt: skip
     return element("fieldset", element("legend", text), *inputs, data_needed=needed)
@@ -196,6 +231,6 @@ def _button(id_: str, text: str) -> Html:
 
 
 def _end() -> Html:
-    thanks = "Save your answers and send the file to whoever gave you this form. Nothing has been sent."
+    thanks = "Save your answers and send the file to the person who gave you this form. Nothing has been sent."
     buttons = element("p", _button("csv", "Save as a table (CSV)"), _button("json", "Save as JSON"))
     return element("section", build_section("Thank you", element("p", thanks), buttons), hidden=True)

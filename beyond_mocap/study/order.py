@@ -1,7 +1,8 @@
-"""A study: clips under neutral names, in which order each rater sees them (Faustino §5.1.1), and both as a file.
+"""A study: clips under neutral names, each rater's order (Faustino §5.1.1), and both as a file.
 
-No rater can tell from a name which system made a clip; all see other orders, systems and scenarios mixed; two clips to
-get used to the task come first and do not count. Raters must not see study.json, which says who made what.
+No name reveals which system produced a clip. All raters see other orders, with systems and scenarios mixed; two
+training
+clips come first and do not count. Raters must not see study.json, which lists the systems.
 """
 
 from __future__ import annotations
@@ -21,22 +22,28 @@ from ..files.content import utf8
 from ..files.tables import read_rows, write_report
 
 TRAINING = "training"
-"""In place of a system: this clip comes first and does not count."""
+"""System of the clips that come first and do not count."""
 MOST_CLIPS = 500
-_LETTERS = "bcdfghjkmnpqrstvwxyz23456789"  # no vowels, no words; nothing that looks like something else
+_LETTERS = "bcdfghjkmnpqrstvwxyz23456789"  # no vowels, so no words; no characters that look alike
 _LONG = 4  # letters of a clip's name
-_TRIES = 200  # random orders tried until one is new
+_TRIES = 200  # random orders to try until one differs from all others
 STUDY_FILE = "study.json"
 VERSION = 1
 COLUMNS = ("file", "system", "scenario")
 _LARGEST = 20_000_000
-_NAME = re.compile(r"[A-Za-z0-9_-]{1,40}")  # of clips and raters: files are called so
+_NAME = re.compile(r"[A-Za-z0-9_-]{1,40}")  # of clips and raters, used as file names
 
 
 @dataclass(frozen=True)
 class Clip:
-    """One clip of a study. file: a movie or a motion, as its maker named it. system: who made it, or TRAINING.
-    scenario: what it shows, the same for all systems. name: the neutral one."""
+    """One clip of a study.
+
+    Attributes:
+        file: a movie or a motion, under its original name.
+        system: the system that produced it, or TRAINING.
+        scenario: what it shows, the same for all systems.
+        name: the neutral name.
+    """
 
     file: str
     system: str
@@ -46,9 +53,16 @@ class Clip:
 
 @dataclass(frozen=True, kw_only=True)
 class Study:
-    """A study. id: eight letters that its answers carry. systems, scenarios: in the order of the table. pairs: whether
-    two clips of one scenario are compared instead of each being rated. orders: rater -> what he sees, one after the
-    other: names of clips, in a study of pairs two each; the training clips come first."""
+    """A study.
+
+    Attributes:
+        id: eight letters that its answers carry.
+        seed: seed of the names and orders.
+        pairs: whether raters compare two clips of one scenario instead of rating each.
+        clips: the clips, in the order of the table.
+        orders: rater -> pages in their order: names of clips, two each in a study of pairs; the training clips come
+            first.
+    """
 
     id: str
     seed: int
@@ -58,12 +72,12 @@ class Study:
 
     @property
     def systems(self) -> tuple[str, ...]:
-        """Systems that are compared."""
+        """The compared systems, in the order of the table."""
         return tuple(dict.fromkeys(clip.system for clip in self.clips if clip.system != TRAINING))
 
     @property
     def scenarios(self) -> tuple[str, ...]:
-        """Scenarios that count."""
+        """The scenarios that count, in the order of the table."""
         return tuple(dict.fromkeys(clip.scenario for clip in self.clips if clip.system != TRAINING))
 
     @property
@@ -72,16 +86,31 @@ class Study:
         return tuple(clip.name for clip in self.clips if clip.system == TRAINING)
 
     def counts(self, shown: Sequence[str]) -> bool:
-        """Whether what is shown together counts."""
+        """Return whether a page counts.
+
+        Args:
+            shown: the names of its clips.
+        """
         return not set(shown) & set(self.training)
 
 
 def ordered(clips: Sequence[Clip], raters: int, seed: int = 0, pairs: bool = False) -> Study:
-    """The study of these clips for so many raters; the same for the same clips and seed, and the first raters' orders
-    do not change with how many there are.
+    """Build the study of some clips.
 
-    InputError where there are not exactly two training clips, fewer than two systems, a system without a scenario that
-    another has, a clip twice, or too few clips for so many different orders."""
+    It is the same for the same clips and seed, and the first raters' orders do not depend on the number of raters.
+
+    Args:
+        clips: the clips, without neutral names.
+        raters: number of raters.
+        seed: seed of the names and orders.
+        pairs: whether raters compare two clips of one scenario.
+    Returns:
+        The study.
+    Raises:
+        InputError: unless there are exactly two training clips, at least two systems, each with the same scenarios,
+            each
+            clip once, and enough clips for so many different orders.
+    """
     _check(clips)
     named = _named(clips, seed)
     mark = hex_digest(repr((seed, pairs, [(c.file, c.system, c.scenario) for c in named])), digits=8)
@@ -93,14 +122,22 @@ def ordered(clips: Sequence[Clip], raters: int, seed: int = 0, pairs: bool = Fal
             if order not in taken:
                 break
         else:
-            raise InputError("raters", str(raters), "no more than there are orders", "add clips or ask fewer raters")
+            raise InputError("raters", str(raters), "at most one per order", "add clips or reduce the raters")
         taken.add(order)
         orders[f"R{number + 1:02d}"] = order
     return Study(id=mark, seed=seed, pairs=pairs, clips=named, orders=orders)
 
 
 def read_clips(path: Path) -> tuple[Clip, ...]:
-    """The clips of a table `file,system,scenario`, without names; InputError with the line of a row that lacks one."""
+    """Read the clips of a table with the columns file, system and scenario.
+
+    Args:
+        path: the table.
+    Returns:
+        The clips, without neutral names.
+    Raises:
+        InputError: with the line, if a row lacks a value.
+    """
     clips = []
     for place, row in read_rows(path, COLUMNS, separators=",;\t"):
         for column in COLUMNS[:2]:
@@ -111,7 +148,12 @@ def read_clips(path: Path) -> tuple[Clip, ...]:
 
 
 def write_study(folder: Path, study: Study) -> None:
-    """Writes study.json into a folder."""
+    """Write study.json into a folder.
+
+    Args:
+        folder: the folder.
+        study: the study.
+    """
     write_report(folder / STUDY_FILE, {
         "version": VERSION, "study": study.id, "seed": study.seed, "pairs": study.pairs,
         "clips": [{"name": c.name, "file": c.file, "system": c.system, "scenario": c.scenario} for c in study.clips],
@@ -120,27 +162,35 @@ def write_study(folder: Path, study: Study) -> None:
 
 
 def read_study(folder: Path) -> Study:
-    """The study of a folder; InputError where its study.json is missing or is not of that form."""
+    """Read the study of a folder.
+
+    Args:
+        folder: the folder with study.json.
+    Returns:
+        The study.
+    Raises:
+        InputError: if study.json is missing or invalid.
+    """
     path = Path(folder) / STUDY_FILE
     text = utf8(path, "a study.json, as 'beyond-mocap study order' writes it", _LARGEST)
     try:
         told = json.loads(text)
-        json.dumps(told, ensure_ascii=False).encode("utf-8")  # halves of characters can be read but not written
+        json.dumps(told, ensure_ascii=False).encode("utf-8")  # lone surrogates can be read but not written
         clips = tuple(Clip(*(str(row[key]) for key in ("file", "system", "scenario", "name"))) for row in told["clips"])
         names = {clip.name for clip in clips}
         orders = {str(rater): tuple(_shown(row, names) for row in rows) for rater, rows in told["orders"].items()}
         if told["version"] != VERSION or not isinstance(told["pairs"], bool) or len(names) != len(clips):
             raise ValueError("another version")
         if odd := next((name for name in (*names, *orders) if not _NAME.fullmatch(name)), None):
-            raise ValueError(f"{odd!r} is no name")
+            raise ValueError(f"{odd!r} is not a valid name")
         return Study(id=str(told["study"]), seed=int(told["seed"]), pairs=told["pairs"], clips=clips, orders=orders)
     except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError) as error:
-        found = f"not of the form of a study ({type(error).__name__}: {error})"
-        raise InputError(path, found, "what 'study order' writes", "make the study again") from None
+        found = f"not a study ({type(error).__name__}: {error})"
+        raise InputError(path, found, "a file written by 'study order'", "create the study again") from None
 
 
 def _order(clips: Sequence[Clip], rng: np.random.Generator, pairs: bool) -> tuple[tuple[str, ...], ...]:
-    """One rater's order."""
+    """Build one rater's random order."""
     first = [clip.name for clip in clips if clip.system == TRAINING]
     first = [first[place] for place in rng.permutation(len(first))]
     real = [clip for clip in clips if clip.system != TRAINING]
@@ -152,7 +202,7 @@ def _order(clips: Sequence[Clip], rng: np.random.Generator, pairs: bool) -> tupl
 
 
 def _named(clips: Sequence[Clip], seed: int) -> tuple[Clip, ...]:
-    """The clips with neutral names, which depend on the seed and on how many there are only."""
+    """Give the clips neutral names, which depend only on the seed and the number of clips."""
     rng, names = np.random.default_rng([seed, len(clips)]), {}
     while len(names) < len(clips):
         names["".join(_LETTERS[letter] for letter in rng.integers(0, len(_LETTERS), _LONG))] = None
@@ -160,8 +210,9 @@ def _named(clips: Sequence[Clip], seed: int) -> tuple[Clip, ...]:
 
 
 def _check(clips: Sequence[Clip]) -> None:
+    """Check the clips of a study, see `build_study`."""
     if len(clips) > MOST_CLIPS:
-        raise InputError("clips", str(len(clips)), f"{MOST_CLIPS} at most", "leave some out")
+        raise InputError("clips", str(len(clips)), f"{MOST_CLIPS} at most", "remove some")
     training = [clip for clip in clips if clip.system == TRAINING]
     if len(training) != 2:
         found = f"{len(training)} clips of the system {TRAINING!r}"
@@ -169,7 +220,7 @@ def _check(clips: Sequence[Clip]) -> None:
     real = [clip for clip in clips if clip.system != TRAINING]
     systems = list(dict.fromkeys(clip.system for clip in real))
     if len(systems) < 2:
-        raise InputError("clips", f"{len(systems)} systems", "two or more to compare", "add another one's clips")
+        raise InputError("clips", f"{len(systems)} systems", "two or more to compare", "add clips of another system")
     have = [(clip.system, clip.scenario) for clip in real]
     for system, scenario in itertools.product(systems, dict.fromkeys(clip.scenario for clip in real)):
         if (count := have.count((system, scenario))) != 1:
@@ -177,11 +228,11 @@ def _check(clips: Sequence[Clip]) -> None:
             raise InputError("clips", found, "one of each scenario by each system", "add or remove rows")
     files = [clip.file for clip in clips]
     if twice := next((file for file in files if files.count(file) > 1), None):
-        raise InputError("clips", f"{twice} twice", "a file for each row", "remove one of them")
+        raise InputError("clips", f"{twice} is listed twice", "each file once", "remove one of them")
 
 
 def _shown(row, names: set[str]) -> tuple[str, ...]:
-    """One entry of an order: one or two names that there are."""
+    """Check one page of an order: one or two known names."""
     shown = tuple(map(str, row))
     if isinstance(row, (str, Mapping)) or not 1 <= len(shown) <= 2 or not set(shown) <= names:
         raise ValueError(f"{row!r} in an order")

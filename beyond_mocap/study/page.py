@@ -1,7 +1,7 @@
-"""The analysis of a study as JSON and as one page for a browser, which loads nothing; all names are escaped.
+"""The analysis of a study as JSON, and as one HTML page that loads nothing; all names are escaped.
 
-Ratings are drawn as diverging stacked bars: good answers to the right of zero, bad ones to the left, undecided ones
-half on each side (Robbins and Heiberger 2011; Faustino figs. 15 and 16).
+Ratings are drawn as diverging stacked bars: good answers to the right of zero, bad ones to the left, neutral ones half
+on each side (Robbins and Heiberger 2011; Faustino figs. 15 and 16).
 """
 
 from __future__ import annotations
@@ -36,11 +36,17 @@ _COLUMNS = (
     ("delta", "delta", 2),
 )  # fmt: skip
 COLOURS = ("#b5482a", "#e3a587", "#d9d9d9", "#8fb8de", "#2563a8")
-_NAME: dict[str, Any] = {"fontsize": 9, "parse_math": False}  # a name may have dollars in it
+_NAME: dict[str, Any] = {"fontsize": 9, "parse_math": False}  # names may contain dollar signs
 
 
 def study_report(found: Analysis) -> dict:
-    """The analysis as a dict for JSON; None where something cannot be had."""
+    """Build the analysis as plain values for JSON.
+
+    Args:
+        analysis: the analysis.
+    Returns:
+        The report; None where a value is unknown.
+    """
     said = found.answers.background.values()
     background = {key: dict(Counter(one[key] for one in said if key in one)) for key in (q.key for q in BACKGROUND)}
     return rounded({
@@ -57,9 +63,17 @@ def study_report(found: Analysis) -> dict:
 
 
 def study_page(found: Analysis) -> str:
-    """The page as text. InputError where matplotlib is not installed."""
+    """Build the analysis as an HTML page.
+
+    Args:
+        analysis: the analysis.
+    Returns:
+        The page as text.
+    Raises:
+        InputError: if matplotlib is not installed.
+    """
     require_matplotlib()
-    unit = "choices: 1 always the first, -1 always the second" if found.study.pairs else "points of the scale"
+    unit = "choices: 1 is always the first, -1 always the second" if found.study.pairs else "points of the scale"
     drawn = differences(found.findings, f"each rater's mean difference, {unit}")
     return build_page(
         f"Study {found.study.id}", element("h1", f"How natural it looks: study {found.study.id}"),
@@ -71,7 +85,13 @@ def study_page(found: Analysis) -> str:
 
 
 def place_bar(counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Left edges and widths (5,) in percent of a bar of counts (5,): the middle of the undecided lies at zero."""
+    """Compute the segments of a diverging bar: the middle of the neutral answers lies at zero.
+
+    Args:
+        counts: (5,) number of each rating.
+    Returns:
+        Left edges and widths, (5,) percent each.
+    """
     share = 100.0 * np.asarray(counts, float) / max(float(np.sum(counts)), 1.0)
     left = np.concatenate([[0.0], np.cumsum(share)[:-1]])
     return left - (share[:2].sum() + share[2] / 2.0), share
@@ -89,22 +109,28 @@ def _systems(found: Analysis) -> tuple[Html, Html]:
 
 
 def p_text(p: float) -> str:
-    """A p as it is told: "p = 0.0391", "p < 0.0001", "p cannot be had"."""
+    """Format a p value: "p = 0.0391", "p < 0.0001", "p is unknown".
+
+    Args:
+        p: the value, NaN if unknown.
+    Returns:
+        The text.
+    """
     if not math.isfinite(p):
-        return "p cannot be had"
+        return "p is unknown"
     return "p < 0.0001" if p < 1e-4 else f"p = {p:.4f}"
 
 
 def _sentence(one: Finding, pairs: bool) -> Html:
     said = f"{one.new} looks more natural than {one.old}"
     if not math.isfinite(one.p):
-        return element("p", f"Whether {said} cannot be tested: too few raters, or all alike.")
+        return element("p", f"Whether {said} cannot be tested: too few raters, or no differences.")
     unit = "" if pairs else " points"
     told = (f"{one.mean:+.2f}{unit} (95 %: {one.low:+.2f} to {one.high:+.2f}), t({one.degrees}) = {one.t:.2f}, "
             f"one-sided {p_text(one.holm_p)}")  # fmt: skip
     if one.better:
         return element("p", element("b", said, class_="met"), f": {told}.")
-    return element("p", f"That {said} is not shown: {told}.")
+    return element("p", f"Not significant that {said}: {told}.")
 
 
 def _findings(found: Analysis) -> Html:
@@ -112,9 +138,9 @@ def _findings(found: Analysis) -> Html:
         build_row(f"{one.new} over {one.old}", build_number_cell(len(one.differences)),
                   *(_cell(getattr(one, key), digits) for key, _, digits in _COLUMNS)) for one in found.findings
     ]  # fmt: skip
-    told = (f"Difference: mean over raters, with its 95 % interval. p: one-sided paired t-test by rater; Holm: for all "
-            f"hypotheses together, at {ALPHA:g}. Wilcoxon: the same by ranks. Pooled: all answers as if each had "
-            "a rater of its own (Faustino §5.1.2). d: Cohen's, of raters' differences. delta: Cliff's.")  # fmt: skip
+    told = (f"Difference: mean over raters with its 95 % interval. p: one-sided paired t-test by rater; Holm: adjusted "
+            f"for all hypotheses, at {ALPHA:g}. Wilcoxon: the same by ranks. Pooled: all answers as if each had a "
+            "rater of its own (Faustino §5.1.2). d: Cohen's d of raters' differences. delta: Cliff's.")  # fmt: skip
     head = ("hypothesis", build_title("raters"), *(build_title(title) for _, title, _ in _COLUMNS))
     return fragment(build_table(head, rows), element("p", told, class_="quiet"))
 
@@ -134,12 +160,18 @@ def _shares(row: Shares) -> dict:
 
 
 def _cell(value: float, digits: int) -> Html:
-    """A number; of four digits, which are those of a p, not below what they can show."""
+    """Build a number cell; values with four digits are p values and show "< 0.0001" below that."""
     return element("td", "< 0.0001", class_="n") if digits == 4 and value < 1e-4 else build_number_cell(value, digits)
 
 
 def diverging(groups: Sequence[tuple[str, Sequence[Shares]]]) -> bytes:
-    """The picture as a PNG: for each group its title and a bar for each of its rows."""
+    """Draw ratings as diverging stacked bars.
+
+    Args:
+        groups: title and rows of each group; one bar for each row.
+    Returns:
+        A PNG.
+    """
     lines = sum(len(rows) for _, rows in groups) + 0.6 * len(groups)
     figure, (ax,) = create_canvas(1.1 + 0.36 * lines)
     y, ticks, names = 0.0, [], []
@@ -164,7 +196,14 @@ def diverging(groups: Sequence[tuple[str, Sequence[Shares]]]) -> bytes:
 
 
 def differences(findings: Sequence[Finding], unit: str) -> bytes:
-    """Each rater's difference as a dot, and the mean with its 95 % interval; a row for each finding."""
+    """Draw each rater's difference as a dot, and the mean with its 95 % interval.
+
+    Args:
+        findings: one row for each.
+        unit: label of the horizontal axis.
+    Returns:
+        A PNG.
+    """
     figure, (ax,) = create_canvas(0.9 + 0.55 * len(findings))
     for row, finding in enumerate(findings):
         spread = row + 0.16 * np.sin(2.4 * np.arange(len(finding.differences)))

@@ -1,7 +1,8 @@
-"""From a plan to a take: resolve, search, construct.
+"""Synthesis of one player: resolve a plan, search the library for clips, construct the final motion.
 
-`wanted` puts the order into frames of the library's rate, `block_costs` and `path_costs` say what things cost,
-`blocks` finds the cheapest sequence and searches coarse to fine as Faustino §3.2 does,
-`locomotion` adds or removes cycles until the travelled distance fits (§3.2.4), and `path_search` looks at speed and
-turn together with words and continuity. Every search ends in an `edit_list`: which clip frame each output frame shows.
+`search.request` converts a plan into frames at the library's rate, `search.block_costs` and `search.path_costs` hold
+the costs. `search.blocks` finds the sequence of blocks with the lowest cost, coarse to fine (Faustino 2024, §3.2),
+`search.locomotion` adds or removes cycles until the travelled distance fits (§3.2.4), and `search.path_search` weighs
+speed and turning together with labels and continuity. Every search returns an `EditList`: the clip frame that each
+output frame shows.
 """

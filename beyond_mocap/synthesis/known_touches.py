@@ -1,10 +1,10 @@
-"""Key moments at the touches that the ball's samples tell, and the ball as physics and the feet have it.
+"""Key moments moved to the solved touches of the ball, and the ball's trajectory by physics and by contact.
 
-    plan = solve_touches(Plan(track=track, timeline=timeline, solve_touches=True))
+    plan = resolve_touches(Plan(track=track, timeline=timeline, solve_touches=True))
 
-What `synthesize` and `resynthesize` do with a solved ball (`solve_ball`): before the search key moments move to solved
-touches; when the body is done, the ball goes through the places where it was met, as solved in between, and in dribbles
-step by step from foot to foot (`synthesis.construct.dribble`).
+This is what `synthesize` and `resynthesize` do with a solved ball (`solve_ball`): before the search, key moments move
+to solved touches; when the body is done, the ball passes through the places where it was met, as solved in between, and
+in dribbles step by step from foot to foot (`synthesis.construct.dribble`).
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ from .plan import Plan, ResolvedPlan, SolvedCourse, Touched
 from .take import DribbleTouch, KeyResult, Take
 
 FURTHEST = 0.4
-"""Seconds from a key moment within which its touch is looked for."""
+"""Seconds from a key moment within which its touch is searched."""
 
-_WITHIN = 1.5  # metres from the player within which a touch by nobody known may be his
-_NOT_MINE, _OTHER_PART, _OTHER_KIND = 0.15, 0.25, 0.15  # seconds that these are worth
-_UNSEEN = 0.1  # seconds from the nearest measured sample beyond which the ball counts as filled in
-_STEP = 0.004  # seconds between the points of a course
+_WITHIN = 1.5  # m from the player within which a touch by an unknown player may be this player's
+_NOT_MINE, _OTHER_PART, _OTHER_KIND = 0.15, 0.25, 0.15  # cost in seconds: player unknown, other part, other kind
+_UNSEEN = 0.1  # s from the nearest measured sample beyond which the ball counts as filled in
+_STEP = 0.004  # s between the points of a trajectory
 _SENDING, _TAKING = frozenset(list_labels(ball="sends")), frozenset(list_labels(ball="takes"))
 _CARRYING = frozenset(list_labels(ball="carries"))
 _SENT = {kind.name for kind in TOUCH_KINDS if kind.ball in ("sends", "carries")}
@@ -40,8 +40,14 @@ _TAKEN = {kind.name for kind in TOUCH_KINDS if kind.ball == "takes"}
 
 
 def solve_touches(plan: Plan, known: SolvedCourse | None = None) -> Plan:
-    """The plan with the ball's course solved and its key moments at the touches that they mean; without a course where
-    it is not to be solved or has no ball. known: the course, where an earlier take of the same track has it."""
+    """Solve the ball's trajectory and move the plan's key moments to its touches.
+
+    Args:
+        plan: the plan.
+        known: the trajectory, where an earlier take of the same track has it.
+    Returns:
+        The plan; without a trajectory where it is not to be solved or the track has no ball.
+    """
     if not plan.solve_touches:
         return plan if plan.solved is None else replace(plan, solved=None)
     course = plan.solved or known or course_of_track(plan)
@@ -49,7 +55,7 @@ def solve_touches(plan: Plan, known: SolvedCourse | None = None) -> Plan:
 
 
 def course_of_track(plan: Plan) -> SolvedCourse | None:
-    """The course of the ball of one player's track, solved from its samples alone; None where these are too few."""
+    """Solve the ball's trajectory from the samples of one player's track; None where these are too few."""
     from ..ball.tracked.solve import solve_ball
 
     try:
@@ -60,13 +66,22 @@ def course_of_track(plan: Plan) -> SolvedCourse | None:
 
 
 def course_of(solved: SolvedBall, player: str, plan: Plan) -> SolvedCourse:
-    """A solved ball as this player's plan has it: over the plan's time, with his touches told from others'."""
+    """Convert a solved ball to the trajectory of one player's plan.
+
+    Args:
+        solved: the solved ball.
+        player: name of the player.
+        plan: the player's plan; its time is covered.
+    Returns:
+        The trajectory, with the player's touches marked.
+    """
     first, last = plan.track.times[[0, -1]]
     inside = [touch for touch in solved.touches if first <= touch.time <= last]
     even = np.linspace(first, last, int(np.ceil((last - first) / _STEP)) + 1)
     times = np.union1d(even, [touch.time for touch in inside])
     begins, ends = solved.pieces[0].start, solved.pieces[-1].end
     pairs = zip(solved.pieces, solved.pieces[1:])
+    # gaps between pieces in which the ball is not known
     gone = np.array([[before.end, after.start] for before, after in pairs]).reshape(-1, 2)
     unknown = (times < begins) | (times > ends)
     for end, start in gone[gone[:, 1] - gone[:, 0] > _STEP]:
@@ -78,7 +93,7 @@ def course_of(solved: SolvedBall, player: str, plan: Plan) -> SolvedCourse:
 
 
 def _far(times: np.ndarray, seen: np.ndarray) -> np.ndarray:
-    """(M,) bool: more than _UNSEEN seconds from the nearest of the times `seen` (K,)."""
+    """Return (M,) bool: times more than _MAX_SAMPLE_GAP seconds from the nearest of the times `seen` (K,)."""
     if len(seen) < 2:
         return np.ones(len(times), bool)
     after = np.clip(np.searchsorted(seen, times), 1, len(seen) - 1)
@@ -86,6 +101,7 @@ def _far(times: np.ndarray, seen: np.ndarray) -> np.ndarray:
 
 
 def _touched(touch: SolvedTouch, player: str, plan: Plan) -> Touched:
+    """Convert a solved touch to this player's view: own touch or not, and the part if the height is known."""
     mine: bool | None = touch.player == player
     if not touch.player:
         place = [np.interp(touch.time, plan.track.times, plan.track.positions[:, axis]) for axis in (0, 1)]
@@ -96,14 +112,17 @@ def _touched(touch: SolvedTouch, player: str, plan: Plan) -> Touched:
 
 
 def _moved(timeline: Timeline, touches: tuple[Touched, ...]) -> Timeline:
-    """The timeline with key moments at the touches that suit them best, each touch for one, in the order of both.
+    """Move key moments to the touches that fit them best, each touch for one, in the order of both.
 
-    Key moments and touches are brought together as two lines of text are: a key moment without a touch costs FURTHEST,
-    one with a touch the seconds in between and what of the touch does not fit its words."""
+    Key moments and touches are aligned like two lines of text (edit distance): a key moment without a touch costs
+    MAX_TOUCH_OFFSET, one with a touch the seconds between them and what of the touch does not fit its labels.
+    """
     keys = [replace(key, solved=None) for key in timeline.keys]
     mine = [touch for touch in touches if touch.mine is not False]
     best = np.full((len(keys) + 1, len(mine) + 1), np.inf)
     best[0], taken = 0.0, np.zeros((len(keys) + 1, len(mine) + 1), int)
+    # best[row, column]: lowest cost of aligning the first `row` key moments with the first `column` touches;
+    # taken: 0 the key moment stays, 1 the touch is skipped, 2 they are matched
     for row, key in enumerate(keys, 1):
         for column in range(len(mine) + 1):
             ways = [best[row - 1, column] + FURTHEST]
@@ -112,6 +131,7 @@ def _moved(timeline: Timeline, touches: tuple[Touched, ...]) -> Timeline:
             taken[row, column] = int(np.argmin(ways))
             best[row, column] = min(ways)
     row, column, moved = len(keys), len(mine), keys[:]
+    # trace back from the last cell: 0 moves up, 1 moves left, 2 moves both
     while row:
         way = taken[row, column]
         if way == 2:
@@ -121,7 +141,7 @@ def _moved(timeline: Timeline, touches: tuple[Touched, ...]) -> Timeline:
 
 
 def _unlike(key: KeyMoment, touch: Touched) -> float:
-    """Seconds: how far a touch is from a key moment and its words; inf where it cannot be meant."""
+    """Compute how far a touch is from a key moment and its labels, in seconds; inf where it cannot be meant."""
     part, words, off = striking_part(key.words), set(key.words), abs(touch.time - key.time)
     if part is None or off > FURTHEST:
         return np.inf
@@ -132,7 +152,7 @@ def _unlike(key: KeyMoment, touch: Touched) -> float:
 
 
 def _in_order(keys: list[KeyMoment]) -> list[KeyMoment]:
-    """Key moments that would pass one another by their solved times stay where they were asked for."""
+    """Restore the requested time of key moments that would pass one another by their solved times."""
     while True:
         pairs = list(enumerate(zip(keys, keys[1:])))
         crossing = [n for n, (a, b) in pairs if a.in_force > b.in_force or a.in_force == b.in_force and a.time < b.time]
@@ -143,15 +163,19 @@ def _in_order(keys: list[KeyMoment]) -> list[KeyMoment]:
 
 
 def untouched(take: Take, plan: ResolvedPlan) -> list[str]:
-    """A line for every key moment that asks for a touch where the ball's course has none, and for every dribble in
-    which no foot touches the ball. take: `with_course`."""
+    """Report key moments that request a touch where the trajectory has none, and dribbles without a touch.
+
+    Args:
+        take: the take of `apply_trajectory`.
+        plan: the resolved plan.
+    """
     if plan.course is None:
-        told = "the touches of the ball are not solved: the track has no ball, or too few samples of it"
+        told = "the ball's touches are not solved: the track has no ball, or too few samples of it"
         return [told] if plan.asked.solve_touches else []
     missing: list[str] = [
         TimedLine(
-            f"{key.time:g} s: the ball's course tells of no touch for '{' '.join(key.words)}' within {FURTHEST:g} s, "
-            "it stays where it is asked for", (key.time, key.time),
+            f"{key.time:g} s: the ball's trajectory has no touch for '{' '.join(key.words)}' within {FURTHEST:g} s; "
+            "the key moment stays at its time", (key.time, key.time),
         ) for key in plan.timeline.keys if striking_part(key.words) and key.solved is None
     ]  # fmt: skip
     touched = np.array([take.start_time + push.first / take.motion.fps for push in take.dribbled])
@@ -159,15 +183,22 @@ def untouched(take: Take, plan: ResolvedPlan) -> list[str]:
         TimedLine(
             f"{span.start:g}-{span.end:g} s: no foot touches the ball in this "
             f"'{' '.join(sorted(_CARRYING.intersection(span.words)))}': it is too short, or no foot "
-            "comes near", (span.start, span.end),
+            "is near the ball", (span.start, span.end),
         ) for span in plan.timeline.spans
         if _CARRYING.intersection(span.words) and not ((touched >= span.start) & (touched <= span.end)).any()
     ]  # fmt: skip
 
 
 def with_course(take: Take, plan: ResolvedPlan) -> Take:
-    """The take with the ball as solved, through the places where it was met, and touched step by step in dribbles; as
-    it is, where nothing is solved."""
+    """Lead the ball of a take along its solved trajectory, through the places where it was met, and dribble it step by
+    step.
+
+    Args:
+        take: the take with the ball as it was met.
+        plan: the resolved plan.
+    Returns:
+        The take; unchanged where nothing is solved.
+    """
     if plan.course is None or take.ball is None:
         return replace(take, solved=plan.course)
     fps, met, times = take.motion.fps, take.ball.positions, take.ball.times
@@ -193,13 +224,13 @@ def with_course(take: Take, plan: ResolvedPlan) -> Take:
 
 
 def _touching(take: Take) -> list[KeyResult]:
-    """The key moments in which some part meets the ball, in the order of time."""
+    """List the key moments in which some part meets the ball, in order of time."""
     skeleton = take.motion.skeleton
     return sorted((key for key in take.keys if surfaces(skeleton, key.touching)), key=lambda key: key.frame)
 
 
 def _around(pair: tuple[int, int], others: list[tuple[int, int]], turns: list[float], fps: float) -> tuple[int, int]:
-    """The frames before and after a touch at which the ball changes its course anyway, but for the touch itself."""
+    """Return the frames before and after a touch at which the ball changes its course for other reasons."""
     low = [*(p[1] for p in others if p[1] <= pair[0]), *(int(np.floor(turn)) for turn in turns if turn < pair[0] - 1.5)]
     high = [*(p[0] for p in others if p[0] >= pair[1]), *(int(np.ceil(turn)) for turn in turns if turn > pair[1] + 1.5)]
     return max(low, default=pair[0] - int(fps)), min(high, default=pair[1] + int(fps))

@@ -1,8 +1,8 @@
-"""Players who are not as tall as the library's skeleton: all is chosen and laid out in its size, and then scaled.
+"""Body-size scaling: players who are not as tall as the library's skeleton.
 
-Track and ball are divided by the size in the plan (`resolve_plan`), and skeleton and root are multiplied by it in the
-end: angles, feet that stand and times stay as they are.
-The ball keeps its own size; `lay_out.met` meets it in the player's.
+Everything is searched and constructed in the library's size, and scaled afterwards. Track and ball are divided by the
+size in the plan (`resolve_plan`), skeleton and root are multiplied by it in the end; angles, contacts and times stay as
+they are. The ball keeps its own size; `Construction.solve_ball_contact` solves in the player's size.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ from ..motion.track.ball_path import BallPath
 from .plan import Plan
 from .take import Take
 
-_EVEN = 1e-9
+_EVEN = 1e-9  # m, rounding in the height of a ball on the ground
 
 
 def taken_in_library_size(take: Take, size: float) -> Take:
-    """A take of `in_own_size`, without its pins and with the ball as it was met, in the library's size again."""
+    """Convert a take back to the library's size, without its pins and with the ball as it was met."""
     motion, contacts = take.unpinned or (take.motion, take.contacts)
     ball = take.met_ball or take.ball
     take = replace(
@@ -33,8 +33,14 @@ def taken_in_library_size(take: Take, size: float) -> Take:
 
 
 def in_own_size(take: Take, size: float, plan: Plan, before: Take | None = None) -> Take:
-    """A take out of the library's size in the player's. before: an earlier take of the same size; frames that are as in
-    it come back bit for bit."""
+    """Scale a take from the library's size to the player's.
+
+    Args:
+        take: the take, in the library's size.
+        size: times as tall as the library's skeleton.
+        plan: the plan as requested.
+        before: an earlier take of the same size; frames that did not change come back bit for bit.
+    """
     if size == 1.0:
         return replace(take, plan=plan)
     grown = _scaled(take, size, plan, lambda ball: real_ball(ball, size))
@@ -50,13 +56,14 @@ def in_own_size(take: Take, size: float, plan: Plan, before: Take | None = None)
 
 
 def real_ball(ball: np.ndarray, size: float) -> np.ndarray:
-    """The ball (..., 3) m out of the library's size: where it rests on the ground it does so with its own radius."""
+    """Scale ball positions (..., 3) m from the library's size; a ball on the ground rests on its own radius."""
     out = ball * size
     out[..., 2] = np.where(ball[..., 2] <= BALL_RADIUS + _EVEN, BALL_RADIUS, np.maximum(out[..., 2], BALL_RADIUS))
     return out
 
 
 def _scaled(take: Take, size: float, plan: Plan, ball_scaled) -> Take:
+    """Scale motion, ball and measures in metres."""
     motion, ball = take.motion, take.ball
     motion = Motion(motion.skeleton.scaled(size), motion.root_positions * size, motion.rotations, motion.fps)
     ball = None if ball is None else BallPath(ball.times, ball_scaled(ball.positions), ball.measured)

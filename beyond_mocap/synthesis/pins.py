@@ -1,5 +1,4 @@
-"""Pins as a table: `time_s,part,x_m,y_m,z_m,hold_s`, a line for each place where a hand, a foot or the gaze has to
-be."""
+"""Pins as a table `time_s,part,x_m,y_m,z_m,hold_s`: one line per place of a hand, a foot or the gaze."""
 
 from __future__ import annotations
 
@@ -15,8 +14,18 @@ COLUMNS = ("time_s", "part", "x_m", "y_m", "z_m", "hold_s")
 
 
 def read_pins(path: str | os.PathLike) -> tuple[Pin, ...]:
-    """The pins of a CSV file, in the order of its lines: seconds on the track's clock, metres in the world, Z up.
-    hold_s may be missing or blank (a moment). InputError names the line that is not of this form."""
+    """Read pins from a CSV file.
+
+    Times are seconds on the track's clock, positions metres in the world, Z up; hold_s may be missing or blank (a
+    moment).
+
+    Args:
+        path: the file.
+    Returns:
+        The pins, in the order of the lines.
+    Raises:
+        InputError: naming the line that does not have this form.
+    """
     reader = csv.DictReader(io.StringIO(read_text(path), newline=""))
     try:
         missing = [name for name in COLUMNS[:-1] if name not in (reader.fieldnames or ())]
@@ -28,6 +37,7 @@ def read_pins(path: str | os.PathLike) -> tuple[Pin, ...]:
 
 
 def _pin(row: dict, place: str) -> Pin:
+    """Build the pin of a row."""
     time, x, y, z, hold = (_number(row, name, place) for name in ("time_s", "x_m", "y_m", "z_m", "hold_s"))
     try:
         return Pin(time, (row["part"] or "").strip().lower(), (x, y, z), hold)
@@ -36,6 +46,7 @@ def _pin(row: dict, place: str) -> Pin:
 
 
 def _number(row: dict, name: str, place: str) -> float:
+    """Parse a number of a row; a blank hold is 0."""
     text = (row.get(name) or "").strip()
     try:
         return float(text) if text or name != "hold_s" else 0.0

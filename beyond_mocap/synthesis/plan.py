@@ -1,5 +1,8 @@
-"""What is asked (`Plan`: track, timeline, ball, pins, library and how to go about it), and the same resolved for a
-library, as search, construction, edits and explanations need it (`ResolvedPlan`, made by `resolve_plan`)."""
+"""The request for one player (`Plan`) and the same resolved for a library (`ResolvedPlan`, built by `resolve_plan`).
+
+A plan holds track, timeline, ball, pins, library and settings; the resolved plan is what search, construction, edits
+and explanations work with.
+"""
 
 from __future__ import annotations
 
@@ -26,9 +29,16 @@ _HEIGHT = setting("player", "height")
 
 @dataclass(frozen=True)
 class Pin:
-    """A part of the body held at a place. time: s on the track's clock from which on; hold: s for which, 0 for a
-    moment. part: one of PARTS; hands and feet are pinned by their joint (wrist, ankle), the gaze is turned to the
-    place. position: (x, y, z) m in the world. InputError for an unknown part and for numbers that are none."""
+    """A part of the body held at a place.
+
+    Attributes:
+        time: s on the track's clock from which on it holds.
+        part: one of PARTS; hands and feet are pinned by their joint (wrist, ankle), the gaze is turned to the place.
+        position: (x, y, z) m, world.
+        hold: s for which it holds, 0 for a moment.
+    Raises:
+        InputError: for an unknown part, and for NaN or infinite values.
+    """
 
     time: float
     part: str
@@ -37,26 +47,33 @@ class Pin:
 
     def __post_init__(self):
         if self.part not in PARTS:
-            raise InputError("pin", f"the part {self.part!r}", f"one of {', '.join(PARTS)}")
+            raise InputError("pin", f"part {self.part!r}", f"one of {', '.join(PARTS)}")
         object.__setattr__(self, "time", float(self.time))
         object.__setattr__(self, "hold", float(self.hold))
         object.__setattr__(self, "position", tuple(float(value) for value in self.position))
         if len(self.position) != 3 or not all(map(math.isfinite, (*self.position, self.time, self.hold))):
-            raise InputError("pin", f"{self.time:g} s, {self.position}, {self.hold:g} s", "a time, a place and a hold")
+            raise InputError(
+                "pin", f"{self.time:g} s, {self.position}, {self.hold:g} s", "a finite time, position and hold"
+            )
         if self.hold < 0.0:
             raise InputError("pin", f"a hold of {self.hold:g} s", "0 s or more")
 
     @property
     def end(self) -> float:
-        """Seconds at which the part is let go."""
+        """Seconds at which the part is released."""
         return self.time + self.hold
 
 
 @dataclass(frozen=True)
 class Touched:
-    """Somebody changed the ball's course. time: s; mine: whether it was this player, None where nobody tracked was
-    near; part: "foot", "head", "chest", "hand", or "" where that cannot be told; kind: a word such as "kick" or
-    "receive"."""
+    """A player changed the ball's course.
+
+    Attributes:
+        time: s.
+        is_own: whether it was this player, None where no tracked player was near.
+        part: "foot", "head", "chest", "hand", or "" where that is not known.
+        kind: a label such as "kick" or "receive".
+    """
 
     time: float
     mine: bool | None
@@ -66,8 +83,14 @@ class Touched:
 
 @dataclass(frozen=True, eq=False)
 class SolvedCourse:
-    """The ball's course as it was solved from its samples: times (M,) s, ascending; ball (M, 3) m, its centre, NaN
-    where it is not known; filled (M,) bool, where the feed has not measured it. touches: in order, everybody's."""
+    """The ball's trajectory, solved from its samples.
+
+    Attributes:
+        times: (M,) s, ascending.
+        ball: (M, 3) m, its centre, world, NaN where it is not known.
+        filled: (M,) bool, where the feed has not measured it.
+        touches: the touches of all players, in order of time.
+    """
 
     times: np.ndarray
     ball: np.ndarray
@@ -80,8 +103,13 @@ class SolvedCourse:
         object.__setattr__(self, "filled", frozen_array(self.filled, bool))
 
     def at(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The ball (T, 3) m at `times` (T,) s, NaN where it is not known,
-        and whether the feed has filled it in (T,)."""
+        """Interpolate the trajectory.
+
+        Args:
+            times: (T,) s.
+        Returns:
+            The ball (T, 3) m, NaN where it is not known, and whether the feed has filled it in (T,).
+        """
         ball = interpolate(times, self.times, self.ball, outside=np.nan)
         near = np.clip(np.searchsorted(self.times, times), 0, len(self.times) - 1)
         return ball, self.filled[near]
@@ -90,21 +118,28 @@ class SolvedCourse:
 @dataclass(frozen=True)
 @add_fields(rows_of("synthesis"))
 class Plan:
-    """One player's order. The fields with a default of the settings table mean what is said there; settings of
-    "synthesis" that are not spelled out here are fields all the same.
+    """The request for one player.
 
-    track: the player's samples, cleaned (`motion.track.clean`), with the ball where the feed has it. timeline: the
-    asked annotations (`annotation.read_timeline`), not yet filled. library: folder of the library. pins: where hands,
-    feet and gaze have to be, in the order of time. gaits: (gait word, clip) pairs; other gaits are found among all
-    clips. strong_foot: one of FEET. style: words, or names or patterns of folders and clips ("academy", "lmd/*").
-    solved: the ball's course where it is known already, such as from a whole match.
+    Fields with a default in the settings table are described there; settings of "synthesis" that do not appear here are
+    fields all the same.
 
-    Source: Faustino, catch_up §3.3.2, alpha eq. 13 (for "path" `synthesis.search.path_costs`), delta §3.2.4, omega and
-    gaits §3.1.1, seam_window eq. 25 (twice its s; "path" fades over half of it). Others: made `library.made`,
-    track_window `motion.track.smoothed`, solve_touches `known_touches`, lag `match.crowd.variety.lags`; the root error
-    is always measured with a root_window of 1.5.
-
-    InputError for a number outside the limits of its setting, and for two pins of one part at one time.
+    Attributes:
+        track: the player's samples, cleaned (`motion.track.clean_track`), with the ball where the feed has it.
+        timeline: the requested annotations (`annotation.read_timeline`), not yet filled.
+        library: folder of the library.
+        pins: where hands, feet and gaze have to be, in order of time.
+        gaits: (gait label, clip) pairs; other gaits are found among all clips.
+        height: m, of the player; 0 for the library's.
+        strong_foot: one of FEET.
+        style: labels, or names or patterns of folders and clips ("academy", "lmd/*").
+        solved: the ball's trajectory where it is known already, such as from a whole match.
+    Raises:
+        InputError: for a number outside the limits of its setting, and for two pins of one part at one time.
+    Source: Faustino 2024: catch_up §3.3.2, alpha eq. 13 (for "path" `synthesis.search.path_costs`), delta §3.2.4, omega
+        and gaits §3.1.1, seam_window eq. 25 (twice its s; "path" blends over half of it). Others: made in
+        `library.synthetic_clips`, track_window in `motion.track.smooth_positions`, solve_touches in
+        `resolved_touches`, lag in `match.crowd.variety.choose_lags`; the root error is always measured with a
+        root_window of 1.5.
     """
 
     track: Track
@@ -139,37 +174,45 @@ class Plan:
         object.__setattr__(self, "style", tuple(dict.fromkeys(self.style)))
         check_limits(self, (*rows_of("synthesis"), *rows_of("player")))
         if 0.0 < self.omega < 1.0:
-            raise InputError("omega", f"{self.omega:g}", "1 or more, or 0 for the usual thresholds")
+            raise InputError("omega", f"{self.omega:g}", "1 or more, or 0 for the default thresholds")
         if self.height and not _HEIGHT.least <= self.height <= _HEIGHT.most:
-            limits = f"{_HEIGHT.least:g} to {_HEIGHT.most:g} m, or 0 for the library's"
+            limits = f"{_HEIGHT.least:g} to {_HEIGHT.most:g} m, or 0 for the height of the library's skeleton"
             raise InputError("height", f"{self.height:g} m", limits)
         if self.strong_foot not in FEET:
-            raise InputError("strong foot", repr(self.strong_foot), "left, right, or nothing for any")
+            raise InputError("strong foot", repr(self.strong_foot), "left, right, or empty for any")
         self._check_pins()
 
     if TYPE_CHECKING:
 
         def __getattr__(self, name: str) -> Any:
-            """The settings that are not spelled out."""
+            """Settings that do not appear above."""
 
     def sampled(self, fps: float) -> SampledTrack:
-        """The track at `fps` frames per second, as `sample_with_course` has it."""
+        """Sample the track, with the solved ball (`sample_with_trajectory`), at `fps` frames per second."""
         return sample_with_course(self.track, self.solved, fps, self.track_window)
 
     def _check_pins(self):
+        """Raise InputError for two pins of one part at one time."""
         for part in PARTS:
             mine = [pin for pin in self.pins if pin.part == part]
             for before, after in zip(mine, mine[1:]):
                 if after.time <= before.end:
                     found = f"two pins of {part} at {told_time(after.time)} s"
-                    raise InputError("pins", found, "one place at a time", "move one, or shorten the hold before it")
+                    raise InputError("pins", found, "one place at a time", "move one, or shorten the earlier hold")
 
 
 def sample_with_course(track: Track, course: SolvedCourse | None, fps: float, window: float) -> SampledTrack:
-    """Sample a track at `fps` frames per second.
+    """Sample a track with its solved ball.
 
-    Where its ball is solved, it has the solved height, and the solved place where the feed has not measured it: where
-    it has, the ball is met within the noise of the measurement. window: s that take the feed's jitter out."""
+    Where the ball is solved, its solved height is used everywhere, and its solved place where the feed has not measured
+    it; where the feed has, the ball is met within the noise of the measurement.
+
+    Args:
+        track: the track.
+        trajectory: the ball's trajectory, None without one.
+        fps: frames per second.
+        window: s, of the window that removes the feed's jitter.
+    """
     sampled = sample(track, fps, window)
     if course is None:
         return sampled
@@ -184,13 +227,15 @@ def sample_with_course(track: Track, course: SolvedCourse | None, fps: float, wi
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ResolvedPlan:
-    """A plan with its touches solved, in the size of the library's skeleton.
+    """A plan with its touches resolved, in the size of the library's skeleton.
 
-    asked: the plan as it was asked; its settings hold as they are, its pins are in the player's size.
-    timeline: the asked annotations, not yet filled, with key moments at the touches that they mean.
-    track: the player's samples, m in the library's size.
-    course: the solved course of the ball, m in the player's size; None where it is not solved.
-    size: how many times as tall as the library's skeleton the player is."""
+    Attributes:
+        requested: the plan as requested; its settings hold as they are, its pins are in the player's size.
+        timeline: the requested annotations, not yet filled, with key moments at the touches that they mean.
+        track: the player's samples, m in the library's size.
+        trajectory: the ball's trajectory, m in the player's size; None where it is not solved.
+        size: how many times as tall as the library's skeleton the player is.
+    """
 
     asked: Plan
     timeline: Timeline
@@ -200,7 +245,7 @@ class ResolvedPlan:
 
     @property
     def method(self) -> str:
-        """The method of the search, one of `plan.METHODS`."""
+        """Method of the search, one of `plan.METHODS`."""
         return self.asked.method
 
     @property
@@ -209,7 +254,7 @@ class ResolvedPlan:
         return self.asked.fps
 
     def sampled(self, fps: float) -> SampledTrack:
-        """The track at `fps` frames per second, with the solved ball, in the library's size."""
+        """Sample the track, with the solved ball, in the library's size, at `fps` frames per second."""
         course = self.course
         if course is not None and self.size != 1.0:
             course = replace(course, ball=course.ball / self.size)

@@ -1,4 +1,4 @@
-"""Provenance: which clip, at which frame, every frame of a take shows, and how that is written as a table."""
+"""Provenance: which clip, at which frame, every frame of a take shows, and its table as CSV."""
 
 from __future__ import annotations
 
@@ -23,9 +23,16 @@ PROVENANCE_COLUMNS = (
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Provenance:
-    """Where each of T output frames came from: times (T,) s; clip, T paths as below the library; clip_frame (T,)
-    fractional, in the clip's own rate; mirrored (T,) bool; words, T tuples; contacts (T, 2) bool, left and right foot
-    on the ground."""
+    """Where each of T output frames comes from.
+
+    Attributes:
+        times: (T,) s on the track's clock.
+        clip: T paths below the library.
+        clip_frame: (T,) fractional frame in the clip's own rate.
+        mirrored: (T,) bool.
+        words: T tuples of labels.
+        contacts: (T, 2) bool, left and right foot in contact.
+    """
 
     times: np.ndarray
     clip: tuple[str, ...]
@@ -43,7 +50,7 @@ class Provenance:
 
 
 def provenance_of(take: Take) -> Provenance:
-    """The provenance that a take carries."""
+    """Build the provenance of a take."""
     return Provenance(
         times=take.start_time + np.arange(len(take.motion)) / take.motion.fps,
         clip=tuple(take.clips[index] for index in take.clip),
@@ -55,7 +62,14 @@ def provenance_of(take: Take) -> Provenance:
 
 
 def write_provenance(path: str | os.PathLike, take: Take | Provenance) -> None:
-    """Writes `frame,time_s,clip,clip_frame,mirrored,labels,contact_left,contact_right`, one row per output frame."""
+    """Write provenance as CSV, one row per output frame.
+
+    Columns: `frame,time_s,clip,clip_frame,mirrored,labels,contact_left,contact_right`.
+
+    Args:
+        path: the file.
+        take: a take or its provenance.
+    """
     table = provenance_of(take) if isinstance(take, Take) else take
     columns = zip(
         (f"{time:.6f}" for time in table.times),
@@ -69,7 +83,11 @@ def write_provenance(path: str | os.PathLike, take: Take | Provenance) -> None:
 
 
 def read_provenance(path: str | os.PathLike) -> Provenance:
-    """The table that `write_provenance` wrote; InputError with the line of a row that is not of that form."""
+    """Read a table of `write_provenance`.
+
+    Raises:
+        InputError: naming the line of a row that does not have this form.
+    """
     rows = list(read_rows(path, PROVENANCE_COLUMNS))
     return Provenance(
         times=parse_column(rows, "time_s"),
@@ -82,7 +100,12 @@ def read_provenance(path: str | os.PathLike) -> Provenance:
 
 
 def provenance_fields(library: Library, shown: Shown) -> dict[str, Any]:
-    """The fields of a `Take` that say what its frames show: clips, clip, clip_frame, mirrored, words and seams."""
+    """Build the fields of a `Take` that say what its frames show: clips, clip, clip_frame, mirrored, words and seams.
+
+    Args:
+        library: the clips.
+        frames_shown: T source frames.
+    """
     sources = sources_shown(library, shown)
     names = tuple(dict.fromkeys(sources))
     number = {name: i for i, name in enumerate(names)}
@@ -97,12 +120,12 @@ def provenance_fields(library: Library, shown: Shown) -> dict[str, Any]:
 
 
 def sources_shown(library: Library, shown: Shown) -> tuple[str, ...]:
-    """The files, below the library, that hold every shown frame: recordings, or what was made behind their end."""
+    """List the file, below the library, of every shown frame: a recording, or the synthetic continuation of one."""
     frames = zip(shown.clip, np.round(shown.clip_frame, 6))
     return tuple(library.clips[clip].source_at(frame) for clip, frame in frames)
 
 
 def words_shown(library: Library, shown: Shown) -> tuple[tuple[str, ...], ...]:
-    """The words that every shown frame's clip carries there."""
+    """List the labels that every shown frame's clip carries there."""
     frames = zip(shown.clip, np.round(shown.clip_frame, 6))
     return tuple(spoken(library.clips[clip].words_at(frame)) for clip, frame in frames)

@@ -1,10 +1,10 @@
-"""From a plan as it is asked to one that can be searched: touches solved, the player in the library's size.
+"""Resolve a plan for a library: touches solved, the player in the library's size.
 
     plan = resolve_plan(Plan(track=track, timeline=timeline, height=1.7, solve_touches=True), library)
-    order = build_order(library, plan)
+    request = build_request(library, plan)
 
 A player of s times the height of the library's skeleton who runs 5 m/s moves as the library does at 5 / s m/s. So the
-track and the ball are divided by s here, and skeleton and root are multiplied by s in the end (`own_size`).
+track and the ball are divided by s here, and skeleton and root are multiplied by s in the end (`body_size`).
 """
 
 from __future__ import annotations
@@ -24,10 +24,11 @@ def resolve_plan(
     """Solve the touches and the body size of a plan for a library.
 
     Args:
-        plan: what is asked.
-        library: the clips it is made from.
-        course: the ball's course, where an earlier take of the same track has it.
-        touches_solved: whether the plan's key moments are at its touches already (`known_touches.solve_touches`).
+        plan: the plan.
+        library: the clips.
+        trajectory: the ball's trajectory, where an earlier take of the same track has it.
+        are_touches_resolved: whether the plan's key moments are at its touches already
+            (`resolved_touches.resolve_touches`).
     """
     known = plan if touches_solved else solve_touches(plan, course)
     size = plan.height / stature(library.skeleton) if plan.height else 1.0
@@ -37,6 +38,7 @@ def resolve_plan(
 
 
 def _scaled(track: Track, size: float) -> Track:
+    """Scale a track and its ball to the library's size."""
     if size == 1.0:
         return track
     ball = None if track.ball is None else track.ball / size

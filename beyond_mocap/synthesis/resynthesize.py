@@ -1,13 +1,13 @@
-"""The recipe for edits: a take after a change of its plan, made anew only where the change touches it.
+"""Resynthesize: a take after a change of its plan, regenerated only where the change affects it.
 
     take = synthesize(library, plan)
     plan = replace(plan, timeline=with_the_kick_a_little_later)
     take = resynthesize(library, plan, take)
 
-What counts as touched is said in `synthesis.search.touched`. Touched stretches are searched between frames that stay
-(`synthesis.search.path_search`, `Between`), laid on the ground with the facing given at both ends, planted, and handed
-over to the old motion on both sides (`synthesis.construct.hand_over`). All other frames come back bit for bit; only
-where the body turns a full turn more or less than before, the quaternions behind may have the other sign, since a
+`synthesis.search.affected_frames` says what counts as affected. Affected stretches are searched between frames that
+stay (`synthesis.search.path_search`, `SearchStretch`), constructed with the heading given at both ends, planted, and
+blended into the old motion on both sides (`synthesis.construct.edit_blending`). All other frames come back bit for bit;
+only where the body turns a full turn more or less than before, the quaternions behind may have the other sign, since a
 motion's signs are continuous.
 """
 
@@ -45,16 +45,21 @@ from .synthesize import Progress, finished, synthesize
 from .take import KeyResult, Take
 
 HAND_OVER = 0.5
-"""Seconds before and behind a touched stretch in which its motion goes over into the old one."""
+"""Seconds before and after an affected stretch in which its motion is blended into the old one."""
 
 CONTEXT = 1.2
-"""Seconds further out that are laid out too, so that the ends of windows and solves lie outside what is used."""
+"""Seconds further out that are constructed too, so that the ends of windows and solves lie outside what is used."""
 
 
 @dataclass(frozen=True)
 class Anew:
-    """A stretch, seconds on the track's clock, of which another solution is wanted, and footage to do without where
-    that can be (`shown_footage` of what is shown there now)."""
+    """A stretch of which another solution is requested.
+
+    Attributes:
+        start: s on the track's clock.
+        end: s on the track's clock.
+        used: source frames to avoid where that is possible (`list_shown_stretches` of what is shown there now).
+    """
 
     start: float
     end: float
@@ -70,13 +75,22 @@ def resynthesize(
     hurry: Callable[[], bool] | None = None,
     anew: Anew | None = None,
 ) -> Take:
-    """The take `before` after its plan has become `plan`: searched and built anew only where the change touches it.
+    """Update a take after its plan has changed: search and construct only what the change affects.
 
-    Pins are laid on anew. A whole synthesis where the change is not one of words, track, ball or pins (another method,
-    rate, length or choice), where `before` was made from another library or by another method than "path", or where all
-    of it is touched. The same library, plan and take give the same bits. anew: a stretch of which another solution is
-    wanted, whether or not its plan has changed; InputError where it lies outside the take, or for another method than
-    "path". progress, cancelled, hurry and what is raised: as for `synthesize`."""
+    Pins are applied again. It is a whole synthesis where the change is not one of labels, track, ball or pins (another
+    method, frame rate, length or choice), where `before` was built from another library or by another method than
+    "path", or where all of it is affected. The same library, plan and take give the same bits.
+
+    Args:
+        library: the recordings.
+        plan: the changed plan.
+        before: the take before the change.
+        progress, cancelled, hurry: as for `synthesize`.
+        variant: a stretch of which another solution is requested, whether or not its plan has changed.
+    Raises:
+        InputError: where that stretch lies outside the take, or for another method than "path".
+        NotInLibraryError, UserCancelledError: as for `synthesize`.
+    """
     from threadpoolctl import threadpool_limits
 
     report = progress or (lambda fraction, text: None)
@@ -91,8 +105,10 @@ def resynthesize(
 
 
 def shown_footage(library: Library, take: Take, start: float, end: float) -> tuple[Used, ...]:
-    """The footage that a take of method "path" shows from second `start` to second `end`, for `Anew`; nothing where the
-    take was made from another library."""
+    """List the source frames that a take of method "path" shows between two seconds, for a `VariantStretch`.
+
+    Nothing where the take was built from another library.
+    """
     library = search_library(library, resolve_plan(take.plan, library, course=take.solved))
     if take.edit is None or not _made_from(library, take, len(take.edit)):
         return ()
@@ -101,16 +117,18 @@ def shown_footage(library: Library, take: Take, start: float, end: float) -> tup
 
 
 def _check(plan: Plan, before: Take, anew: Anew) -> None:
+    """Raise InputError for a stretch that cannot be searched again."""
     low, high = before.start_time, before.start_time + before.motion.duration
     if plan.method != "path":
-        raise InputError("a stretch made anew", f"method {plan.method}", "method path", "synthesize the whole take")
+        raise InputError("resynthesize stretch", f"method {plan.method}", "method path", "synthesize the whole take")
     if not low <= anew.start < anew.end <= high + 0.5 / before.motion.fps:
         found = f"{told_time(anew.start)} to {told_time(anew.end)} s"
         expected = f"a stretch within {told_time(low)} to {told_time(high)} s"
-        raise InputError("a stretch made anew", found, expected)
+        raise InputError("resynthesize stretch", found, expected)
 
 
 def _comparable(plan: Plan, before: Take) -> bool:
+    """Return whether the plans differ only in track, timeline, library folder and pins, over the same time."""
     old = before.plan
     if old is None or plan.method != "path":
         return False
@@ -121,7 +139,7 @@ def _comparable(plan: Plan, before: Take) -> bool:
 def _edited(
     library: Library, asked: Plan, before: Take, report: Progress, *, cancelled, hurry, anew: Anew | None
 ) -> Take | None:
-    """The take, or None where it has to be made as a whole; what is made anew is made in the library's size."""
+    """Update the take in the library's size, and finish it; None where it has to be synthesized as a whole."""
     then = resolve_plan(before.plan, library, course=before.solved)
     same_ball = _same_ball(asked, before.plan)
     plan = resolve_plan(asked, library, course=before.solved if same_ball else None)
@@ -134,7 +152,7 @@ def _edited(
 
 
 def _same_ball(plan: Plan, old: Plan) -> bool:
-    """Whether the ball's course is solved from the same samples."""
+    """Return whether the ball's trajectory is solved from the same samples."""
     names = ("times", "positions", "ball", "ball_height_known")
     pairs = [(getattr(plan.track, name), getattr(old.track, name)) for name in names]
     return all(np.array_equal(new, before, equal_nan=True) for new, before in pairs)
@@ -144,8 +162,12 @@ def _updated(
     library: Library, plan: ResolvedPlan, then: ResolvedPlan, before: Take, report: Progress, *, cancelled, hurry,
     anew: Anew | None,
 ):
-    """The take without pins, made by `plan` where `before` was made by `then`; its order and the frame
-    from which on it was searched in a hurry; None where it has to be made as a whole."""
+    """Search and construct the affected stretches.
+
+    Returns:
+        The take without pins, its request, and the frame from which on it was searched in a hurry; None where it has to
+        be synthesized as a whole.
+    """
     clock = [time.perf_counter()]
     library = _library_of_both(library, (plan, then), report)
     old, new = build_order(library, then), build_order(library, plan)
@@ -184,7 +206,7 @@ def _updated(
 
 
 def _library_of_both(library: Library, plans: Iterable[ResolvedPlan], report: Progress) -> Library:
-    """The library with made clips where the first plan or else the second needs them."""
+    """Return the library, with synthetic clips where the first plan or else the second needs them."""
     for which in plans:
         suited = search_library(library, which, report)
         if len(suited.clips) > len(library.clips):
@@ -193,7 +215,7 @@ def _library_of_both(library: Library, plans: Iterable[ResolvedPlan], report: Pr
 
 
 def _made_from(library: Library, before: Take, count: int) -> bool:
-    """Whether the take's edit list, read in this library, shows what the take shows."""
+    """Return whether the take's edit list, read in this library, shows what the take shows."""
     edit, fps = before.edit, before.plan.fps
     if edit is None or len(edit) != count or edit.clip.max() >= len(library.clips):
         return False
@@ -203,17 +225,27 @@ def _made_from(library: Library, before: Take, count: int) -> bool:
 
 
 def _outside(keys, order: Wanted, again: list[Stretch]):
-    """The placed keys that no stretch searches anew."""
+    """Select the placed keys that no stretch searches again."""
     frames = {key.wanted: order.keys[key.wanted].frame for key in keys}
     return tuple(key for key in keys if not any(first <= round(frames[key.wanted]) < end for first, end in again))
 
 
 class _Update:
-    """A take in the making: the old one's arrays, with one stretch after the other made anew."""
+    """An update in progress: the old take's arrays, with one stretch after the other replaced."""
 
     def __init__(
         self, library: Library, plan: ResolvedPlan, before: Take, *, track: SampledTrack, edit: EditList, order: Wanted
     ):
+        """Copy what the old take has, and prepare what the new one shows.
+
+        Args:
+            library: the clips.
+            plan: the resolved plan.
+            before: the old take, in the library's size.
+            track: the track at the output's rate.
+            edit: the new edit list.
+            request: the new request.
+        """
         self.library, self.plan, self.before = library, plan, before
         self.track, self.edit, self.order = track, edit, order
         self.index = output_index(len(track), library, plan.fps, len(edit))
@@ -229,15 +261,18 @@ class _Update:
         self.touches = find_touches(library, plan.fps, edit, self.keys)
 
     def stretches(self, again: list[Stretch], moved: np.ndarray) -> list[Stretch]:
-        """Output frames (first, end) that are laid out anew: what was searched, where the track moved (T,), and the
-        frames over which seams are spread otherwise than before."""
+        """List the output frames (first, end) that are constructed again.
+
+        These are what was searched, where the track moved (T,), and the frames over which transitions are spread
+        otherwise than before.
+        """
         touched = moved.copy()
         old, new = (self._spread(seams) for seams in (self.before.seams, self.shown.seams))
         spread = old ^ new
         for first, end in again:
             inside = (self.index > first - 1) & (self.index < end)
             touched |= inside
-            # a seam at either end stays where it was, but what it joins is another
+            # a transition at either end stays where it was, but the clips that it joins differ
             low, high = np.flatnonzero(inside)[[0, -1]]
             spread |= {(seam, reach) for seam, reach in old | new if low <= seam <= high + 1}
         for seam, reach in spread:
@@ -245,17 +280,19 @@ class _Update:
         return stretches(touched, int(round((2 * HAND_OVER + 0.3) * self.plan.fps)))
 
     def _spread(self, seams: np.ndarray) -> set[tuple[int, float]]:
+        """Return (transition, reach) of each transition as it is spread."""
         longest = 0.5 * self.plan.asked.seam_window * self.plan.fps
         return set(zip(seams.tolist(), spread_reaches(seams, len(self.index), longest).tolist()))
 
     def make(self, stretch: Stretch) -> None:
-        """Makes output frames first .. end anew and hands over to the old ones around them."""
+        """Construct the output frames of a stretch again, and blend them into the old ones around them."""
         hand, context = (int(round(seconds * self.plan.fps)) for seconds in (HAND_OVER, HAND_OVER + CONTEXT))
         low, high = max(0, stretch[0] - context), min(len(self.index), stretch[1] + context)
         inner = stretch[0] - low, stretch[1] - low
         construction = self._construction(low, high, inner, old_share(high - low, inner, hand))
         planted, taken = construction.lay_out()
         planted, ball = construction.meet_ball(planted, taken)
+        # frames within the constructed window that are used, and the same frames in the take
         made = slice(max(0, stretch[0] - hand - low), min(high, stretch[1] + hand) - low)
         at, share = slice(made.start + low, made.stop + low), construction.old.share[made]
         new, old = (planted.root[made], planted.rotations[made]), (self.root[at], self.rotations[at])
@@ -269,8 +306,11 @@ class _Update:
         self.anew[at] = True
 
     def _construction(self, low: int, high: int, stretch: Stretch, share: np.ndarray) -> Construction:
-        """Frames low .. high, of which those within `stretch` (counted from low) are free and the others are given by
-        the old motion; share (W,) of it in what comes out."""
+        """Build the construction of frames low .. high.
+
+        Those within `stretch` (counted from low) are free, the others are given by the old motion; share (W,) of it in
+        the result.
+        """
         window = slice(low, high)
         old = OldMotion(
             root=self.root[window], rotation=self.rotations[window, 0], stepped=self.stepped[window], share=share,
@@ -284,7 +324,7 @@ class _Update:
         )
 
     def take(self) -> Take:
-        """The take as it now is."""
+        """Build the take as it is now."""
         made = self.anew
         mirrored = np.array([clip.mirrored for clip in self.library.clips])
         what = self.shown
@@ -314,13 +354,13 @@ class _Update:
         )
 
     def _ball_path(self) -> BallPath | None:
+        """Return the ball's path, None where it is nowhere known."""
         if not np.isfinite(self.ball[:, :2]).any():
             return None
         return BallPath(self.track.times, self.ball, self.track.ball_measured)
 
     def _keys_as_before(self) -> tuple[KeyResult, ...]:
-        """The results; of a key moment whose frame has not been touched the old one, under the line in which it is
-        asked now."""
+        """Return the results; where a key moment's frame was not affected, the old one for the new request."""
         out, left = [], list(self.before.keys)
         for key in self.keys:
             near = int(np.clip(round(key.frame), 0, len(self.anew) - 1))
@@ -332,5 +372,5 @@ class _Update:
 
 
 def _ball_between(new: np.ndarray, old: np.ndarray, share: np.ndarray) -> np.ndarray:
-    """(W, 3) m from the new path of the ball to the old one."""
+    """Blend the new path of the ball (W, 3) m into the old one."""
     return np.where(np.isfinite(old) & (share > 0.0)[:, None], new + share[:, None] * (old - new), new)

@@ -1,4 +1,4 @@
-"""The clips that a plan is searched in: the recordings, with synthetic ones where those lack what is asked."""
+"""The clips that a plan is searched in: the recordings, with synthetic ones where those lack what is requested."""
 
 from __future__ import annotations
 
@@ -22,20 +22,20 @@ def search_library(
 
     Args:
         library: the recordings.
-        plan: what is asked.
-        report: called as report(fraction, text) before synthetic clips are made.
+        plan: the resolved plan.
+        report: called as report(fraction, text) before synthetic clips are built.
         edit: what an earlier search chose; where it shows synthetic clips the library has them too.
     """
     shows_synthetic = edit is not None and int(edit.clip.max()) >= len(library.clips)
     if shows_synthetic or plan.method == "path" and plan.asked.made and _lacks(library, plan):
         if report is not None:
-            report(0.0, "Making what the recordings lack")
+            report(0.0, "Building synthetic clips")
         library = library.extended
     return with_chosen_gaits(library, dict(plan.asked.gaits))
 
 
 def _lacks(library: Library, plan: ResolvedPlan) -> bool:
-    """Whether the recordings lack speeds that the track asks for, or touches as fast as its key moments."""
+    """Return whether the recordings lack speeds of the track, or touches as fast as its key moments."""
     track = sample(plan.track, library.fps, plan.asked.track_window)
     moments = np.array([key.in_force for key in plan.timeline.keys])
     takes = np.array([takes_with_foot(key.words) for key in plan.timeline.keys], bool)

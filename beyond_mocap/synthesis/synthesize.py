@@ -1,13 +1,12 @@
-"""The recipe: from a library and a plan to a take.
+"""Synthesize: from a library and a plan to a take.
 
     library = build("clips")
     track, report = clean(read_track_csv("player.csv"))
     take = synthesize(library, Plan(track=track, timeline=read_timeline("player.txt", 30.0)))
 
-The plan is put into frames (`synthesis.search.wanted`), a search picks what is shown (`synthesis.search.path_search`,
-or
-`synthesis.search.blocks` with `synthesis.search.locomotion`), the frames are fetched (`synthesis.search.footage`) and
-laid on the track (`synthesis.construct`).
+The plan is put into frames (`synthesis.search.request`), a search chooses what is shown
+(`synthesis.search.path_search`, or `synthesis.search.blocks` with `synthesis.search.locomotion`), the frames are
+fetched (`synthesis.search.source_frames`) and placed on the track (`synthesis.construct`).
 """
 
 from __future__ import annotations
@@ -51,12 +50,12 @@ from .search_library import search_library
 from .take import PinResult, Take
 
 NEAR_KEY = 1.5
-"""Seconds around a key moment in which its own words may be shown, whoever avoids them."""
+"""Seconds around a key moment in which its own labels may be shown although they are avoided."""
 
 PIN_MISSED, GAZE_MISSED = 0.01, np.radians(5.0)
-"""Metres, and radians of a gaze, by which a pin may be missed without being told."""
+"""Metres, and radians of a gaze, by which a pin may be missed without a warning."""
 
-LOOKED_AT = 200
+LOOKED_AT = 200  # poses from which the look axis is estimated
 _looks: weakref.WeakKeyDictionary[Library, np.ndarray] = weakref.WeakKeyDictionary()
 
 Progress = Callable[[float, str], None]
@@ -64,15 +63,20 @@ Progress = Callable[[float, str], None]
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """What a search ends in: the edit list at the library's rate, (T,) metres travelled where the method decides it,
-    and the frame from which on it was searched in a hurry, if it was."""
+    """The result of a search.
+
+    Attributes:
+        edit: the edit list, at the library's rate.
+        travelled: (T,) m travelled where the method decides it, else None.
+        hurried_from: frame from which on it was searched in a hurry, None if it was not.
+    """
 
     edit: EditList
     travelled: np.ndarray | None = None
     hurried: int | None = None
 
     def travelled_at(self, index: np.ndarray) -> np.ndarray | None:
-        """(N,) metres travelled at fractional frames `index` (N,) of the edit list."""
+        """Interpolate the distance (N,) m travelled at fractional frames `index` (N,) of the edit list."""
         return None if self.travelled is None else np.interp(index, np.arange(len(self.travelled)), self.travelled)
 
 
@@ -85,17 +89,28 @@ def synthesize(
     used: tuple[Used, ...] = (),
     narrow: bool = False,
 ) -> Take:
-    """A player's motion for `plan` out of `library`.
+    """Synthesize a player's motion.
 
-    progress(fraction, text) is called now and then. Raises NotInLibrary for a key moment that no clip can serve (unless
-    plan.nearest), InputError for an unknown method, Cancelled when `cancelled()` says so. When `hurry()` says so,
-    method "path" keeps what it has found, searches the rest quickly, and the take's warnings tell from which second on;
-    before anything is found, and by the other methods, that is Cancelled too. used: footage that another solution is to
-    do without where it can (method "path"; the others differ by their seed). narrow: whether method "path" searches
-    quickly from the start. The same library, plan and numpy give the same bits: linear algebra is held to one thread,
-    since more add up in another order."""
+    The same library, plan and numpy give the same bits: linear algebra is held to one thread, since more threads add up
+    in another order.
+
+    Args:
+        library: the recordings.
+        plan: the request.
+        progress: called as progress(fraction, text).
+        cancelled: returns whether to stop.
+        hurry: returns whether to finish early: method "path" then keeps what it has found, searches the rest
+            quickly, and the take's warnings say from which second on; before anything is found, and by the other
+            methods, this cancels.
+        used: source frames that another solution avoids where it can (method "path"; the others differ by their seed).
+        narrow: whether method "path" searches quickly from the start.
+    Raises:
+        NotInLibraryError: for a key moment that no clip can serve (unless plan.nearest).
+        InputError: for an unknown method.
+        UserCancelledError: when `cancelled` returns true.
+    """
     if plan.method not in METHODS:
-        raise InputError("--method", plan.method, f"one of {', '.join(METHODS)}")
+        raise InputError("method", plan.method, f"one of {', '.join(METHODS)}")
     from threadpoolctl import threadpool_limits
 
     with threadpool_limits(limits=1):
@@ -104,6 +119,7 @@ def synthesize(
 
 
 def _synthesize(library: Library, asked: Plan, report: Progress, **asking) -> Take:
+    """Resolve, search and construct, with the seconds of each stage."""
     begun = time.perf_counter()
     plan = resolve_plan(asked, library)
     solving = {} if plan.course is None else {"solve": time.perf_counter() - begun}
@@ -118,11 +134,17 @@ def _synthesize(library: Library, asked: Plan, report: Progress, **asking) -> Ta
 
 
 def constructed(library: Library, plan: ResolvedPlan, edit: EditList, progress: Progress | None = None) -> Take:
-    """The take of method "path" that shows `edit`: all that `synthesize` does behind its search.
+    """Construct the take of method "path" that shows an edit list: all that `synthesize` does after its search.
 
-    edit: at the library's rate, from the track's first time on; its clips are those of `library`, which has made ones
-    (`Library.extended`) where it shows them. What gave way is not told in its warnings: it may be a part of a longer
-    take, of which `evaluation.report.evaluate` tells it. The same arguments and numpy give the same bits."""
+    Unmet constraints are not in its warnings: it may be a part of a longer take, for which `evaluation.report.evaluate`
+    reports them. The same arguments and numpy give the same bits.
+
+    Args:
+        library: the clips, with synthetic ones (`Library.with_synthetic_clips`) where the edit list shows them.
+        plan: the resolved plan.
+        edit: at the library's rate, from the track's first time on.
+        progress: called as progress(fraction, text).
+    """
     from threadpoolctl import threadpool_limits
 
     with threadpool_limits(limits=1):
@@ -134,7 +156,7 @@ def constructed(library: Library, plan: ResolvedPlan, edit: EditList, progress: 
 def _laid_out(
     library: Library, plan: ResolvedPlan, order: Wanted, found: Found, report: Progress
 ) -> tuple[Take, dict[str, float]]:
-    """What was found, fetched and laid on the ground, in the library's size; and what that took, in seconds."""
+    """Fetch what was found and construct the motion, in the library's size; also return the seconds of each stage."""
     clock = [time.perf_counter()]
     report(0.8, "Constructing")
     track = order.track if plan.fps == library.fps else plan.sampled(plan.fps)
@@ -161,6 +183,7 @@ def _laid_out(
 def _search(
     library: Library, plan: ResolvedPlan, order: Wanted, report: Progress, *, cancelled, hurry, used, narrow
 ) -> Found:
+    """Run the search of the plan's method."""
     if plan.method == "path":
         more = {"hurry": hurry, "used": used, "narrow": narrow}
         search = PathSearch(library, order, balanced(plan.asked.alpha), report, cancelled, **more)
@@ -174,7 +197,7 @@ def _search(
 
 
 def _body(construction: Construction, travelled: np.ndarray | None) -> tuple[Planted, Steps, BallPath | None]:
-    """The body, its steps and the ball; travelled: (T,) m by method "distance"."""
+    """Construct the body, its steps and the ball; travelled: (T,) m by method "distance"."""
     track, ball = construction.track, construction.track.ball
     if construction.plan.method == "path":
         planted, taken = construction.lay_out()
@@ -189,8 +212,17 @@ def finished(
     take: Take, plan: ResolvedPlan, recordings: Library, order: Wanted, *, hurried: int | None = None,
     before: Take | None = None, judged: bool = True,
 ) -> Take:
-    """A take out of the library's size in the player's, with its pins, its ball and its warnings. before: the finished
-    take that it is an edit of; hurried, judged: as `with_warnings` has them."""
+    """Finish a take: scale it to the player's size, apply pins and the ball's trajectory, and add its warnings.
+
+    Args:
+        take: in the library's size.
+        plan: the resolved plan.
+        recordings: the library without synthetic clips.
+        request: the request.
+        hurried_from: frame at the library's rate from which on the search was cut short, None if it was not.
+        before: the finished take that it is an edit of.
+        report_unmet: whether unmet constraints are reported.
+    """
     take = with_pins(in_own_size(take, plan.size, plan.asked, before), recordings)
     begun = time.perf_counter()
     take = with_course(take, plan)
@@ -200,7 +232,7 @@ def finished(
 
 
 def with_pins(take: Take, recordings: Library) -> Take:
-    """The take with hands, feet and gaze at the pins of its plan."""
+    """Bring the hands, feet and gaze of a take to the pins of its plan."""
     pins = take.plan.pins
     if not pins:
         return take
@@ -212,7 +244,7 @@ def with_pins(take: Take, recordings: Library) -> Take:
 
 
 def look_of(library: Library) -> np.ndarray:
-    """(3,) which way heads look in their own frame, on the average of the library's locomotion."""
+    """Estimate the direction (3,) in which heads look, in their own frame, over the library's locomotion; cached."""
     if library not in _looks:
         frames = library.frames
         gaits = [i for i, word in enumerate(frames.vocabulary) if word in LOCOMOTION_WORDS]
@@ -228,27 +260,34 @@ def with_warnings(
     take: Take, recordings: Library, order: Wanted, hurried: int | None, *, more: Sequence[str] = (),
     judged: bool = True,
 ) -> Take:
-    """The take with what has to be told about it. recordings: the library without made clips; hurried: frame at the
-    library's rate from which on the search was cut short, or None; more: lines that are told too; judged: whether what
-    gave way is told."""
+    """Add its warnings to a take.
+
+    Args:
+        take: the take.
+        recordings: the library without synthetic clips.
+        request: the request.
+        hurried_from: frame at the library's rate from which on the search was cut short, or None.
+        more: further lines.
+        report_unmet: whether unmet constraints are reported.
+    """
     told = [*recordings.notes, *order.warnings, *more, *_crowded_out(order, take.edit)]
-    if take.plan.method == "path":  # the others never choose what of a clip is left out
+    if take.plan.method == "path":  # the other methods leave out no part of a clip
         told += left_out(recordings, order, take.edit)
     if hurried is not None:
         since = take.start_time + hurried / recordings.fps
-        told.append(TimedLine(f"{since:.1f} s: from here on the search was cut short", (since, since)))
+        told.append(TimedLine(f"{since:.1f} s: the search was cut short from here on", (since, since)))
     told += [*_shown_all_the_same(take), *_pins_missed(take)]
     gave_way = _gave_way(recordings, take.plan, take) if judged else ()
     return replace(take, cut_short=hurried is not None, warnings=(*told, *gave_way))
 
 
 def _crowded_out(order: Wanted, edit: EditList) -> list[str]:
-    """One warning per key moment that clips could serve, but not so close to another one."""
+    """Report each key moment that clips could serve, but not so close to another one."""
     placed = {key.wanted for key in edit.keys}
     return [
         TimedLine(
-            f"{told_time(key.asked.time)} s: no room for '{' '.join(key.asked.words)}' so close to another key moment, "
-            "it is not played", (key.asked.time, key.asked.time),
+            f"{told_time(key.asked.time)} s: '{' '.join(key.asked.words)}' is too close to another key moment and is "
+            "not played", (key.asked.time, key.asked.time),
         )  # fmt: skip
         for number, key in enumerate(order.keys)
         if key.choices and number not in placed
@@ -256,8 +295,7 @@ def _crowded_out(order: Wanted, edit: EditList) -> list[str]:
 
 
 def _shown_all_the_same(take: Take) -> list[TimedLine]:
-    """One warning per stretch and word that must not be, where no way without it was found; what key moments close by
-    ask for is not told."""
+    """Report each stretch with an avoided label; labels that key moments close by request do not count."""
     times = take.start_time + np.arange(len(take.words)) / take.motion.fps
     avoided = avoided_per_frame(take.plan.timeline, times)
     asked = [(key.asked.in_force, frozenset(key.asked.words)) for key in take.keys]
@@ -268,20 +306,21 @@ def _shown_all_the_same(take: Take) -> list[TimedLine]:
             shows &= (word not in words) | (np.abs(times - moment) > NEAR_KEY)
         told += [
             TimedLine(
-                f"{times[first]:.1f} s: '{word}' is shown for {(end - first) / take.motion.fps:.1f} s though it "
-                "must not be; no way without it was found", (times[first], times[end - 1]),
+                f"{times[first]:.1f} s: the avoided label '{word}' is shown for "
+                f"{(end - first) / take.motion.fps:.1f} s: the search found nothing without it",
+                (times[first], times[end - 1]),
             ) for first, end in runs(shows)
         ]  # fmt: skip
     return told
 
 
 def _pins_missed(take: Take) -> list[str]:
-    """One warning per pin that is missed by more than can be seen."""
+    """Report each pin that is missed visibly."""
     told = []
     for result in take.pins:
         pin, when = f"{told_time(result.pin.time)} s: the pin of {result.pin.part}", (result.pin.time, result.pin.end)
         if not np.isfinite(result.miss):
-            told.append(f"{pin} lies outside the track, or the skeleton has no such part; it counts for nothing")
+            told.append(f"{pin} is outside the track, or the skeleton has no such part; it is ignored")
         elif result.pin.part == "gaze" and result.miss > GAZE_MISSED:
             beyond = np.degrees(result.miss)
             told.append(TimedLine(f"{pin} is {beyond:.0f} degrees beyond what the neck can turn", when))
@@ -291,7 +330,7 @@ def _pins_missed(take: Take) -> list[str]:
 
 
 def _gave_way(library: Library, plan: Plan, take: Take) -> list[TimedLine]:
-    """What could not all hold, and when."""
+    """Report what could not be met, and when."""
     played = played_from_take(take)
     return give_way(
         played, track=plan.track, timeline=take.timeline, library=library, ik_miss=take.ik_miss, asked=plan.timeline

@@ -1,4 +1,4 @@
-"""What came out: the motion on the pitch, where each of its frames came from, the ball, and the filled timeline."""
+"""The result of a synthesis: motion, source of every frame, ball, filled timeline and what was reported."""
 
 from __future__ import annotations
 
@@ -18,9 +18,15 @@ from .search.edit_list import EditList
 class KeyResult:
     """How one key moment was served.
 
-    asked: the line of the timeline. frame: output frame (fractional) where the clip's key frame is played. clip
-    (path below the library), clip_frame (in the clip's own rate), mirrored. words: what the clip carries there, sides
-    after mirroring. used_instead: the words used where the asked ones were not to be had, else None."""
+    Attributes:
+        requested: the key moment of the timeline.
+        frame: output frame, fractional, where the clip's key frame is played.
+        clip: path below the library.
+        clip_frame: key frame in the clip's own rate.
+        mirrored: whether the clip is mirrored.
+        words: labels that the clip carries there, sides after mirroring.
+        used_instead: the labels used where the library lacks the requested ones, else None.
+    """
 
     asked: KeyMoment
     frame: float
@@ -32,14 +38,18 @@ class KeyResult:
 
     @property
     def touching(self) -> tuple[str, ...]:
-        """The words that say which part meets the ball (`ball_contact.meeting_words`)."""
+        """Labels that say which part meets the ball (`ball_contact.choose_contact_labels`)."""
         return meeting_words(self.words, self.asked.words)
 
 
 @dataclass(frozen=True)
 class PinResult:
-    """How one pin was met: miss, m by which a hand or foot falls short of it,
-    or radians that the gaze looks past it."""
+    """How one pin was met.
+
+    Attributes:
+        pin: the pin.
+        miss: m by which a hand or foot falls short of it, or rad that the gaze looks past it.
+    """
 
     pin: Pin
     miss: float
@@ -47,7 +57,13 @@ class PinResult:
 
 @dataclass(frozen=True)
 class DribbleTouch:
-    """One touch of a dribble: output frames first .. last in which the ball is at the foot of that side."""
+    """One touch of a dribble.
+
+    Attributes:
+        first: first output frame in which the ball is at the foot.
+        last: last one.
+        side: "left" or "right".
+    """
 
     first: int
     last: int
@@ -58,17 +74,35 @@ class DribbleTouch:
 class Take:
     """A synthesized player.
 
-    motion: T frames at the output's rate on the pitch (metres, Z up); frame 0 is at `start_time` seconds on the track's
-    clock. clips: table of clip paths below the library; clip (T,) index into it, clip_frame (T,) fractional frame in
-    that clip's own rate, mirrored (T,) bool. words: per frame the source frame's words, sides after mirroring. contacts
-    (T, 2) bool, left and right, carried from the source. seams: output frames that start a new piece of clip.
-    correction: (T, 2) metres by which polish moved each foot (left, right) from where the clip laid out had it.
-    ik_miss: (T, 2) metres that each leg was short of where its foot should stand. stepped: (T, 2) bool, left and right,
-    extra steps of feet that stand in the source (no contacts). plan, edit: what was asked and what the search chose
-    at the library's rate, for `resynthesize`. cut_short: whether part of it was searched in a hurry. pins: how they
-    were met; unpinned: motion and contacts without them, None where there are none. solved: the ball's course where it
-    was solved; met_ball: the ball as it was met, before it was led along that course, None where it was not; dribbled:
-    the touches of dribbles."""
+    Attributes:
+        motion: T frames at the output's rate on the pitch (metres, Z up).
+        start_time: s on the track's clock of frame 0.
+        clips: table of clip paths below the library.
+        clip: (T,) index into it.
+        clip_frame: (T,) fractional frame in that clip's own rate.
+        mirrored: (T,) bool.
+        words: T tuples, the source frame's labels, sides after mirroring.
+        contacts: (T, 2) bool, left and right foot, carried from the source.
+        seams: (S,) output frames that begin a new piece of clip.
+        timeline: the filled timeline.
+        keys: the results of the key moments.
+        ball: the ball's path, None without a ball.
+        method: of the search.
+        seed: of the search.
+        seconds: stage -> s that it took.
+        warnings: what did not turn out as requested.
+        correction: (T, 2) m by which polishing moved each foot (left, right) from where the placed clip had it.
+        ik_miss: (T, 2) m that each leg was short of where its foot should be.
+        stepped: (T, 2) bool, extra steps of feet that are in contact in the source (no contacts).
+        plan: the request.
+        edit: what the search chose, at the library's rate, for `resynthesize`.
+        pins: how the pins were met.
+        is_cut_short: whether part of it was searched in a hurry.
+        unpinned: motion and contacts without pins, None where there are none.
+        solved: the ball's trajectory where it was solved.
+        contact_ball: the ball as it was met, before it was led along that trajectory, None where it was not.
+        dribble_touches: the touches of dribbles.
+    """
 
     motion: Motion
     start_time: float

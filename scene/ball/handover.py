@@ -1,9 +1,8 @@
-"""Blender's rigid bodies take an animated ball over on a frame, as fast and with the spin that it has there, and give
-it back.
+"""Let Blender's rigid bodies move an animated ball from a frame on, with its velocity and spin there, and revert that.
 
-Blender takes a body's first velocity from its last keyed step, which is its mean over that frame: while the ball flies,
-half a frame of gravity too little. So the key before the handover is moved by that much (some millimetres), and put
-back afterwards.
+Blender takes a body's first velocity from its last keyed step, the mean over that frame: for a flying ball, half a
+frame of gravity is missing. So the key before the handover is moved by that amount (some millimetres), and restored
+afterwards.
 """
 
 from __future__ import annotations
@@ -19,20 +18,29 @@ from ..core import channels
 from ..core.measure import frames_per_second, units_per_metre
 
 GROUND = "Ball Ground"
-SIZE, THICK = 300.0, 2.0  # metres of the slab that the ball lies on
-OURS = "beyond_mocap_physics"  # custom property of what a handover has made
-ROLLS_OUT = 0.4  # angular damping, for Blender's balls would roll for ever
+SIZE, THICK = 300.0, 2.0  # m, side and thickness of the slab under the ball
+OURS = "beyond_mocap_physics"  # custom property of objects created by a handover
+ROLLS_OUT = 0.4  # angular damping; without it Blender's balls roll for ever
 CHOSEN = ("selected_objects", "selected_editable_objects")
 SPAN = ("frame_start", "frame_end")
-STRONGEST = 200.0  # of gravity's weight; Blender takes its number for units a second squared, whatever a unit is
+STRONGEST = 200.0  # limit of the gravity weight; Blender's gravity is in units/s^2, whatever a unit is
 FINE = {"substeps_per_frame": 20, "solver_iterations": 20}
 
 
 def hand_over(
     scene: bpy.types.Scene, ball: bpy.types.Object, frame: int, kind: str, solid: list[bpy.types.Object]
 ) -> None:
-    """From `frame` on Blender's rigid bodies move the ball, over a slab that ends at the ground; `solid` objects are in
-    its way too. kind: of `physics.BALLS`. InputError, and nothing changed, where that cannot be."""
+    """Let Blender's rigid bodies move the ball from a frame on, over a slab whose top is the ground.
+
+    Args:
+        scene: the scene.
+        ball: the animated ball.
+        frame: of the handover.
+        kind: one of `physics.BALLS`.
+        solid: objects the ball collides with.
+    Raises:
+        InputError: if that is not possible; nothing is changed then.
+    """
     from ...beyond_mocap.ball.physics import BALLS
 
     _check(ball, frame)
@@ -50,7 +58,12 @@ def hand_over(
 
 
 def take_back(scene: bpy.types.Scene, ball: bpy.types.Object) -> None:
-    """The ball goes its keyed way again; what the handover made goes, unless another ball lies on it."""
+    """Return the ball to its keys and remove what the handover created, unless another ball needs it.
+
+    Args:
+        scene: the scene.
+        ball: the ball.
+    """
     channels.check_local(ball)
     _refuse_hidden(ball)
     aim = ball.beyond_mocap_aim
@@ -76,7 +89,7 @@ def take_back(scene: bpy.types.Scene, ball: bpy.types.Object) -> None:
 
 
 def _bequeath(heir: bpy.types.Object, kept: dict) -> None:
-    """Let another ball that is handed over bring back what came before the first handover, after the last."""
+    """Transfer the stored values to another ball that is handed over, which restores them when it is the last one."""
     theirs = json.loads(heir.beyond_mocap_aim.handed_before or "{}")
     if not kept.get("others"):
         theirs.update({name: kept[name] for name in ("world", "gravity", *FINE, *SPAN) if name in kept}, others=False)
@@ -85,7 +98,7 @@ def _bequeath(heir: bpy.types.Object, kept: dict) -> None:
 
 
 def _remove_solids(scene: bpy.types.Scene, kept: dict) -> None:
-    """Objects that were made solid are no rigid bodies any more; the ground that was added goes."""
+    """Remove the rigid bodies of objects that were made solid, and the added ground."""
     for name in kept.get("solid", ()):
         thing = scene.objects.get(name)
         if thing is not None and thing.rigid_body is not None and thing.visible_get():
@@ -98,7 +111,7 @@ def _remove_solids(scene: bpy.types.Scene, kept: dict) -> None:
 
 
 def _restore_world(scene: bpy.types.Scene, kept: dict) -> None:
-    """The rigid-body world is as it was before, or gone where there was none."""
+    """Restore the rigid-body world, or remove it if there was none."""
     world = scene.rigidbody_world
     if world is not None and not kept.get("world", True):
         with bpy.context.temp_override(scene=scene):
@@ -112,17 +125,18 @@ def _restore_world(scene: bpy.types.Scene, kept: dict) -> None:
 
 
 def _check(ball: bpy.types.Object, frame: int) -> None:
+    """Check that a ball can be handed over on a frame; InputError otherwise."""
     channels.check_local(ball)
     channels.check_free(ball)
     if ball.type != "MESH":
         raise InputError(f"object {ball.name}", f"of type {ball.type.lower()}", "a mesh", "select the ball")
     _refuse_hidden(ball)
     if ball.beyond_mocap_aim.handed or ball.rigid_body is not None:
-        step = "press Take Ball Back first"
-        raise InputError(f"ball {ball.name}", "a rigid body already", "a ball that is keyed", step)
+        step = "press Ball from Physics first"
+        raise InputError(f"ball {ball.name}", "already a rigid body", "a ball with keys only", step)
     if ball.parent is not None or any(constraint.influence for constraint in ball.constraints):
         found = "it has a parent or a constraint"
-        raise InputError(f"ball {ball.name}", found, "a ball of its own keys", "free the ball first")
+        raise InputError(f"ball {ball.name}", found, "a ball moved by its keys only", "free the ball first")
     action, slot = channels.playing(ball)
     ends = channels.keyed_range(channels.curves(action, slot)) if action is not None else None
     if ends is None or not ends[0] + 2 <= frame <= ends[1]:
@@ -130,19 +144,21 @@ def _check(ball: bpy.types.Object, frame: int) -> None:
         expected = f"keys from two frames before the handover on frame {frame} up to it"
         raise InputError(f"ball {ball.name}", found, expected, "choose another frame")
     if any(("location", axis) not in channels.curves(action, slot) for axis in range(3)):
-        raise InputError(f"ball {ball.name}", "no keys of all three of its coordinates", "them", "key its location")
+        raise InputError(f"ball {ball.name}", "a coordinate without keys", "keys of all three", "key its location")
     channels.check_local(action)
 
 
 def _refuse_hidden(ball: bpy.types.Object) -> None:
-    """InputError for a ball that is hidden: Blender changes no rigid body then."""
+    """Check that a ball is visible, because Blender does not change hidden rigid bodies; InputError otherwise."""
     if not ball.visible_get():
         step = "show it with Alt-H, or its collection"
-        raise InputError(f"ball {ball.name}", "it is hidden", "a ball that is shown", step)
+        raise InputError(f"ball {ball.name}", "it is hidden", "a visible ball", step)
 
 
 def _velocity(curves: dict, frame: int, fps: float) -> np.ndarray:
-    """(3,) units a second of the ball on a frame, by its keys on either side; by those before where it bounces."""
+    """Measure the ball's velocity (3,) on a frame, units per second, from the keys on either side; at a bounce from
+    those before.
+    """
     at = np.array([frame - 2, frame - 1, frame, frame + 1], float)
     places = np.stack([channels.sample(curves["location", axis], at) for axis in range(3)], axis=1)
     before, last = places[2] - places[1], 1.5 * places[2] - 2.0 * places[1] + 0.5 * places[0]
@@ -152,7 +168,9 @@ def _velocity(curves: dict, frame: int, fps: float) -> np.ndarray:
 
 
 def _shift(curves: dict, frame: int, velocity: np.ndarray, fps: float) -> list:
-    """Move the key before the handover so that it steps as fast as the ball; (path, index, frame, old value) each."""
+    """Move the key before the handover so that the last step has the ball's velocity; return (path, index, frame,
+    old value).
+    """
     kept = []
     for axis in range(3):
         curve = curves["location", axis]
@@ -163,7 +181,7 @@ def _shift(curves: dict, frame: int, velocity: np.ndarray, fps: float) -> list:
 
 
 def _move(curve, frame: float, value: float) -> bool:
-    """Give a curve's key on a frame another value; whether there is one."""
+    """Set a curve's key on a frame to another value; return whether there is one."""
     for key in curve.keyframe_points if curve is not None else ():
         if abs(key.co.x - frame) < 0.005:
             key.co.y = value
@@ -173,6 +191,7 @@ def _move(curve, frame: float, value: float) -> bool:
 
 
 def _world(scene, frame: int, kept: dict) -> None:
+    """Create or adapt the rigid-body world, and store its values."""
     if scene.rigidbody_world is None:
         with bpy.context.temp_override(scene=scene):
             bpy.ops.rigidbody.world_add()
@@ -191,7 +210,7 @@ def _world(scene, frame: int, kept: dict) -> None:
 
 
 def _solids(scene, solid: list, kept: dict) -> None:
-    """The ground and whatever else the ball may hit."""
+    """Create the ground, and make it and the given objects solid."""
     slab = scene.objects.get(GROUND)
     if slab is None:
         units = units_per_metre(scene)
@@ -211,7 +230,7 @@ def _solids(scene, solid: list, kept: dict) -> None:
         if thing.rigid_body is None:
             _add(thing, "PASSIVE")
             thing.rigid_body.collision_shape = "BOX" if thing is slab else "MESH"
-            thing.rigid_body.restitution = thing.rigid_body.friction = 1.0  # Blender multiplies both bodies' values
+            thing.rigid_body.restitution = thing.rigid_body.friction = 1.0  # Blender multiplies those of both
             thing.rigid_body.use_margin, thing.rigid_body.collision_margin = True, 0.0
             if thing is slab:
                 thing.hide_set(True)
@@ -220,7 +239,7 @@ def _solids(scene, solid: list, kept: dict) -> None:
 
 
 def _ball(scene, ball: bpy.types.Object, frame: int, kind, speed: float) -> None:
-    """The ball's own numbers, and when the rigid bodies take it."""
+    """Add the ball's rigid body with its physical values, and key when it takes over."""
     _add(ball, "ACTIVE")
     body = ball.rigid_body
     body.collision_shape, body.mass = "SPHERE", kind.mass

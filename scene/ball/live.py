@@ -1,8 +1,8 @@
-"""Aimed balls follow while their target is dragged and their settings or bodies are edited.
+"""Update aimed balls while their target is dragged and their settings or bodies are edited.
 
-Blender says after every change that something has changed; a timer, which runs during modal operators too, then
-compares what each ball's way was made of with what there is now. Our own writes are such changes too, and find nothing
-to do. What cannot be hit just now is told at the ball, which keeps its last way.
+Blender reports every change. A timer, which also runs during modal operators, then compares what each ball's trajectory
+was computed from with the present state. Our own writes are such changes too, and cause no update. If the target is
+unreachable, the ball shows the error and keeps its last trajectory.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from .settings import MARK, aimed
 
 
 def follow(scene: bpy.types.Scene) -> int:
-    """Bring all live balls of a scene up to date; of how many there is anything new."""
+    """Update all live balls of a scene; return how many changed."""
     count = 0
     for ball in aimed(scene):
         aim = ball.beyond_mocap_aim
         if aim.live and not aim.handed and ball.library is None:
-            failed = f"{ball.name}: could not be aimed here"
+            failed = f"{ball.name}: aiming failed"
             count += attempt(lambda: renew(scene, ball), lambda text: tell(ball, text), failed)
     if count:
         window.redraw()
@@ -29,7 +29,7 @@ def follow(scene: bpy.types.Scene) -> int:
 
 
 def renew(scene: bpy.types.Scene, ball: bpy.types.Object) -> bool:
-    """Aim a ball again where what its way was made of is another than it was; whether it was."""
+    """Update a ball if what its trajectory was computed from has changed; return whether it had."""
     wish, known = shots.wish_of(scene, ball), shots.solved_of(ball)
     made_of = shots.digest(wish, shots.strikes_of(scene, wish))
     played = channels.playing(ball)[0]
@@ -37,7 +37,7 @@ def renew(scene: bpy.types.Scene, ball: bpy.types.Object) -> bool:
     if known is not None and known.digest == made_of == written:
         return tell(ball, "")
     solved = shots.solve(scene, wish, ball.name)
-    if made_of == written:  # another session has written it: only what is drawn is lacking
+    if made_of == written:  # written by another session: only the overlay is missing
         shots.remember(ball, solved)
         return False
     shots.write(scene, ball, solved)
@@ -45,7 +45,7 @@ def renew(scene: bpy.types.Scene, ball: bpy.types.Object) -> bool:
 
 
 def tell(ball: bpy.types.Object, text: str) -> bool:
-    """Say at the ball what is wrong; whether that is new."""
+    """Show a problem at the ball; return whether it is new."""
     new = ball.beyond_mocap_aim.told != text
     if new:
         ball.beyond_mocap_aim.told = text
@@ -53,7 +53,7 @@ def tell(ball: bpy.types.Object, text: str) -> bool:
 
 
 def look_at(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
-    """Note which keys may be others, and whether a ball may have to be aimed again."""
+    """Detect which keys may have changed, and whether a ball may need an update."""
     if not shots.anything():
         return
     bodies = {ball.beyond_mocap_aim.body for ball in aimed(scene)}

@@ -1,4 +1,6 @@
-"""What an aimed ball keeps, saved with the file and known to undo; which ball, body and target are meant."""
+"""Properties of an aimed ball, saved with the file and covered by undo; and which ball, body and target are
+selected.
+"""
 
 from __future__ import annotations
 
@@ -11,49 +13,49 @@ from ..passes.settings import KEPT
 from ..result.result import BeyondMocapBefore
 
 MARK = "beyond_mocap_shot"
-"""Custom property of an action or curve of ours: of an action, a digest of what it was made of. Not the name of the
-group on objects, with which it would share its place before Blender 5.0."""
+"""Custom property of an action or curve of this extension; of an action, a digest of what it was computed from. Not the
+name of the property group on objects: before Blender 5.0 both would share one place."""
 
 
 def changed(_settings, _context) -> None:
-    """A setting that the ball may have to follow."""
+    """Mark that an aimed ball may need an update."""
     live.mark("Aimed balls")
 
 
 @with_settings("aim", update=changed)
 @with_settings("aim.handover")
 class BeyondMocapAim(bpy.types.PropertyGroup):
-    """Who strikes a ball, towards what and how."""
+    """How a ball is struck, by what and towards what."""
 
     attached_to = ("Object.beyond_mocap_aim",)
 
-    on: BoolProperty(name="Aimed", description="Whether this ball is aimed at a target")
+    on: BoolProperty(name="Aimed", description="This ball is aimed at a target")
     body: PointerProperty(name="Body", type=bpy.types.Object, poll=lambda _own, thing: thing.type == "ARMATURE",
                           update=changed,
-                          description="The armature that strikes the ball; none: it leaves from where it lies")
+                          description="Armature that strikes the ball; none: it leaves from its place")
     place: FloatVectorProperty(name="From", size=3, options={"HIDDEN"},
-                               description="Where the ball lies when nobody strikes it, metres")
+                               description="Position of the ball without a body, in metres")
     target: PointerProperty(name="Target", type=bpy.types.Object, update=changed,
                             description="Where the ball arrives; drag it with G")
-    curve: PointerProperty(name="Trajectory", type=bpy.types.Object, description="The curve along the ball's way")
-    told: StringProperty(name="Told", options={"HIDDEN"}, description="What is wrong, if anything")
-    figures: StringProperty(name="Figures", options={"HIDDEN"}, description="Lines about the shot that is shown")
+    curve: PointerProperty(name="Trajectory", type=bpy.types.Object, description="Curve along the ball's trajectory")
+    told: StringProperty(name="Messages", options={"HIDDEN"}, description="Status and warnings")
+    figures: StringProperty(name="Figures", options={"HIDDEN"}, description="Figures of the shot")
     strike: IntProperty(name="Strike", options={"HIDDEN"}, description="Scene frame on which the ball is struck")
     arrived: FloatProperty(name="Arrived", options={"HIDDEN"}, description="Scene frame on which it is at the target")
-    before: PointerProperty(type=BeyondMocapBefore, description="What the ball played before it was aimed")
+    before: PointerProperty(type=BeyondMocapBefore, description="Animation of the ball before it was aimed")
     handed: BoolProperty(name="Handed Over", options={"HIDDEN"},
-                         description="Whether Blender's rigid bodies have the ball")
+                         description="Blender's rigid bodies move the ball")
     handed_before: StringProperty(name="Handed Before", options={"HIDDEN"},
-                                  description="What the handover has to bring back, as JSON")
+                                  description="Values to restore after the handover, as JSON")
 
 
 def aimed(scene: bpy.types.Scene) -> list[bpy.types.Object]:
-    """The aimed balls of a scene."""
+    """List the aimed balls of a scene."""
     return [thing for thing in scene.objects if thing.beyond_mocap_aim.on]
 
 
 def aimed_ball(context: bpy.types.Context) -> bpy.types.Object | None:
-    """The aimed ball that is meant: active, selected, the one whose target is active, or the only one."""
+    """Find the aimed ball that is active, has the active target, is selected, or is the only one."""
     active = context.view_layer.objects.active
     balls = aimed(context.scene)
     meant = [ball for ball in balls if ball == active]
@@ -64,7 +66,9 @@ def aimed_ball(context: bpy.types.Context) -> bpy.types.Object | None:
 
 
 def ball_meant(context: bpy.types.Context) -> bpy.types.Object | None:
-    """The ball that is selected, by mark or name; an aimed one that, or whose target, is active; the only mesh."""
+    """Find the selected ball by mark or name; an aimed one that is active, or whose target or body is; or the only
+    mesh.
+    """
     chosen = [thing for thing in context.selected_objects if thing.type == "MESH"]
     marked = [thing for thing in chosen if thing.beyond_mocap_aim.on or thing.get(KEPT) or "ball" in thing.name.lower()]
     if marked:
@@ -78,12 +82,12 @@ def ball_meant(context: bpy.types.Context) -> bpy.types.Object | None:
 
 
 def body_meant(context: bpy.types.Context) -> bpy.types.Object | None:
-    """The armature that strikes: the active one, or one that is selected."""
+    """Find the armature that strikes: the active one, or a selected one."""
     active = context.view_layer.objects.active
     found = [thing for thing in (active, *context.selected_objects) if thing is not None and thing.type == "ARMATURE"]
     return found[0] if found else None
 
 
 def target_meant(context: bpy.types.Context) -> bpy.types.Object | None:
-    """An Empty that is selected."""
+    """Find a selected Empty."""
     return next((thing for thing in context.selected_objects if thing.type == "EMPTY"), None)

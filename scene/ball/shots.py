@@ -1,4 +1,4 @@
-"""The settings of an aimed ball as a shot of the core; the shot as keys, as a curve, and as what the overlays draw."""
+"""The settings of an aimed ball as a shot of the core; the shot as keys, as a curve, and as overlays."""
 
 from __future__ import annotations
 
@@ -25,15 +25,36 @@ if TYPE_CHECKING:
     from ...beyond_mocap.ball.flight import Flight
     from ...beyond_mocap.ball.shot import Shot, Strikes
 
-CLOSEST = 0.02  # frames between two keys at least; Blender takes keys within 0.01 for one
-STROKES = 40  # of a candidate's way that is drawn
-CURVE_STEP = 0.04  # s between two points of the curve
+CLOSEST = 0.02  # frames, least distance of two keys; Blender merges keys within 0.01
+STROKES = 40  # points of a drawn candidate trajectory
+CURVE_STEP = 0.04  # s between points of the curve
 
 
 @dataclass(frozen=True, eq=False)
 class Wish:
-    """What is asked: the values of `BeyondMocapAim`, with the target (3,) and the ball's place (3,) in metres. body is
-    an object: a wish lives no longer than the event that made it."""
+    """What is requested: the values of `BeyondMocapAim`. `body` is an object, so a request is only valid within one
+    event.
+
+    Attributes:
+        body: armature that strikes, None: the ball leaves from `place`.
+        part: that strikes.
+        side: "left" or "right".
+        bone: that strikes instead of the part, "" for none.
+        first: first frame of the strike.
+        last: last frame of the strike.
+        target: (3,) m.
+        place: (3,) m of the ball without a body.
+        way: "AIR" or "GROUND".
+        bounces: before the target.
+        timing: "FREE", "SECONDS" or "FRAME".
+        seconds: s from strike to target.
+        arrival: scene frame of the arrival.
+        ball: one of `physics.BALLS`.
+        back: back spin, turns per second.
+        left: spin to the left, turns per second.
+        human: limit the launch to human speeds.
+        follow: s simulated after the target.
+    """
 
     body: bpy.types.Object | None
     part: str
@@ -55,7 +76,7 @@ class Wish:
     follow: float = 3.0
 
     def key(self) -> tuple:
-        """Plain values that tell two wishes apart, but for the body's motion; Blender keeps seven digits."""
+        """Build plain values that distinguish requests, except for the body's motion; Blender keeps seven digits."""
         values = (getattr(self, field.name) for field in fields(self))
         return tuple(value.session_uid if isinstance(value, bpy.types.Object) else _rounded(value) for value in values)
 
@@ -68,9 +89,18 @@ def _rounded(value):
 
 @dataclass(frozen=True, eq=False)
 class Solved:
-    """A shot in a scene: its core values, the ball's whole way from the strike on (seconds 0), scene frame of the
-    strike, frames a second, and a digest of what it was made of; candidates (N, STROKES, 3) m, of launches that are
-    possible."""
+    """A solved shot in a scene.
+
+    Attributes:
+        digest: of what it was computed from.
+        shot: of the core.
+        strikes: of the core.
+        flight: the ball from the strike (0 s) on.
+        strike: scene frame of the strike.
+        fps: frames per second.
+        target: (3,) m.
+        candidate_trajectories: (N, CANDIDATE_POINTS, 3) m of the possible launches.
+    """
 
     digest: str
     shot: "Shot"
@@ -87,55 +117,64 @@ _solved: dict[int, Solved] = {}
 
 
 def solved_of(ball: bpy.types.Object) -> Solved | None:
-    """What was solved last for a ball in this session."""
+    """Find the last solved shot of a ball in this session."""
     return _solved.get(ball.session_uid)
 
 
 def anything() -> bool:
-    """Whether any ball has been aimed in this session."""
+    """Say whether any ball has been aimed in this session."""
     return bool(_solved)
 
 
 def remember(ball: bpy.types.Object, solved: Solved) -> None:
-    """What a ball's keys show already."""
+    """Store the shot that a ball's keys already show."""
     _solved[ball.session_uid] = solved
 
 
 def unsure(body: bpy.types.Object | None = None) -> None:
-    """The motion of a body, or of any, may be another than it was."""
+    """Clear the stored strikes of a body, or of all: its motion may have changed."""
     for key in [key for key in _strikes if body is None or key[0] == body.session_uid]:
         del _strikes[key]
 
 
 def forget() -> None:
-    """Another file is open, or the extension goes."""
+    """Clear everything stored, when another file is opened or the extension is disabled."""
     _strikes.clear()
     _solved.clear()
 
 
 def wish_of(scene: bpy.types.Scene, ball: bpy.types.Object) -> Wish:
-    """What an aimed ball's settings ask for; InputError where something is gone."""
+    """Build the request of an aimed ball from its settings; InputError if something is missing."""
     aim = ball.beyond_mocap_aim
     if aim.target is None or aim.target.name not in scene.objects:
-        step = "pick a target, or press Leave Aim"
-        raise InputError(f"ball {ball.name}", "its target is gone", "an object to aim at", step)
+        step = "pick a target, or press Revert Aim"
+        raise InputError(f"ball {ball.name}", "its target is missing", "an object to aim at", step)
     if aim.body is not None and aim.body.name not in scene.objects:
         found = f"{aim.body.name} is not in this scene"
         raise InputError(f"ball {ball.name}", found, "a body of this scene", "pick another body")
     if aim.body is None and ball.get(KEPT):
-        step = "pick a body, or press Leave Aim"  # a ball that was made for a strike has no place of its own
-        raise InputError(f"ball {ball.name}", "no body strikes it", "the body that it was made for, or another", step)
+        step = "pick a body, or press Revert Aim"  # a ball created for a strike has no own position
+        raise InputError(f"ball {ball.name}", "no body strikes it", "a body", step)
     same = {field.name: getattr(aim, field.name) for field in fields(Wish) if field.name not in ("target", "place")}
     return Wish(**same, target=place_of(scene, aim.target), place=tuple(aim.place))
 
 
 def place_of(scene: bpy.types.Scene, thing: bpy.types.Object) -> tuple[float, float, float]:
-    """Where an object is, metres."""
+    """Measure an object's position, m."""
     return tuple(float(value) / units_per_metre(scene) for value in thing.matrix_world.translation)
 
 
 def strikes_of(scene: bpy.types.Scene, wish: Wish) -> "Strikes":
-    """Where the part can strike; without a body, where the ball lies."""
+    """Find where the part can strike; without a body, where the ball lies.
+
+    Args:
+        scene: the scene.
+        request: the request.
+    Returns:
+        The strikes, world frame.
+    Raises:
+        InputError: if the body does not move on these frames, or its pose is invalid.
+    """
     from ...beyond_mocap.ball.contact import striking_surface
     from ...beyond_mocap.ball.physics import BALLS
     from ...beyond_mocap.ball.shot import Strikes
@@ -154,18 +193,28 @@ def strikes_of(scene: bpy.types.Scene, wish: Wish) -> "Strikes":
         last = first + len(motion) - 1
         inside = frames[(frames >= first) & (frames <= last)]
         if not len(inside):
-            found = f"frames {wish.first} to {wish.last}, but it moves on {first} to {last}"
-            raise InputError(f"armature {wish.body.name}", found, "frames on which it moves", "set From and To")
+            found = f"frames {wish.first} to {wish.last}, but its motion is on {first} to {last}"
+            raise InputError(f"armature {wish.body.name}", found, "frames of its motion", "set From and To")
         surface = striking_surface(motion.skeleton, wish.bone or wish.part, wish.side)
         found = Strikes.of(motion, surface, inside - first, inside)
         if not (np.isfinite(found.start).all() and np.isfinite(found.velocity).all()):
-            raise InputError(f"armature {wish.body.name}", "a pose that is no number", "numbers", "look at its keys")
+            raise InputError(f"armature {wish.body.name}", "NaN values in its pose", "a valid pose", "check its keys")
         _strikes[key] = found
     return _strikes[key]
 
 
 def solve(scene: bpy.types.Scene, wish: Wish, name: str) -> Solved:
-    """Work the shot out, each time the same; `name` is told where that cannot be. InputError as `shoot`."""
+    """Solve a shot; the same request gives the same shot.
+
+    Args:
+        scene: the scene.
+        request: the request.
+        name: of the ball, for messages.
+    Returns:
+        The solved shot.
+    Raises:
+        InputError: as for `ball.shot.solve_shot`.
+    """
     from ...beyond_mocap.ball.batch import courses
     from ...beyond_mocap.ball.flight import Launch, fly
     from ...beyond_mocap.ball.physics import BALLS, FASTEST
@@ -189,7 +238,7 @@ def solve(scene: bpy.types.Scene, wish: Wish, name: str) -> Solved:
 
 
 def digest(wish: Wish, strikes: "Strikes") -> str:
-    """What a shot is made of, in a few letters."""
+    """Compute a short digest of what a shot is computed from."""
     made = hashlib.sha1(repr(wish.key()[1:]).encode())
     for values in (strikes.frames, strikes.start, strikes.end, strikes.velocity):
         made.update(np.round(np.asarray(values, float), 5).tobytes())
@@ -197,21 +246,28 @@ def digest(wish: Wish, strikes: "Strikes") -> str:
 
 
 def _timed(strikes: "Strikes", wish: Wish, fps: float) -> tuple["Strikes", np.ndarray | float | None]:
-    """The strikes that come in time, and the seconds from each to the target."""
+    """Select the strikes that are early enough, and the seconds from each to the target."""
     if wish.timing != "FRAME":
         return strikes, wish.seconds if wish.timing == "SECONDS" else None
     seconds = (wish.arrival - strikes.frames) / fps
     early = seconds > 0.05
     if not early.any():
-        expected = f"a frame behind the strike ({strikes.frames[0]})"
+        expected = f"a frame after the strike ({strikes.frames[0]})"
         raise InputError("aim", f"arrival on frame {wish.arrival}", expected, "set Frame")
     kept = {name: getattr(strikes, name)[early] for name in ("frames", "start", "end", "velocity")}
     return replace(strikes, **kept), seconds[early]
 
 
 def write(scene: bpy.types.Scene, ball: bpy.types.Object, solved: Solved) -> None:
-    """Let a ball go the way of a shot: keys on every frame, and where it bounces and arrives; before the strike it does
-    what it did before it was aimed. In place, where it has been aimed already."""
+    """Write a shot to the ball: keys on every frame, and where it bounces and arrives.
+
+    Before the strike the ball keeps its earlier animation. Keys of an earlier shot are replaced in place.
+
+    Args:
+        scene: the scene.
+        ball: the ball.
+        solved: the shot.
+    """
     aim = ball.beyond_mocap_aim
     if not aim.before.kept:
         put_aside(aim.before, ball)
@@ -232,7 +288,7 @@ def write(scene: bpy.types.Scene, ball: bpy.types.Object, solved: Solved) -> Non
 
 
 def set_up(ball: bpy.types.Object, wish: Wish, target: bpy.types.Object) -> None:
-    """Let a ball be aimed: its settings are those of a wish."""
+    """Apply a request to a ball's settings, and aim it at `target`."""
     aim = ball.beyond_mocap_aim
     for field in fields(Wish):
         if field.name != "target":
@@ -241,20 +297,20 @@ def set_up(ball: bpy.types.Object, wish: Wish, target: bpy.types.Object) -> None
 
 
 def check_ball(ball: bpy.types.Object | None) -> None:
-    """InputError for a ball that something else moves."""
+    """Check that nothing else moves a ball; InputError otherwise."""
     if ball is None:
         return
     channels.check_free(ball)
     if ball.parent is not None or len(ball.beyond_mocap_ball.holds) or any(one.influence for one in ball.constraints):
         found = "it has a parent, a constraint or is carried"
-        raise InputError(f"ball {ball.name}", found, "a ball of its own", "free the ball first")
+        raise InputError(f"ball {ball.name}", found, "a free ball", "free the ball first")
     if ball.rigid_body is not None and not ball.rigid_body.kinematic:
         found = "Blender's rigid bodies move it"
-        raise InputError(f"ball {ball.name}", found, "a ball of its own", "take its rigid body off")
+        raise InputError(f"ball {ball.name}", found, "a free ball", "remove its rigid body")
 
 
 def ahead(strikes: "Strikes", far: float) -> tuple[float, float, float]:
-    """A place (3,) m on the ground, `far` m off the way the part moves where it is fastest, or along X."""
+    """Find a place (3,) m on the ground, `far` m in the direction in which the part moves fastest, or along X."""
     from ...beyond_mocap.ball.physics import FOOTBALL
 
     row = int(np.argmax(np.linalg.norm(strikes.velocity, axis=1)))
@@ -265,7 +321,7 @@ def ahead(strikes: "Strikes", far: float) -> tuple[float, float, float]:
 
 
 def stretch_of(scene: bpy.types.Scene, body: bpy.types.Object, part: str, side: str) -> tuple[int, int]:
-    """Scene frames of the ball stretch of the strike nearest to the current frame; that frame where there is none."""
+    """Find the scene frames of the strike nearest to the current frame; that frame if there is none."""
     from ...beyond_mocap.passes.hits import analyse
 
     motion, first = motion_of(scene, body)
@@ -279,18 +335,27 @@ def stretch_of(scene: bpy.types.Scene, body: bpy.types.Object, part: str, side: 
 
 
 def radius_of(wish: Wish) -> float:
-    """Metres of the ball that a wish asks for."""
+    """Find the radius of the requested ball, m."""
     from ...beyond_mocap.ball.physics import BALLS
 
     return BALLS[wish.ball].radius
 
 
 def keys(scene: bpy.types.Scene, ball: bpy.types.Object, solved: Solved) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Frames (F,), locations (F, 3) in Blender's units and rotations (F, 4) of an aimed ball."""
+    """Build the keys of an aimed ball.
+
+    Args:
+        scene: the scene.
+        ball: the ball.
+        solved: the shot.
+    Returns:
+        Frames (F,), locations (F, 3) in Blender's units, rotations (F, 4).
+    """
     strike, fps, flight = solved.strike, solved.fps, solved.flight
     rest = flight.rests_from if flight.rests_from is not None else flight.end
     last = int(np.ceil(strike + max(rest, solved.shot.seconds) * fps))
     whole = np.arange(strike, last + 1, dtype=float)
+    # Bounces and the arrival get keys on fractional frames, unless a whole frame is close.
     exact = strike + fps * np.append(flight.bounces, solved.shot.seconds)
     exact = exact[(exact < last) & (np.abs(exact - np.round(exact)) > CLOSEST)]
     frames = np.sort(np.append(whole, exact))
@@ -305,7 +370,7 @@ def keys(scene: bpy.types.Scene, ball: bpy.types.Object, solved: Solved) -> tupl
 
 
 def _earlier(ball: bpy.types.Object, strike: int) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
-    """What the ball did before it was aimed, up to the frame before the strike; None where it did nothing."""
+    """Sample the ball's earlier animation up to the frame before the strike; None if there is none."""
     curves = curves_before(ball.beyond_mocap_aim.before)
     ends = channels.keyed_range(curves)
     if ends is None or ends[0] >= strike or ("location", 0) not in curves:
@@ -318,7 +383,16 @@ def _earlier(ball: bpy.types.Object, strike: int) -> tuple[np.ndarray, np.ndarra
 def trajectory(
     scene: bpy.types.Scene, path: bpy.types.Object | None, ball: bpy.types.Object, flight: "Flight"
 ) -> bpy.types.Object:
-    """A curve along a flight, up to where the ball rests; `path`, or a new one; seen in the view, not in a picture."""
+    """Update the curve along a flight, up to where the ball rests; visible in views, not in renders.
+
+    Args:
+        scene: the scene.
+        path: the existing curve, or None.
+        ball: the ball.
+        flight: the flight.
+    Returns:
+        The curve.
+    """
     units = units_per_metre(scene)
     end = flight.rests_from if flight.rests_from is not None else flight.end
     times = np.unique(np.concatenate([np.arange(0.0, end, CURVE_STEP), flight.bounces, [end]]))
@@ -344,14 +418,14 @@ def trajectory(
 
 
 def lines(solved: Solved) -> list[str]:
-    """A shot in lines "name: value"."""
+    """Describe a shot in lines "name: value"."""
     shot, aimed = solved.shot, solved.shot.aimed
     speed = float(np.linalg.norm(shot.velocity))
     up = float(np.degrees(np.arctan2(shot.velocity[2], np.linalg.norm(shot.velocity[:2]))))
     part = float(np.linalg.norm(solved.strikes.velocity[shot.chosen]))
-    told = [f"Struck on frame: {solved.strike}", f"Leaves with: {speed:.1f} m/s, {up:.0f}\N{DEGREE SIGN} up"]
+    told = [f"Struck on frame: {solved.strike}", f"Launch: {speed:.1f} m/s, {up:.0f}\N{DEGREE SIGN} up"]
     if part:
-        told.append(f"Part moves: {part:.1f} m/s")
+        told.append(f"Part speed: {part:.1f} m/s")
     told.append(f"Arrives on frame: {solved.strike + shot.seconds * solved.fps:.1f}")
     told.append(f"Flight, miss: {shot.seconds:.2f} s, {1000.0 * aimed.miss[shot.chosen]:.1f} mm")
     before = solved.flight.bounces[solved.flight.bounces < shot.seconds - 1e-3]
@@ -363,7 +437,7 @@ def lines(solved: Solved) -> list[str]:
 
 
 def leave(ball: bpy.types.Object) -> None:
-    """The ball is not aimed any more, and plays what it did before; its curve goes, the target stays."""
+    """Remove the aim of a ball: its earlier animation returns and its curve is removed; the target stays."""
     channels.check_local(ball)
     channels.check_free(ball)
     aim = ball.beyond_mocap_aim

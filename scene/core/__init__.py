@@ -1,1 +1,1 @@
-"""What every room of the scene stands on: channels, clock, jobs, the live watcher, registration, settings."""
+"""Shared parts of the Blender side: channels, clock, jobs, the live watcher, registration, settings."""

@@ -1,8 +1,7 @@
-"""Motions as actions of an armature, and actions as motions, by time: the scene keeps its frame rate.
+"""Convert motions to actions of an armature and back, by time: the scene keeps its frame rate.
 
-A bone's pose is a turn in its own rest frame B, the core's local rotation q one in the armature's frame:
-q = B pose B^-1.
-Where the armature object is turned by O in the scene, the root takes that turn along: q_root = O B pose B^-1.
+A bone's pose is a rotation in its own rest frame B, the core's local rotation q one in the armature's frame: q = B pose
+B^-1. Where the armature object is rotated by O in the scene, the root includes that rotation: q_root = O B pose B^-1.
 """
 
 from __future__ import annotations
@@ -19,16 +18,26 @@ from . import channels
 from .measure import frames_per_second, whole_frames
 
 PLACED = "beyond_mocap_placement"
-"""Custom property of an action: the 16 numbers of the armature's matrix when the motion was written onto it, so that
-what is drawn beside the body follows it when it is moved."""
+"""Custom property of an action: the 16 numbers of the armature's matrix when the motion was written, so that overlays
+follow the body when it is moved."""
 
 
 def write(body: bpy.types.Object, motion: Motion, scene: bpy.types.Scene, start: float | None = None,
           name: str | None = None, generated: bool = False) -> bpy.types.Action:
-    """Play `motion` on the armature `body`: a new action `name` with a key on every whole scene frame.
+    """Write a motion as a new action with a key on every whole scene frame.
 
-    start: scene frame (may be fractional) at which the motion's first frame is played; the scene's first if None. The
-    armature needs a bone for every joint. generated: as for `channels.animate`. Returns the action."""
+    Args:
+        body: an armature with a bone for every joint.
+        motion: the motion.
+        scene: says frame rate and unit scale.
+        start: scene frame (may be fractional) of the motion's first frame; None for the scene's first.
+        name: of the action.
+        generated: mark the keys, see `channels.create_action`.
+    Returns:
+        The action.
+    Raises:
+        InputError: if the armature cannot play the motion.
+    """
     frames, curves = keyed(body, motion, scene, start)
     action = channels.animate(body, name or f"{body.name} motion", frames, curves, generated)
     action[PLACED] = [number for row in body.matrix_world for number in row]
@@ -36,17 +45,21 @@ def write(body: bpy.types.Object, motion: Motion, scene: bpy.types.Scene, start:
 
 
 def keyed(body: bpy.types.Object, motion: Motion, scene: bpy.types.Scene, start: float | None = None):
-    """What `write` writes, as `channels.animate` takes it: whole scene frames (F,), and the values of every curve.
+    """Build the keys that `write_motion` writes, as `channels.create_action` takes them.
 
-    InputError where the armature cannot play it."""
+    Returns:
+        Whole scene frames (F,), and the values of every curve.
+    Raises:
+        InputError: if the armature cannot play the motion.
+    """
     channels.check_local(body)
     channels.check_free(body)
     if getattr(body, "beyond_mocap_ride", None) is not None and body.beyond_mocap_ride.on:  # not there for batch.py
-        raise InputError(f"armature {body.name}", "its motion rides a path", "an armature that does not",
-                         "press Keep or Leave first")
+        raise InputError(f"armature {body.name}", "its path is being edited", "an armature without a path edit",
+                         "press Apply or Revert first")
     missing = [joint for joint in motion.skeleton.names if joint not in body.data.bones]
     if missing:
-        raise InputError(f"armature {body.name}", f"no bone {', '.join(missing[:3])}", "a bone for every joint")
+        raise InputError(f"armature {body.name}", f"bones missing: {', '.join(missing[:3])}", "a bone for every joint")
     fps = frames_per_second(scene)
     start = float(scene.frame_start) if start is None else start
     frames = whole_frames(start, motion.duration, fps)
@@ -66,10 +79,21 @@ def keyed(body: bpy.types.Object, motion: Motion, scene: bpy.types.Scene, start:
 
 
 def read(body: bpy.types.Object, scene: bpy.types.Scene, action: bpy.types.Action | None = None, slot=None) -> Motion:
-    """The motion that an action plays on the armature `body`, at the scene's frame rate, from first key to last.
+    """Read the motion that an action plays on an armature, at the scene's frame rate, from the first to the last key.
 
-    action and slot: those that the armature plays if None. Curves of any rotation mode are read; what has no curve
-    stays as it is posed now. Constraints and drivers are not part of an action and not read."""
+    Curves of any rotation mode are read; what has no curve keeps its present pose. Constraints and drivers are not part
+    of an action and are not read.
+
+    Args:
+        body: the armature.
+        scene: says frame rate and unit scale.
+        action: the action; None for the one that the armature plays.
+        slot: its slot; None for the first that fits.
+    Returns:
+        The motion, metres, world.
+    Raises:
+        InputError: if there is no action or no key on a bone.
+    """
     if action is None:
         action, slot = channels.playing(body)
     if action is None:
@@ -92,7 +116,7 @@ def read(body: bpy.types.Object, scene: bpy.types.Scene, action: bpy.types.Actio
 
 
 def first_frame(body: bpy.types.Object) -> int | None:
-    """The first whole frame on which the armature's action has a key; None where it plays none."""
+    """Find the first whole frame on which the armature's action has a key; None where it plays none."""
     action, slot = channels.playing(body)
     ends = channels.keyed_range(channels.curves(action, slot)) if action else None
     return ends[0] if ends else None
@@ -103,7 +127,7 @@ def _path(bone: str, name: str) -> str:
 
 
 def _values(bone: bpy.types.PoseBone, name: str, curves: dict, frames: np.ndarray) -> np.ndarray:
-    """A pose bone's property over frames: (F, n)."""
+    """Sample a pose bone's property over frames: (F, n)."""
     path, now = _path(bone.name, name), getattr(bone, name)
     columns = [channels.sample(curves[path, i], frames) if (path, i) in curves else np.full(len(frames), value) for i,
                value in enumerate(now)]
@@ -111,14 +135,14 @@ def _values(bone: bpy.types.PoseBone, name: str, curves: dict, frames: np.ndarra
 
 
 def _rotation(bone: bpy.types.PoseBone, curves: dict, frames: np.ndarray) -> np.ndarray:
-    """A pose bone's rotation over frames, whatever its rotation mode: (F, 4)."""
+    """Sample a pose bone's rotation over frames, in any rotation mode: (F, 4)."""
     if bone.rotation_mode == "QUATERNION":
         return quaternion.normalized(_values(bone, "rotation_quaternion", curves, frames))
     if bone.rotation_mode == "AXIS_ANGLE":
         angle, *axis = _values(bone, "rotation_axis_angle", curves, frames).T
         axis = np.stack(axis, axis=1)
         return quaternion.about_axis(unit_vectors(axis), angle)
-    # Blender names the axes in the order in which they are applied to a point, the core as nested frames: the reverse
+    # Blender names the axes in the order in which they are applied to a point, the core as nested frames: reversed
     order = bone.rotation_mode[::-1]
     turns = _values(bone, "rotation_euler", curves, frames)
     return quaternion.from_euler(turns[:, ["XYZ".index(letter) for letter in order]], order)

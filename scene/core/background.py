@@ -1,7 +1,7 @@
-"""Long work in a thread, polled by whoever started it. Scripts and farms, which have no window, call the work itself.
+"""Run long work in a thread, polled by whichever operator started it; scripts without a window call the work directly.
 
-The thread sees plain values and arrays, never bpy. When a newer job of its kind has started, or the user has cancelled,
-what a job brings is dropped.
+The thread gets plain values and arrays, never bpy. The result of a job is dropped if a newer job of its kind has
+started, or the user has cancelled it.
 """
 
 from __future__ import annotations
@@ -17,20 +17,26 @@ Work = Callable[[Callable[[float, str], None], Callable[[], bool], Callable[[], 
 
 _newest: dict[str, "Job"] = {}
 _working, _counting = [0], threading.Lock()
-_usual = sys.getswitchinterval()  # seconds for which a thread keeps the interpreter to itself
-POLITE = 0.0005  # the same while work runs: Blender's own thread, which draws, asks for it a dozen times a picture
+_usual = sys.getswitchinterval()  # seconds for which a thread keeps the interpreter
+POLITE = 0.0005  # the same while work runs: Blender's drawing thread needs the interpreter a dozen times per redraw
 
 
 class Job:
-    """Work of one kind ("library", "synthesis") in a thread of its own.
+    """Work of one kind ("library", "synthesis") in its own thread.
 
-    `work(progress, cancelled, hurry)` is called there; `hurry()` turns true when the user wants an end and what is
-    there by then. `fraction` and `text` say how far it is; after `poll()` has returned True either `result` or `error`
-    is set."""
+    `work(progress, cancelled, hurry)` is called there; `hurry()` becomes true when the user wants to stop with what is
+    done so far. `fraction` and `text` describe the progress; once `poll()` has returned True, either `result` or
+    `error` is set.
+    """
 
     def __init__(self, kind: str, work: Work, keeps: bool = False):
-        """Starts at once and takes the place of an older job of the same kind, which is cancelled. keeps: whether the
-        work can come to an early end with what it has."""
+        """Start the job; an older job of the same kind is cancelled.
+
+        Args:
+            kind: name of the kind.
+            work: the function to run.
+            can_end_early: whether the work can end early with what it has.
+        """
         stop(kind)
         self.kind, self.keeps = kind, keeps
         self.fraction, self.text = 0.0, ""
@@ -40,7 +46,7 @@ class Job:
         threading.Thread(target=self._run, args=(work,), name=f"beyond-mocap {kind}", daemon=True).start()
 
     def poll(self) -> bool:
-        """Take in what the thread has sent; True once it has ended."""
+        """Receive what the thread has sent; return True once it has ended."""
         while not self._news.empty():
             what, value = self._news.get()
             if what == "progress":
@@ -52,11 +58,11 @@ class Job:
         return False
 
     def cancel(self) -> None:
-        """Ask the thread to stop; its result will be dropped."""
+        """Ask the thread to stop; its result is dropped."""
         self._stop.set()
 
     def end(self) -> None:
-        """Ask the thread to come to an end with what it has; asked again, or where it keeps nothing, cancel it."""
+        """Ask the thread to end with what it has; the second time, or where it cannot, cancel it."""
         if self.keeps and not self.ending:
             self._soon.set()
         else:
@@ -64,27 +70,28 @@ class Job:
 
     @property
     def ending(self) -> bool:
-        """Whether it has been asked to come to an end with what it has."""
+        """Whether the thread was asked to end with what it has."""
         return self._soon.is_set()
 
     @property
     def ended(self) -> bool:
-        """Whether `poll` has found its end."""
+        """Whether `poll` has found the end."""
         return self._ended
 
     @property
     def stale(self) -> bool:
-        """Whether nobody waits for this job's result any more."""
+        """Whether the result is no longer wanted."""
         return self._stop.is_set() or _newest.get(self.kind) is not self
 
     def _tell(self, fraction: float, text: str) -> None:
         self._news.put(("progress", (fraction, text)))
 
     def _run(self, work: Work) -> None:
+        """Run the work in the thread, and send its result or error."""
         _work(1)
         try:
             result = work(self._tell, self._stop.is_set, self._soon.is_set)
-        except BaseException as error:  # carried to the main thread, which reports or raises it
+        except BaseException as error:  # passed to the main thread, which reports or raises it
             self._news.put(("error", error))
         else:
             self._news.put(("result", result))
@@ -93,7 +100,7 @@ class Job:
 
 
 def _work(step: int) -> None:
-    """Count one more thread at work, or one less; threads are polite as long as there is one."""
+    """Count one more working thread, or one less; a short switch interval is used while there is one."""
     with _counting:
         _working[0] += step
         sys.setswitchinterval(POLITE if _working[0] else _usual)
@@ -107,11 +114,11 @@ def stop(kind: str | None = None) -> None:
 
 
 def end() -> None:
-    """What ESC does, to all running jobs: see `Job.end`."""
+    """End all running jobs, as ESC does: see `Job.request_end`."""
     for job in list(_newest.values()):
         job.end()
 
 
 def cancelled(job: Job) -> bool:
-    """Whether an ended job was stopped by the user rather than by trouble."""
+    """Return whether an ended job was stopped by the user rather than by an error."""
     return job.stale or isinstance(job.error, Cancelled)

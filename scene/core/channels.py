@@ -1,7 +1,7 @@
-"""Animation curves in bulk: the one file that knows of slots, layers, strips and channelbags.
+"""Animation curves in bulk: the only module that handles slots, layers, strips and channelbags.
 
-Values cross the border by `foreach_get` and `foreach_set` only: 72,000 keys take some 0.04 s that way and many seconds
-key by key.
+Values are read and written with `foreach_get` and `foreach_set` only: 72,000 keys take about 0.04 s that way, and many
+seconds key by key.
 """
 
 from __future__ import annotations
@@ -12,10 +12,10 @@ import numpy as np
 from ...beyond_mocap.base.errors import InputError
 
 LINEAR = 1  # Keyframe.interpolation as foreach_set takes it
-GENERATED = 5  # Keyframe.type likewise: drawn dim in the editors
+GENERATED = 5  # Keyframe.type likewise: drawn dimmed in the editors
 
 PLACES = ("co", "handle_left", "handle_right")
-FIGURES = {  # what else a key has, and how foreach_get gives it
+FIGURES = {  # other properties of a key, with the type that foreach_get returns
     "interpolation": np.int32, "easing": np.int32, "type": np.int32, "handle_left_type": np.int32,
     "handle_right_type": np.int32, "amplitude": np.float32, "back": np.float32, "period": np.float32,
 }
@@ -23,11 +23,19 @@ FIGURES = {  # what else a key has, and how foreach_get gives it
 
 def animate(target: bpy.types.Object, name: str, frames: np.ndarray, channels: dict[str, tuple[str, np.ndarray]],
             generated: bool = False):
-    """Give `target` a new action `name` and return it.
+    """Create a new action and assign it to an object; the earlier action stays in the file.
 
-    frames: (F,) scene frames, rising. channels: data path -> (name of the curves' group, values (F, n), or (1, n) for
-    one key on the first frame). generated: whether the keys are to be told from hand-made ones by their type. The
-    action that was there before is kept in the file. InputError as `check_free`."""
+    Args:
+        target: the object.
+        name: of the action.
+        frames: (F,) scene frames, increasing.
+        channels: data path -> (name of the curves' group, values (F, n), or (1, n) for one key on the first frame).
+        generated: mark the keys by their type, to distinguish them from keys of the user.
+    Returns:
+        The action.
+    Raises:
+        InputError: as `check_editable`.
+    """
     check_free(target)
     action = bpy.data.actions.new(name)
     slot = action.slots.new(id_type=target.id_type, name=target.name)
@@ -51,8 +59,13 @@ def animate(target: bpy.types.Object, name: str, frames: np.ndarray, channels: d
 
 
 def rewrite(target: bpy.types.Object, frames: np.ndarray, channels: dict[str, np.ndarray]) -> None:
-    """Let the action that `target` plays have other keys, in place: data path -> values (F, n) at frames (F,), rising.
-    Paths without curves get no keys."""
+    """Replace the keys of the action that an object plays, in place; paths without curves get no keys.
+
+    Args:
+        target: the object.
+        frames: (F,) scene frames, increasing.
+        channels: data path -> values (F, n).
+    """
     found = curves(*playing(target))
     keys = np.empty((len(frames), 2), np.float32)
     keys[:, 0] = frames
@@ -72,7 +85,7 @@ def rewrite(target: bpy.types.Object, frames: np.ndarray, channels: dict[str, np
 
 
 def check_free(target: bpy.types.ID) -> None:
-    """InputError where an NLA strip is being tweaked: Blender lets nobody change the action then."""
+    """Raise InputError while an NLA strip is in tweak mode: Blender does not allow a change of the action then."""
     data = target.animation_data
     if data is not None and data.use_tweak_mode:
         raise InputError(target.name, "one of its NLA strips is in tweak mode", "an object whose action may change",
@@ -80,10 +93,12 @@ def check_free(target: bpy.types.ID) -> None:
 
 
 def assign(target: bpy.types.Object, action: bpy.types.Action, slot=None) -> None:
-    """Play `action` on `target`, by `slot` or the first that fits; the action before is kept, even if unused.
-    InputError as `check_free`."""
+    """Assign an action, by `slot` or the first that fits; the earlier action is kept, even if unused.
+
+    Raises InputError as `check_editable`.
+    """
     check_free(target)
-    bpy.context.view_layer.update()  # a slot given to an object that the depsgraph has not met yet crashes Blender
+    bpy.context.view_layer.update()  # assigning a slot to an object that is not in the depsgraph yet crashes Blender
     data = target.animation_data_create()
     if data.action is not None and data.action.users == 1:
         data.action.use_fake_user = True
@@ -92,10 +107,10 @@ def assign(target: bpy.types.Object, action: bpy.types.Action, slot=None) -> Non
 
 
 def discard(target: bpy.types.Object, mark: str) -> None:
-    """Take off and remove the action that `target` plays, if it carries the custom property `mark` and has no other
-    user.
+    """Remove the action that an object plays, if it has the custom property `mark` and no other user.
 
-    For results that are made again and again, so that they do not pile up in the file."""
+    Used for results that are regenerated often, so that they do not accumulate in the file.
+    """
     action, _ = playing(target)
     if action is not None and action.get(mark) and action.users - action.use_fake_user == 1:
         target.animation_data.action = None
@@ -103,7 +118,7 @@ def discard(target: bpy.types.Object, mark: str) -> None:
 
 
 def playing(target: bpy.types.Object):
-    """The action and slot that `target` plays; (None, None) where it plays none."""
+    """Return the action and slot that an object plays; (None, None) where it plays none."""
     data = target.animation_data
     if data is None or data.action is None or data.action_slot is None:
         return None, None
@@ -111,7 +126,7 @@ def playing(target: bpy.types.Object):
 
 
 def curves(action: bpy.types.Action, slot) -> dict[tuple[str, int], bpy.types.FCurve]:
-    """The curves of one slot by data path and array index."""
+    """Collect the curves of one slot by data path and array index."""
     found = {}
     for layer in action.layers:
         for strip in layer.strips:
@@ -121,7 +136,7 @@ def curves(action: bpy.types.Action, slot) -> dict[tuple[str, int], bpy.types.FC
 
 
 def remove_curve(action: bpy.types.Action, slot, curve: bpy.types.FCurve) -> None:
-    """Take a curve out of an action."""
+    """Remove a curve from an action."""
     for layer in action.layers:
         for strip in layer.strips:
             bag = strip.channelbag(slot)
@@ -131,7 +146,7 @@ def remove_curve(action: bpy.types.Action, slot, curve: bpy.types.FCurve) -> Non
 
 
 def keys_of(curve: bpy.types.FCurve) -> dict[str, np.ndarray]:
-    """All that the n keys of a curve have: PLACES (n, 2), FIGURES (n,)."""
+    """Read all properties of the n keys of a curve: PLACES (n, 2), FIGURES (n,)."""
     points, count = curve.keyframe_points, len(curve.keyframe_points)
     found = {}
     for name in PLACES:
@@ -145,7 +160,7 @@ def keys_of(curve: bpy.types.FCurve) -> dict[str, np.ndarray]:
 
 
 def put_keys(curve: bpy.types.FCurve, keys: dict[str, np.ndarray]) -> None:
-    """Let a curve without keys have those of `keys_of`, whose frames rise."""
+    """Write keys as `read_keys` returns them to a curve without keys; frames increase."""
     points = curve.keyframe_points
     points.add(len(keys["co"]))
     for name in ("handle_left_type", "handle_right_type", *PLACES, *(n for n in FIGURES if not n.startswith("handle"))):
@@ -153,20 +168,26 @@ def put_keys(curve: bpy.types.FCurve, keys: dict[str, np.ndarray]) -> None:
 
 
 def new_curve(action: bpy.types.Action, slot, path: str, index: int, group: str) -> bpy.types.FCurve:
-    """A curve that the action does not have yet."""
+    """Add a curve that the action does not have yet."""
     return _new_curve(_channelbag(action, slot), path, index, group)
 
 
 def chosen(keys: dict[str, np.ndarray], which: np.ndarray) -> dict[str, np.ndarray]:
-    """Those keys of a table that an index or mask picks."""
+    """Select keys of a table by an index or mask."""
     return {name: values[which] for name, values in keys.items()}
 
 
 def built(name: str, slot_name: str, tables: dict, like: dict):
-    """A new action `name` with one slot, and that slot.
+    """Build a new action with one slot.
 
-    tables: (data path, array index) -> keys as of `keys_of`. like: (data path, array index) -> a curve whose group,
-    extrapolation, lock and mute are taken over."""
+    Args:
+        name: of the action.
+        slot_name: of the slot.
+        tables: (data path, array index) -> keys as of `read_keys`.
+        models: (data path, array index) -> a curve whose group, extrapolation, lock and mute are copied.
+    Returns:
+        The action and its slot.
+    """
     action = bpy.data.actions.new(name)
     slot = action.slots.new(id_type="OBJECT", name=slot_name)
     bag = _channelbag(action, slot)
@@ -179,8 +200,10 @@ def built(name: str, slot_name: str, tables: dict, like: dict):
 
 
 def cut(whole: bpy.types.Action, slot, start: float, end: float, name: str):
-    """A new action with the keys between two frames, and two more on either side, so that its curves run between them
-    as the whole's do; and its slot."""
+    """Cut a new action from the keys between two frames; return it with its slot.
+
+    Two more keys on either side are kept, so that the curves between the frames stay the same.
+    """
     models, tables = curves(whole, slot), {}
     for place, curve in models.items():
         keys = keys_of(curve)
@@ -193,8 +216,10 @@ def cut(whole: bpy.types.Action, slot, start: float, end: float, name: str):
 
 
 def joined(parts: list, name: str, slot_name: str):
-    """A new action that plays (action, slot, start frame, end frame) one after the other, and its slot; on a frame that
-    two share the later one's key counts."""
+    """Join (action, slot, start frame, end frame) one after the other; return the new action and its slot.
+
+    On a shared frame the later part's key is used.
+    """
     tables, models = {}, {}
     for action, slot, start, end in parts:
         for place, curve in curves(action, slot).items():
@@ -209,7 +234,7 @@ def joined(parts: list, name: str, slot_name: str):
 
 
 def keyed_range(found: dict) -> tuple[int, int] | None:
-    """First and last whole frame between the outermost keys of curves from `curves`; None where there is no key."""
+    """Find the first and last whole frame between the outermost keys of curves; None without keys."""
     ends = [curve.range() for curve in found.values() if len(curve.keyframe_points)]
     if not ends:
         return None
@@ -217,7 +242,7 @@ def keyed_range(found: dict) -> tuple[int, int] | None:
 
 
 def sample(curve: bpy.types.FCurve, frames: np.ndarray) -> np.ndarray:
-    """The curve's values (F,) at scene frames (F,): keys where every frame has one, else evaluated by Blender."""
+    """Sample a curve's values (F,) at scene frames (F,): from the keys where every frame has one, else by Blender."""
     count = len(curve.keyframe_points)
     if not curve.modifiers and count >= len(frames):
         keys = np.empty(2 * count, np.float32)
@@ -230,7 +255,7 @@ def sample(curve: bpy.types.FCurve, frames: np.ndarray) -> np.ndarray:
 
 
 def check_local(*things: bpy.types.ID | None) -> None:
-    """InputError where one of these is linked from another file: what is written to it is lost with the next load."""
+    """Raise InputError where data is linked from another file: changes to it are lost when the file is loaded again."""
     for thing in things:
         if thing is not None and thing.library is not None:
             found = f"linked from {thing.library.filepath}"

@@ -1,12 +1,12 @@
-"""The one listener to Blender: its handlers, its timers, undo and redo, files, and the end of the extension.
+"""The only listener to Blender: its handlers, timers, undo and redo, files, and the end of the extension.
 
-A feature makes one `Watcher` at the top of its module: what it watches, and what it does then. Blender calls one
-handler for each kind of event, and one timer for each watcher that looks for itself. What raises is reported once, and
-everything else, and the next look too, goes on; the panel says so until the same succeeds. `unregister` takes all of it
-away.
+A feature creates one `Watcher` at the top of its module, with what it watches and what it does then. Blender calls one
+handler for each kind of event, and one timer for each watcher that polls. An exception is reported once; everything
+else, and the next poll, continues, and the panel shows the failure until the same action succeeds. `unregister` removes
+everything.
 
-Without a window Blender calls no timer, and what scripts edit is not watched: they ask for what they want. Undo, redo
-and files are followed there too.
+Without a window Blender calls no timer, and edits of scripts are not watched: scripts call what they need. Undo, redo
+and files are watched there too.
 """
 
 from __future__ import annotations
@@ -23,12 +23,13 @@ from bpy.app.handlers import persistent
 from ...beyond_mocap.base.errors import BeyondMocapError
 from . import window
 
-TICK, IDLE = 0.05, 0.4  # seconds between two looks: usually, and where there is no window or a look has failed
-RESTED = 0.15  # seconds without a change after which the user's hand rests
-HOLDING = ("TRANSFORM_OT", "CURVE_OT", "VIEW3D_OT_cursor3d")  # operators during which it does not
-BUSY_TICK, BUSY = 0.01, 0.5  # seconds between two looks until so many seconds after a change, where one follows a drag
-SHARE = 0.3  # of the time that following has taken is left to the window before the next look
-EVENTS = {  # Blender's handler -> what of a watcher it calls, with how many of Blender's arguments
+TICK, IDLE = 0.05, 0.4  # seconds between two polls: usually, and without a window or after a failure
+RESTED = 0.15  # seconds without a change after which the user is idle
+HOLDING = ("TRANSFORM_OT", "CURVE_OT", "VIEW3D_OT_cursor3d")  # operators during which the user is not idle
+# Seconds between two polls up to so many seconds after a change, for watchers that follow a drag.
+BUSY_TICK, BUSY = 0.01, 0.5
+SHARE = 0.3  # share of the time taken by an update that is left to the window before the next poll
+EVENTS = {  # Blender's handler -> the watcher's callback, and how many of Blender's arguments it gets
     "depsgraph_update_post": ("changed", 2), "frame_change_post": ("framed", 1), "undo_post": ("restored", 0),
     "redo_post": ("restored", 0), "load_post": ("loaded", 0), "load_pre": ("closing", 0), "save_pre": ("saving", 0),
 }
@@ -37,26 +38,33 @@ ANOTHER_STATE = {"restored", "loaded"}
 
 _watchers: list[Watcher] = []
 _handlers: list[tuple[str, Callable]] = []
-_timers: dict[Callable, Callable] = {}  # what is to be done -> the function that Blender calls for it
+_timers: dict[Callable, Callable] = {}  # action -> the function that Blender calls for it
 _reported: set[tuple] = set()
 
 
 @dataclass(eq=False, kw_only=True)
 class Watcher:
-    """What one feature watches, and what it does then. Of `follow`, `settle` and `look` it has one at most.
+    """What one feature watches, and what it does then. It has at most one of `follow`, `settle` and `look`.
 
-    name: what the user calls it, where it fails
-    matters: types of data; a change of such data marks the watcher
-    changed(scene, depsgraph), framed(scene): after each change, each change of frame; only with a window
-    restored(): undo or redo has brought back another state; it marks the watcher too, as a file that is opened does
-    loaded(), closing(), saving(): a file has been opened, is about to be closed, to be saved
-    follow(scene): once marked, brings each window's scene up to date, also while the user drags
-    settle(scene): once marked and the user's hand rests; whether to call it again though nothing changes
-    dragged(scene): in place of `settle` while the hand does not rest
-    held_by: names of operators, beside HOLDING, during which the hand does not rest
-    look(): called all the time; seconds until the next time
-    draws: (type of space, function, "POST_VIEW" or "POST_PIXEL") of what is drawn over its main regions
-    ends(): the extension is switched off: stop what runs, forget what was made"""
+    Attributes:
+        name: shown to the user if it fails.
+        watched_types: types of data; a change of such data marks the watcher.
+        changed: (scene, depsgraph), after each change; only with a window.
+        framed: (scene), after each change of frame; only with a window.
+        restored: after undo or redo, which also marks the watcher, as does opening a file.
+        loaded: after a file was opened.
+        closing: before a file is closed.
+        saving: before a file is saved.
+        follow: (scene), once marked, updates each window's scene, also while the user drags.
+        settle: (scene), once marked and the user is idle; returns whether to call it again without a change.
+        dragged: (scene), replaces `settle` while the user is not idle.
+        busy_operators: names of further operators during which the user is not idle.
+        look: called continuously; returns the seconds until the next call.
+        draws: (type of space, function, "POST_VIEW" or "POST_PIXEL") of overlays in its main regions.
+        ends: called when the extension is disabled: stop what runs, clear what was stored.
+        dirty: whether it is marked.
+        changed_at: time of the last change.
+    """
 
     name: str
     matters: tuple[type, ...] = ()
@@ -82,11 +90,16 @@ class Watcher:
         _watchers.append(self)
 
     def mark(self) -> None:
-        """Something has changed that may matter."""
+        """Mark the watcher: something that may matter has changed."""
         self.dirty, self.since = True, perf_counter()
 
     def hear(self, what: str, *arguments) -> None:
-        """Take in an event: `what` is one of the values of EVENTS."""
+        """Handle an event.
+
+        Args:
+            event: one of the values of EVENTS.
+            arguments: passed on.
+        """
         action = getattr(self, what)
         if action is not None:
             guard(self.name, lambda: action(*arguments), counts=not (self.look or self.follow or self.settle))
@@ -94,15 +107,18 @@ class Watcher:
             self.mark()
 
     def tick(self) -> float:
-        """One look by the timer; seconds until the next."""
+        """Poll once; return the seconds until the next poll."""
         act = self.look or (self._follow if self.follow else self._settle)
-        return guard(self.name, act, IDLE, counts=bool(self.look))  # the others count where there was something to do
+        return guard(self.name, act, IDLE, counts=bool(self.look))  # the others clear failures after work
 
     def _mark_what_matters(self, _scene, depsgraph) -> None:
         if any(isinstance(update.id, self.matters) for update in depsgraph.updates):
             self.mark()
 
     def _follow(self) -> float:
+        """Call `follow` for the scene of each window if the watcher is marked; return the seconds until the next
+        poll.
+        """
         if not self.dirty or bpy.app.is_job_running("RENDER"):
             return BUSY_TICK if perf_counter() - self.since < BUSY else TICK
         self.dirty, begun, scenes = False, perf_counter(), set()
@@ -115,6 +131,7 @@ class Watcher:
         return max(BUSY_TICK, SHARE * (perf_counter() - begun))
 
     def _settle(self) -> float:
+        """Call `settle` if the watcher is marked and the user is idle; return the seconds until the next poll."""
         shown = next(iter(bpy.context.window_manager.windows), None)
         if not self.dirty or shown is None or bpy.app.is_job_running("RENDER"):
             return TICK
@@ -124,31 +141,39 @@ class Watcher:
         elif perf_counter() - self.since > RESTED:
             self.dirty = False
             with bpy.context.temp_override(window=shown):
-                again = self.settle(shown.scene)  # which may mark it meanwhile
+                again = self.settle(shown.scene)  # may mark it again
             _take_back(f"{self.name} has failed")
             self.dirty = self.dirty or bool(again)
         return TICK
 
 
 def mark(name: str) -> None:
-    """Mark the watcher of this name. For modules that the watcher's own module imports."""
+    """Mark the watcher of this name, for modules that the watcher's own module imports."""
     next(watcher for watcher in _watchers if watcher.name == name).mark()
 
 
 def is_running(prefixes: tuple[str, ...]) -> bool:
-    """Whether an operator whose name begins with one of these runs in any window."""
+    """Return whether an operator whose name begins with one of these runs in any window."""
     windows = bpy.context.window_manager.windows
     return any(one.bl_idname.startswith(prefixes) for shown in windows for one in shown.modal_operators)
 
 
 def is_playing() -> bool:
-    """Whether the scene plays in any window."""
+    """Return whether the animation plays in any window."""
     return any(shown.screen.is_animation_playing for shown in bpy.context.window_manager.windows)
 
 
 def guard(name: str, action: Callable[[], Any], otherwise: Any = None, counts: bool = True) -> Any:
-    """What `action` returns; `otherwise` where it raises, which is reported once under this name. counts: whether the
-    panel stops saying so where it does not raise."""
+    """Call an action; report an exception once under this name.
+
+    Args:
+        name: of what runs.
+        action: the function.
+        fallback: returned after an exception.
+        clears_failure: whether success clears an earlier failure from the panel.
+    Returns:
+        What the action returns.
+    """
     try:
         result = action()
     except Exception as error:  # a timer that raises is never called again
@@ -160,13 +185,21 @@ def guard(name: str, action: Callable[[], Any], otherwise: Any = None, counts: b
 
 
 def attempt(action: Callable[[], Any], tell: Callable[[str], Any], failed: str) -> Any:
-    """What `action` returns. Where it raises, `tell` is called with the reason, or with `failed` where that is no
-    BeyondMocapError, which is reported too; then what `tell` returns."""
+    """Call an action; describe an exception.
+
+    Args:
+        action: the function.
+        describe: called with the reason of a BeyondMocapError, or with `failed` for any other exception, which is also
+            reported.
+        failed: message for an exception that is no BeyondMocapError.
+    Returns:
+        What the action returns, or after an exception what `describe` returns.
+    """
     try:
         result = action()
     except BeyondMocapError as error:
         return tell(str(error))
-    except Exception as error:  # one that fails must not keep the others from being looked at
+    except Exception as error:  # one failure must not stop the others
         _report(failed, error)
         return tell(_message(failed))
     _take_back(failed)
@@ -174,10 +207,12 @@ def attempt(action: Callable[[], Any], tell: Callable[[str], Any], failed: str) 
 
 
 def soon(action: Callable[[], float | None], seconds: float) -> None:
-    """Call `action` in so many seconds, and again as long as it returns seconds. Nothing happens where it is to be
-    called already, or without a window."""
+    """Call an action in so many seconds, and again as long as it returns seconds.
+
+    Nothing happens if it is scheduled already, or without a window.
+    """
     def call() -> float | None:
-        del _timers[action]  # it may be asked for again while it runs
+        del _timers[action]  # it may be scheduled again while it runs
         wait = guard(getattr(action, "__name__", "timer"), action)
         if wait is not None and action not in _timers:
             _timers[action] = call
@@ -190,7 +225,7 @@ def soon(action: Callable[[], float | None], seconds: float) -> None:
 
 
 def start_watching() -> None:
-    """Listen, draw and look from now on, for all watchers."""
+    """Start handlers, overlays and timers for all watchers."""
     for handler, (what, count) in EVENTS.items():
         if not (bpy.app.background and what in WITH_WINDOW):
             _handlers.append((handler, _handler(what, count)))
@@ -203,7 +238,7 @@ def start_watching() -> None:
 
 
 def stop_watching() -> None:
-    """Nothing is called any more, and nothing of ours is left in the windows; each watcher ends."""
+    """Stop all handlers and timers, remove overlays from the windows, and end each watcher."""
     while _handlers:
         handler, function = _handlers.pop()
         if function in getattr(bpy.app.handlers, handler):
@@ -221,6 +256,7 @@ def stop_watching() -> None:
 
 
 def _handler(what: str, count: int) -> Callable:
+    """Build the handler that passes an event to all watchers."""
     @persistent
     def call(*arguments):
         for watcher in _watchers:
@@ -230,7 +266,7 @@ def _handler(what: str, count: int) -> Callable:
 
 
 def _report(failed: str, error: Exception) -> None:
-    """Tell the panel that something `failed`, and print where; the same is printed once."""
+    """Show in the panel that something failed, and print the traceback; the same one is printed only once."""
     places = traceback.extract_tb(error.__traceback__)
     seen = (failed, type(error), places[-1].filename, places[-1].lineno)
     if seen not in _reported:
@@ -240,7 +276,7 @@ def _report(failed: str, error: Exception) -> None:
 
 
 def _take_back(failed: str) -> None:
-    """The panel says no more that something `failed`, since it has succeeded."""
+    """Clear a failure from the panel once the action succeeds."""
     work = bpy.context.window_manager.beyond_mocap_work
     if work.trouble == _message(failed):
         work.trouble = ""

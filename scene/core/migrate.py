@@ -1,8 +1,7 @@
-"""Files that an earlier version of the extension has saved: what they hold is brought into today's form when they are
-opened, scene by scene, by the version number that each scene's settings keep.
+"""Migrate files of earlier versions when they are opened, scene by scene, by the version in each scene's settings.
 
-Everything here may run again on data that is already in today's form and then changes nothing. What would need other
-files (a track, a text on disk) is not done here: Bring to the Timeline does it when the user asks for it.
+Every step can run again on migrated data without changing it. What needs other files (a track, a text on disk) is not
+done here, but by Bring to the Timeline when the user asks for it.
 """
 
 from __future__ import annotations
@@ -14,11 +13,11 @@ from . import channels
 from .live import Watcher
 from .settings import BeyondMocapSettings
 
-VERSION = 1  # 0: before the editor, when no number was kept yet; also a scene that has not been saved
+VERSION = 1  # 0: before the editor, without a number; also a scene that has not been saved
 
 
 def bring_up(scene: bpy.types.Scene) -> None:
-    """Bring one scene's settings from the version that they were saved with to today's."""
+    """Migrate one scene's settings from the version they were saved with."""
     settings = scene.beyond_mocap
     if settings.version < 1:
         _know_bodies(settings)
@@ -26,7 +25,7 @@ def bring_up(scene: bpy.types.Scene) -> None:
 
 
 def _know_bodies(settings: BeyondMocapSettings) -> None:
-    """From 0: a body that plays what Bake wrote is an accepted result."""
+    """From version 0: a body that plays what Bake wrote is an accepted result."""
     for player in settings.players:
         if player.body is None or player.result.state != "NONE":
             continue
@@ -36,17 +35,17 @@ def _know_bodies(settings: BeyondMocapSettings) -> None:
 
 
 def on_load() -> None:
-    """A file has been opened: nothing can be undone yet, so that this is no step of its own."""
+    """Migrate an opened file; there is no undo history yet, so this adds no step."""
     for scene in bpy.data.scenes:
         if scene.library is None:
             bring_up(scene)
 
 
 def on_save() -> None:
-    """Scenes that were made since are of today's form."""
+    """Set the version of scenes that were added since."""
     for scene in bpy.data.scenes:
         if scene.library is None and scene.beyond_mocap.version != VERSION:
             scene.beyond_mocap.version = VERSION
 
 
-WATCHER = Watcher(name="Files of earlier versions", loaded=on_load, saving=on_save)
+WATCHER = Watcher(name="Migration of older files", loaded=on_load, saving=on_save)

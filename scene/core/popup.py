@@ -1,7 +1,7 @@
-"""The menu of words as it is drawn at the pointer while annotating: rows of digit, word, and the nearest that the
-library has instead; laid out within the editor, in several columns where it is low.
+"""The label menu at the pointer during annotation: rows of a digit, a label, and the nearest that the library has.
 
-Everything is in pixels of the region, from its lower left corner. `laid_out` needs no window.
+The menu is placed within the editor, in several columns where there is little height. Units are pixels of the region,
+from its lower left corner. `place_menu` needs no window.
 """
 
 from __future__ import annotations
@@ -17,15 +17,23 @@ from ...beyond_mocap.annotation.decision import can_skip, instead_of, served
 
 Rect = tuple[float, float, float, float]
 
-_ROW, _EDGE, _GAP = 1.65, 0.7, 0.8  # of the letters' size: height of a row, edge of the box, between columns
-_OFF_POINTER = 1.2
+_ROW, _EDGE, _GAP = 1.65, 0.7, 0.8  # shares of the font size: height of a row, edge of the box, column gap
+_OFF_POINTER = 1.2  # share of the font size between pointer and box
 _ARROW = "\u2192"
 
 
 @dataclass(frozen=True)
 class Row:
-    """One option. key: what to press. note: what the library has instead. word: for the mouse. faint: the library
-    cannot serve it. chosen: it is among the words already."""
+    """One option.
+
+    Attributes:
+        key: what to press.
+        text: the label as drawn.
+        note: the nearest that the library has.
+        word: the label, for the mouse.
+        faint: whether the library cannot serve it.
+        chosen: whether it is among the chosen labels.
+    """
 
     key: str
     text: str
@@ -37,7 +45,13 @@ class Row:
 
 @dataclass(frozen=True)
 class Content:
-    """What stands in the menu: a line above (who, which words, when), the options, hints below."""
+    """The contents of the menu.
+
+    Attributes:
+        head: line above (player, labels, time).
+        rows: the options.
+        foot: hints below.
+    """
 
     head: str
     rows: tuple[Row, ...]
@@ -46,8 +60,17 @@ class Content:
 
 @dataclass(frozen=True)
 class Box:
-    """The menu in place. box, and for each row its place; columns: x of key, text and note in each; size: of the
-    letters in pixels."""
+    """The menu in place, in pixels.
+
+    Attributes:
+        content: what it shows.
+        box: left, bottom, right, top.
+        rows: the same for each row.
+        head: place of the line above.
+        foot: places of the hints.
+        offsets: x of text and of note within a row.
+        size: font size.
+    """
 
     content: Content
     box: Rect
@@ -58,7 +81,7 @@ class Box:
     size: float
 
     def word_at(self, x: float, y: float) -> str | None:
-        """The word of the row at this place; "" elsewhere in the box, None outside."""
+        """Return the label of the row at this place; "" elsewhere in the box, None outside."""
         for row, rect in zip(self.content.rows, self.rows):
             if _inside(rect, x, y):
                 return row.word
@@ -66,7 +89,16 @@ class Box:
 
 
 def content(state: State, who: str, told: str = "", folded: bool = False) -> Content:
-    """What the menu says in a state. told: what was done last; folded: no list before a first word is chosen."""
+    """Build the contents for a state.
+
+    Args:
+        state: of the annotation.
+        player: the player's name.
+        message: on what was done last.
+        folded: show no list before a first label is chosen.
+    Returns:
+        The contents.
+    """
     rows = tuple(Row(str(option.digit), option.word, f"{_ARROW} {' '.join(option.instead)}" if option.instead else "",
                      word=option.word, faint=not option.served, chosen=option.chosen)
                  for option in state.shown)
@@ -89,13 +121,23 @@ def content(state: State, who: str, told: str = "", folded: bool = False) -> Con
 
 def laid_out(content: Content, at: tuple[float, float] | None, free: Rect, size: float,
              width_of: Callable[[str], float]) -> Box:
-    """The menu with its upper left corner by the pointer `at` (None: in the lower left corner of `free`), moved to lie
-    within `free`. size: of the letters; width_of: pixels that a text takes."""
+    """Place the menu within a free rectangle.
+
+    Args:
+        content: what it shows.
+        at: the pointer, at which the upper left corner goes; None for the lower left corner of `free`.
+        free: left, bottom, right, top of the free part of the region.
+        size: font size.
+        width_of: returns the width of a text.
+    Returns:
+        The menu in place.
+    """
     row, edge, gap = round(_ROW * size), round(_EDGE * size), round(_GAP * size)
     key = max((width_of(one.key) for one in content.rows), default=0.0) + gap
     text = max((width_of(one.text) for one in content.rows), default=0.0) + gap
     note = max((width_of(one.note) for one in content.rows), default=0.0)
     lines = 1 + len(content.foot)
+    # rows that fit below the head and above the hints; more rows go to further columns
     per_column = max(1, int((free[3] - free[1] - 2 * edge) / row) - lines)
     columns = max(1, -(-len(content.rows) // per_column))
     tallest = -(-len(content.rows) // columns) if content.rows else 0
@@ -115,13 +157,13 @@ def laid_out(content: Content, at: tuple[float, float] | None, free: Rect, size:
 
 
 def letters() -> float:
-    """Pixels of the interface's letters."""
+    """Return the font size of the interface in pixels."""
     preferences = bpy.context.preferences
     return preferences.ui_styles[0].widget.points * preferences.system.ui_scale
 
 
 def width_of(text: str) -> float:
-    """Pixels that a text takes in the interface's letters."""
+    """Return the width of a text in the interface's font, in pixels."""
     import blf
 
     blf.size(0, letters())
@@ -129,7 +171,7 @@ def width_of(text: str) -> float:
 
 
 def draw(box: Box, hovered: str = "") -> None:
-    """Draw the menu into the region that is drawn just now; hovered: the word under the mouse."""
+    """Draw the menu into the present region; `hovered` is the label under the mouse."""
     import gpu
 
     theme = bpy.context.preferences.themes[0].user_interface
@@ -152,7 +194,7 @@ def draw(box: Box, hovered: str = "") -> None:
 
 
 def _corner(at, free: Rect, wide: float, tall: float, away: float) -> tuple[float, float]:
-    """Left and top of the box."""
+    """Return left and top of the box: beside the pointer, on its other side at the right edge, always within `free`."""
     left, top = (free[0], free[1] + tall) if at is None else (at[0] + away, at[1] - away)
     if at is not None and left + wide > free[2] and at[0] - away - wide >= free[0]:
         left = at[0] - away - wide
@@ -164,6 +206,7 @@ def _inside(rect: Rect, x: float, y: float) -> bool:
 
 
 def _fill(rect: Rect, color: Sequence[float]) -> None:
+    """Draw a filled rectangle."""
     import gpu
     from gpu_extras.batch import batch_for_shader
 
@@ -176,7 +219,7 @@ def _fill(rect: Rect, color: Sequence[float]) -> None:
 
 
 def _write(text: str, x: float, y: float, color: Sequence[float], box: Box) -> None:
-    """Text on the base line of the row whose lower edge is `y`, cut off at the box's right edge."""
+    """Draw text on the baseline of the row with lower edge `y`, clipped at the box's right edge."""
     import blf
 
     blf.size(0, box.size)

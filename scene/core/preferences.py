@@ -1,6 +1,6 @@
-"""What a user sets once for all files, in Blender's preferences under Add-ons > Beyond Mocap.
+"""The user's settings for all files, in Blender's preferences under Add-ons > Beyond Mocap.
 
-Everything works without them too (an extension that is switched on by a script alone has none): then the defaults hold.
+Without them (an extension that a script enables has none), the defaults apply.
 """
 
 from __future__ import annotations
@@ -21,20 +21,20 @@ class Preferences:
 
 
 def get() -> "Preferences | None":
-    """The user's preferences; None where the extension has none."""
+    """Return the user's preferences; None where the extension has none."""
     addon = bpy.context.preferences.addons.get(EXTENSION)
     return addon.preferences if addon is not None else None
 
 
 def threads() -> int:
-    """How many threads may be used, at least one."""
+    """Return how many threads may be used, at least one."""
     chosen = get()
     return (chosen.threads if chosen else 0) or os.cpu_count() or 1
 
 
 def cache_folder(library_folder: str) -> str | None:
-    """Where the library of that folder is kept; None means beside its recordings."""
-    from ...beyond_mocap.library import cache  # slow to import, and switching the extension on has to be quick
+    """Return where the library of a folder is cached; None for beside its recordings."""
+    from ...beyond_mocap.library import cache  # slow to import, and enabling the extension must be quick
 
     chosen = get()
     if not chosen or not chosen.cache_folder:
@@ -43,5 +43,5 @@ def cache_folder(library_folder: str) -> str | None:
 
 
 def for_build(library_folder: str) -> dict:
-    """What the preferences say to the core's `library.build`, as its arguments."""
+    """Return the arguments of the core's `library.build` that the preferences set."""
     return {"cache_dir": cache_folder(library_folder), "threads": threads()}

@@ -17,7 +17,9 @@ _MAKERS = {bool: BoolProperty, int: IntProperty, float: FloatProperty, str: Stri
 
 
 def with_settings(*groups: str, **callbacks: Callable) -> Callable[[type], type]:
-    """A class decorator that gives a class the properties of groups of settings; callbacks: such as `update`."""
+    """Return a class decorator that adds the properties of groups of settings; callbacks are arguments such as
+    `update`.
+    """
 
     def add(cls: type) -> type:
         made = {row.identifier: property_of(row, **callbacks) for row in _shown(groups)}
@@ -28,7 +30,7 @@ def with_settings(*groups: str, **callbacks: Callable) -> Callable[[type], type]
 
 
 def property_of(row: Setting, **more):
-    """A setting as a property of bpy, with further arguments."""
+    """Build a property of bpy from a setting, with further arguments."""
     arguments = {
         "name": row.title, "description": row.tooltip, "default": row.default or None, "min": row.least,
         "max": row.most, "precision": row.precision, "unit": "TIME_ABSOLUTE" if row.unit == "seconds" else None,
@@ -43,15 +45,23 @@ def property_of(row: Setting, **more):
 
 
 def property_values(record: type, properties: bpy.types.PropertyGroup, *groups: str) -> dict[str, object]:
-    """What the properties say about fields of the dataclass `record`, in groups of settings."""
+    """Read the values for the fields of a dataclass from properties.
+
+    Args:
+        record: the dataclass.
+        properties: the property group.
+        groups: groups of settings.
+    Returns:
+        Field name -> value.
+    """
     return collect(record, _shown(groups), lambda row: getattr(properties, row.identifier))
 
 
 def active_row(rows, number: int):
-    """The row of a list that is picked; None while the list is empty."""
+    """Return the active row of a list; None while the list is empty."""
     return rows[number] if 0 <= number < len(rows) else None
 
 
 def _shown(groups: tuple[str, ...]) -> list[Setting]:
-    """The settings of groups that panels have."""
+    """List the settings of groups that panels show."""
     return [row for group in groups for row in rows_of(group) if row.tooltip]

@@ -1,8 +1,8 @@
-"""Registers whatever the modules of a package define: no list of classes has to be kept anywhere.
+"""Register everything that the modules of a package define: there is no list of classes to maintain.
 
-A class is registered because it is a Blender class that a module defines; one that Blender's own data carries says so
-in `attached_to` ("Scene.beyond_mocap"). A module that has to do more has a function `register()`, `unregister()` or
-both. A package that has `register()` in its `__init__` looks after its own modules.
+A class is registered because it is a Blender class that a module defines; one that is attached to Blender's own data
+says so in `attached_to` ("Scene.beyond_mocap"). A module that needs more has a function `register()`, `unregister()` or
+both. A package with `register()` in its `__init__` handles its own modules.
 """
 
 from __future__ import annotations
@@ -22,7 +22,8 @@ _undoing: dict[str, list[Callable[[], None]]] = {}
 
 
 def register_package(package: str) -> None:
-    """Register all that a package's modules define; where a step fails, undo those before it and pass the error on.
+    """Register everything that a package's modules define; if a step fails, undo those before it and raise the error
+    again.
 
     Args:
         package: its full name, `__name__` in its `__init__`.
@@ -38,14 +39,20 @@ def register_package(package: str) -> None:
 
 
 def unregister_package(package: str) -> None:
-    """Undo what `register_package` did, the last step first."""
+    """Undo `register_package`, the last step first."""
     undoing = _undoing.pop(package)
     while undoing:
         undoing.pop()()
 
 
 def in_order(classes: Iterable[type]) -> list[type]:
-    """Classes by kind, else as they come, but each after those that it needs."""
+    """Sort classes by kind, each after those that it needs.
+
+    Args:
+        classes: the classes.
+    Returns:
+        The classes in the order of registration.
+    """
     classes = sorted(classes, key=lambda cls: next(n for n, kind in enumerate(KINDS) if issubclass(cls, kind)))
     ordered: dict[type, None] = {}
 
@@ -60,7 +67,9 @@ def in_order(classes: Iterable[type]) -> list[type]:
 
 
 def _steps(package: str) -> Iterator[tuple[Callable[[], None], Callable[[], None]]]:
-    """Pairs of what to do and what undoes it: classes, their places in Blender's data, then the modules' own hooks."""
+    """Iterate over pairs of a step and its undo: classes, their places in Blender's data, then the modules' own
+    hooks.
+    """
     modules = list(_modules(import_module(package)))
     classes = in_order(cls for module in modules for cls in _classes(module))
     for cls in classes:
@@ -75,7 +84,7 @@ def _steps(package: str) -> Iterator[tuple[Callable[[], None], Callable[[], None
 
 
 def _modules(package: ModuleType) -> Iterator[ModuleType]:
-    """The modules below a package by name; of a package that registers itself only that."""
+    """Iterate over the modules below a package by name; of a package that registers itself, only that package."""
     for found in sorted(iter_modules(package.__path__), key=lambda found: found.name):
         module = import_module(f"{package.__name__}.{found.name}")
         yield module
@@ -84,13 +93,13 @@ def _modules(package: ModuleType) -> Iterator[ModuleType]:
 
 
 def _classes(module: ModuleType) -> list[type]:
-    """The Blender classes that a module defines, in the order of its lines."""
+    """List the Blender classes that a module defines, in the order of its lines."""
     defined = [thing for thing in vars(module).values() if isinstance(thing, type)]
     return [cls for cls in defined if cls.__module__ == module.__name__ and issubclass(cls, KINDS)]
 
 
 def _needs(cls: type, classes: list[type]) -> list[type]:
-    """Which of the classes have to be registered before this one: what its properties point to, or a panel's parent."""
+    """List the classes that must be registered before this one: targets of its properties, or a panel's parent."""
     if issubclass(cls, bpy.types.PropertyGroup):
         pointed = [getattr(hint, "keywords", {}).get("type") for hint in get_type_hints(cls).values()]
         return [other for other in classes if other in pointed]
@@ -102,4 +111,4 @@ def _attach(owner: type, name: str, cls: type) -> None:
 
 
 def _nothing() -> None:
-    """The hook that a module does not have."""
+    """Do nothing, for a module without a hook."""

@@ -1,5 +1,6 @@
-"""Put aside and brought back exactly: what an object plays (action, slot, NLA, how it stands), and the user's scene for
-work that needs Blender's importers, exporters or modes."""
+"""Save and restore exactly what an object plays (action, slot, NLA, pose), and the user's scene for work that needs
+Blender's importers, exporters or modes.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +16,7 @@ STANDS = ("location", "rotation_quaternion", "rotation_euler", "rotation_axis_an
 
 
 def put_aside(before: BeyondMocapBefore, target: bpy.types.Object) -> None:
-    """Keep what `target` plays and let it play nothing: its action comes off, its NLA tracks fall silent."""
+    """Save what an object plays, and let it play nothing: its action is removed from it, its NLA tracks are off."""
     before.kept, before.made = True, False
     before.stance = json.dumps(stance_of(target))
     data = target.animation_data
@@ -32,8 +33,10 @@ def put_aside(before: BeyondMocapBefore, target: bpy.types.Object) -> None:
 
 
 def bring_back(before: BeyondMocapBefore, target: bpy.types.Object, mark: str) -> None:
-    """Let `target` play and stand as before it was put aside; an action of ours that it plays now, told by the custom
-    property `mark`, is removed, another one stays in the file."""
+    """Restore what an object played and its pose.
+
+    An action with the custom property `mark` that it plays now is removed; another one stays in the file.
+    """
     channels.discard(target, mark)
     now, _ = channels.playing(target)
     if now is not None and now != before.action and now.users == 1:
@@ -54,20 +57,20 @@ def bring_back(before: BeyondMocapBefore, target: bpy.types.Object, mark: str) -
 
 
 def play_as_before(before: BeyondMocapBefore, data: bpy.types.AnimData) -> None:
-    """NLA, influence and blending as they were."""
+    """Restore NLA, influence and blending."""
     data.use_nla, data.action_influence = before.use_nla, before.influence
     data.action_blend_type, data.action_extrapolation = before.blend, before.extrapolation
 
 
 def clear(before: BeyondMocapBefore) -> None:
-    """Keep nothing any more."""
+    """Clear what was saved."""
     for name in ("kept", "made", "animated", "action", "slot", "use_nla", "influence", "blend", "extrapolation",
                  "stance"):
         before.property_unset(name)
 
 
 def drop(before: BeyondMocapBefore, mark: str) -> None:
-    """Nothing will be brought back: an action of ours that nobody else uses is removed, others stay in the file."""
+    """Clear what was saved without restoring it; an unused action with `mark` is removed, others stay in the file."""
     action = before.action
     clear(before)
     if action is not None:
@@ -75,7 +78,7 @@ def drop(before: BeyondMocapBefore, mark: str) -> None:
 
 
 def purge_action(action: bpy.types.Action, mark: str) -> None:
-    """Remove an action that carries `mark` and has no user; one without the mark stays in the file."""
+    """Remove an action with `mark` and no user; one without the mark stays in the file."""
     if action.users - action.use_fake_user:
         return
     if action.get(mark):
@@ -85,13 +88,15 @@ def purge_action(action: bpy.types.Action, mark: str) -> None:
 
 
 def stance_of(target: bpy.types.Object) -> dict:
-    """How an object and its bones stand: name ("" for the object) -> rotation mode and STANDS."""
+    """Read the transforms of an object and its bones: name ("" for the object) -> rotation mode and transform
+    properties.
+    """
     bones = target.pose.bones if target.pose is not None else ()
     return {"": _stands(target), **{f"{bone.name}": _stands(bone) for bone in bones}}
 
 
 def stand(target: bpy.types.Object, stance: dict) -> None:
-    """Let object and bones stand as `stance_of` said."""
+    """Apply the transforms that `read_stance` returned."""
     for name, (mode, *values) in stance.items():
         thing = target if not name else target.pose.bones.get(name)
         if thing is None:
@@ -103,8 +108,10 @@ def stand(target: bpy.types.Object, stance: dict) -> None:
 
 @contextmanager
 def scene_aside(name: str):
-    """A new scene, in the window where there is one, else in the context; all data that comes in meanwhile is removed
-    at the end, and the scene and view layer from before are shown again."""
+    """Use a temporary scene, in the window where there is one, else in the context.
+
+    All data that is added meanwhile is removed at the end, and the earlier scene and view layer are shown again.
+    """
     before, window = set(_all_data()), bpy.context.window
     home, layer = (window.scene, window.view_layer.name) if window is not None else (None, "")
     scene = bpy.data.scenes.new(name)
@@ -125,11 +132,12 @@ def scene_aside(name: str):
 
 
 def _stands(thing) -> list:
+    """Read the transform of an object or bone."""
     return [thing.rotation_mode, *(list(getattr(thing, name)) for name in STANDS)]
 
 
 def _all_data() -> dict:
-    """All that the file holds, by identity: newer Blenders list the same things under several names."""
+    """Return all data of the file by identity; newer Blender versions list some data under several names."""
     found = {}
     for name in dir(bpy.data):
         kind = getattr(bpy.data, name)

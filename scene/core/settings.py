@@ -1,6 +1,6 @@
-"""What the panels show and the operators read: one group of settings per scene, saved with the file.
+"""The settings that panels show and operators read: one group for each scene, saved with the file.
 
-Paths may be relative to the file. What is too large for a file's properties (a built library, a take) lives in
+Paths may be relative to the file. What is too large for a file's properties (a built library, a take) is stored in
 `session` under the names kept here.
 """
 
@@ -21,17 +21,17 @@ FILE = {"subtype": "FILE_PATH", "options": {"PATH_SUPPORTS_BLEND_RELATIVE"}}
 
 
 def is_armature(_settings, candidate: bpy.types.Object) -> bool:
-    """Whether an object may be picked as a player's body."""
+    """Return whether an object may be picked as a player's body."""
     return candidate.type == "ARMATURE"
 
 
 def is_track(_settings, candidate: bpy.types.Object) -> bool:
-    """Whether an object may be picked as a player's drawn track."""
+    """Return whether an object may be picked as a player's drawn track."""
     return candidate.type in {"CURVE", "EMPTY", "MESH", "ARMATURE"}
 
 
 def show_on_dot(player, _context) -> None:
-    """A player's new name or colour is his dot's too."""
+    """Apply a player's new name or colour to their dot."""
     if player.dot is not None:
         player.dot.name, player.dot.color = f"{player.name} dot", (*player.shirt, 1.0)
         player.dot.beyond_mocap_dot.player, player.dot.beyond_mocap_dot.shirt = player.name, player.shirt
@@ -39,97 +39,98 @@ def show_on_dot(player, _context) -> None:
 
 @with_settings("player")
 class BeyondMocapPlayer(bpy.types.PropertyGroup):
-    """One player: the dots, the words, and the body that came of them."""
+    """One player: tracking data, labels, and the generated body."""
 
-    name: StringProperty(name="Name", update=show_on_dot, description="What this player is called")
+    name: StringProperty(name="Name", update=show_on_dot, description="Name of the player")
     use: BoolProperty(name="Use", default=True, description="Include this player in Synthesize and Accept")
     tracking_file: StringProperty(name="Tracking", description="The file with this player's positions", **FILE)
     metadata_file: StringProperty(name="Metadata", **FILE,
                                   description="The provider's second file, where there is one (pitch, teams)")
-    feed_id: StringProperty(name="ID in the feed",
-                            description="Which player of the tracking file this is; empty for a file of one player")
-    provider: StringProperty(name="Provider", description="Whose form the tracking file has; empty guesses it")
+    feed_id: StringProperty(name="Feed ID",
+                            description="ID of this player in the tracking file; empty for a file of one player")
+    provider: StringProperty(name="Provider", description="Format of the tracking file; empty detects it")
     drawn_track: PointerProperty(
         name="Drawn Track", type=bpy.types.Object, poll=is_track,
-        description="A curve with speeds at its points, or an object that moves; it counts more than the tracking file",
+        description="A curve with speeds at its points, or a moving object; it replaces the tracking file",
     )
-    pins: CollectionProperty(type=BeyondMocapPin, description="Where hands, feet and gaze have to be, and when")
-    active_pin: IntProperty(name="Pin", min=0, description="The pin that is shown below the list")
+    pins: CollectionProperty(type=BeyondMocapPin, description="Targets for hands, feet and gaze, with their times")
+    active_pin: IntProperty(name="Pin", min=0, description="The pin shown below the list")
     annotation_file: StringProperty(
-        name="Words", **FILE,
-        description="Text file of lines 'START END words' and 'TIME words'; none means automatic locomotion",
+        name="Labels", **FILE,
+        description="Text file of lines 'START END labels' and 'TIME labels'; none means automatic locomotion",
     )
     annotation_text: PointerProperty(name="Text", type=bpy.types.Text,
-                                     description="A text of this file with the words; it counts more than the file "
+                                     description="A text of this file with the labels; it replaces the file "
                                      "on disk")
     shirt: bpy.props.FloatVectorProperty(name="Shirt", subtype="COLOR", size=3, min=0.0, max=1.0, update=show_on_dot,
                                          default=(0.75, 0.05, 0.06), description="Colour of the player's shirt")
     dot: PointerProperty(name="Dot", type=bpy.types.Object,
-                         description="The Empty that runs along the track and carries the strips of the player's words")
+                         description="The empty that moves along the track and has the strips of the player's labels")
     body: PointerProperty(name="Body", type=bpy.types.Object, poll=is_armature,
-                          description="The armature that this player's takes are shown on; made where it is missing")
+                          description="The armature that plays this player's takes; created where it is missing")
     rig: PointerProperty(
         name="Rig", type=bpy.types.Object, poll=is_armature,
-        description="This player's own rig for Bake to Rig with all players; a copy of the chosen rig where it is "
-        "empty",
+        description="This player's own rig for Bake to Rig with all players; empty uses a copy of the chosen "
+        "rig",
     )
     take: StringProperty(name="Take", options={"HIDDEN"}, description="Name of the newest take in this session")
     quality: StringProperty(name="Quality", options={"HIDDEN"}, description="Lines 'name: value' about the newest take")
-    moments: StringProperty(name="Key moments", options={"HIDDEN"},
-                            description="A line for each key moment of the newest take")
+    moments: StringProperty(name="Key Moments", options={"HIDDEN"},
+                            description="One line for each key moment of the newest take")
     warnings: StringProperty(name="Warnings", options={"HIDDEN"},
-                             description="Lines about what to look at in the newest take")
-    result: PointerProperty(type=BeyondMocapResult, description="What became of the newest take")
+                             description="Warnings about the newest take, line by line")
+    result: PointerProperty(type=BeyondMocapResult, description="State of the newest take")
 
 
 @with_settings("synthesis", "result", "library", "path.new_curve")
 @with_settings("clock", update=renew)
 class BeyondMocapSettings(bpy.types.PropertyGroup):
-    """All steps of one scene."""
+    """The settings of one scene, for all steps."""
 
     attached_to = ("Scene.beyond_mocap",)
     version: IntProperty(name="Version", options={"HIDDEN"},
-                         description="Form of what is kept here, see scene/core/migrate.py; 0: not saved yet")
+                         description="Version of these settings, see scene/core/migrate.py; 0: not saved yet")
     rig: PointerProperty(type=BeyondMocapRig, description="Rig, bone map, baking and export")
     library_folder: StringProperty(
         name="Library", subtype="DIR_PATH", options={"PATH_SUPPORTS_BLEND_RELATIVE"},
         description="Folder of BVH clips with their annotations; may be relative to this file",
     )
     words_model: StringProperty(
-        name="Learned Words", **FILE,
-        description="What Learn from Words has kept, of this library or another; empty: Propose Words goes by rules",
+        name="Learned Labels", **FILE,
+        description="Model learned from the labels of this or another library; empty: proposals follow rules",
     )
-    library_holds: StringProperty(name="Holds", options={"HIDDEN"}, description="What the library built last holds")
-    players: CollectionProperty(type=BeyondMocapPlayer, description="Who is animated, in the order of the list")
-    active_player: IntProperty(name="Player", min=0, description="The player that is shown below the list")
+    library_holds: StringProperty(name="Contents", options={"HIDDEN"},
+                                  description="Contents of the library that was built last")
+    players: CollectionProperty(type=BeyondMocapPlayer, description="The players to animate, in the order of the list")
+    active_player: IntProperty(name="Player", min=0, description="The player shown below the list")
     video: PointerProperty(type=BeyondMocapVideo, description="The reference video")
-    shared: PointerProperty(type=BeyondMocapShared, description="What all players' previews have in common")
-    view: PointerProperty(type=BeyondMocapView, description="What is drawn over the 3D view")
+    shared: PointerProperty(type=BeyondMocapShared, description="What the previews of all players share")
+    view: PointerProperty(type=BeyondMocapView, description="Overlays in the 3D view")
 
     def list_tuning(self) -> list[str]:
-        """Names of the settings that the panel lists under Fine Tuning."""
+        """List the names of the settings under Fine Tuning."""
         return [row.identifier for row in rows_of("synthesis") if row.tuning in ("any", self.method)]
 
 
 class BeyondMocapWork(bpy.types.PropertyGroup):
-    """What runs in the background just now; on the window manager, so that undo leaves it alone."""
+    """What runs in the background; on the window manager, so that undo does not affect it."""
 
     attached_to = ("WindowManager.beyond_mocap_work",)
     kind: StringProperty(description="Name of the running step; empty while nothing runs")
-    text: StringProperty(description="What it is doing")
-    fraction: FloatProperty(min=0.0, max=1.0, description="How far it is")
-    waiting: StringProperty(description="The players that wait for their turn, a line each")
-    ending: BoolProperty(description="Whether it has been asked to finish early")
-    trouble: StringProperty(description="What that looks by itself has failed; empty where nothing has")
+    text: StringProperty(description="Present step of the work")
+    fraction: FloatProperty(min=0.0, max=1.0, description="Share of the work that is done")
+    waiting: StringProperty(description="The players that wait for their turn, one line each")
+    ending: BoolProperty(description="Whether it was asked to finish early")
+    trouble: StringProperty(description="Background update that failed; empty where none did")
 
 
 def absolute(path: str) -> str:
-    """A path as typed into a setting, made absolute; empty stays empty."""
+    """Return a path from a setting as an absolute one; empty stays empty."""
     return bpy.path.abspath(path) if path else ""
 
 
 def as_setting(path: str) -> str:
-    """A chosen path as it is kept: relative to the file where it is saved and the user's preferences say so."""
+    """Return a chosen path as it is stored: relative to a saved file where the user's preferences say so."""
     if bpy.data.is_saved and bpy.context.preferences.filepaths.use_relative_paths:
         try:
             return bpy.path.relpath(path)
@@ -139,5 +140,5 @@ def as_setting(path: str) -> str:
 
 
 def active_player(settings: BeyondMocapSettings) -> BeyondMocapPlayer | None:
-    """The player chosen in the list; None while the list is empty."""
+    """Return the player chosen in the list; None while the list is empty."""
     return active_row(settings.players, settings.active_player)

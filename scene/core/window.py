@@ -1,5 +1,7 @@
-"""Blender's windows: their editors, what is selected in them, and what is hung over them: drawing, the line in the
-status bar, the clocks of operators that run. What is still there when the extension is switched off goes with it."""
+"""Blender's windows: editors, selection, overlays, the line in the status bar, and timers of running operators.
+
+Whatever is left when the extension is disabled is removed.
+"""
 
 from __future__ import annotations
 
@@ -12,21 +14,20 @@ _clocks: list[bpy.types.Timer] = []
 
 
 def draw(space: type, function: Callable[[], None], when: str = "POST_PIXEL") -> None:
-    """Call `function` from now on whenever the main region of such a space is drawn; never without a window."""
+    """Call a function whenever the main region of such a space is drawn; never without a window."""
     if not bpy.app.background:
         _drawn.append((space, function, space.draw_handler_add(function, (), "WINDOW", when)))
 
 
 def undraw(function: Callable[[], None]) -> None:
-    """Call it no more, in no space."""
+    """Remove a draw function from all spaces."""
     for one in [one for one in _drawn if one[1] == function]:
         one[0].draw_handler_remove(one[2], "WINDOW")
         _drawn.remove(one)
 
 
 def redraw(*kinds: str) -> None:
-    """Let all editors of these kinds be drawn again, 3D views where none is given: what is drawn over them is no data
-    that Blender watches."""
+    """Redraw all editors of these kinds, 3D views by default; Blender does not watch the data of overlays."""
     for window in bpy.context.window_manager.windows:
         for area in window.screen.areas:
             if area.type in (kinds or ("VIEW_3D",)):
@@ -34,7 +35,7 @@ def redraw(*kinds: str) -> None:
 
 
 def start_clock(context: bpy.types.Context) -> bpy.types.Timer:
-    """Events of a timer for an operator that polls a thread, and progress at the pointer. Returns the timer."""
+    """Start timer events for an operator that polls a thread, and progress at the pointer; return the timer."""
     windows = context.window_manager
     clock = windows.event_timer_add(0.05, window=context.window)
     windows.progress_begin(0, 100)
@@ -43,7 +44,7 @@ def start_clock(context: bpy.types.Context) -> bpy.types.Timer:
 
 
 def stop_clock(context: bpy.types.Context, clock: bpy.types.Timer) -> None:
-    """End both, and clear the status bar."""
+    """Stop timer and progress, and clear the status bar."""
     if clock in _clocks:
         _clocks.remove(clock)
     context.window_manager.event_timer_remove(clock)
@@ -52,13 +53,13 @@ def stop_clock(context: bpy.types.Context, clock: bpy.types.Timer) -> None:
 
 
 def clear_status() -> None:
-    """Take our line off the status bar of every workspace: the user may have gone to another one meanwhile."""
+    """Clear our line from the status bar of every workspace: the user may have changed the workspace meanwhile."""
     for workspace in bpy.data.workspaces:
         workspace.status_text_set(None)
 
 
 def clear() -> None:
-    """Take everything away."""
+    """Remove everything."""
     while _clocks:
         stop_clock(bpy.context, _clocks[-1])
     for _, function, _ in list(_drawn):
@@ -67,7 +68,7 @@ def clear() -> None:
 
 
 def select_only(context: bpy.types.Context, *things: bpy.types.Object) -> None:
-    """Let these objects be the selected ones, and the first of them active."""
+    """Select these objects alone, and make the first one active."""
     for other in context.selected_objects:
         other.select_set(False)
     for thing in things:
@@ -76,11 +77,16 @@ def select_only(context: bpy.types.Context, *things: bpy.types.Object) -> None:
 
 
 def open_editor(context: bpy.types.Context, kind: str, direction: str, factor: float) -> bpy.types.Area | None:
-    """The largest editor of a kind (an area's type); where there is none, the left or lower part of the largest 3D view
-    becomes one.
+    """Return the largest editor of a kind; without one, turn the left or lower part of the largest 3D view into one.
 
-    direction: "VERTICAL" splits into left and right, "HORIZONTAL" into below and above; factor: the new editor's share.
-    None without a window, or where the screen has no 3D view to split."""
+    Args:
+        context: with a window.
+        kind: type of the area.
+        direction: "VERTICAL" splits into left and right, "HORIZONTAL" into below and above.
+        factor: share of the new editor.
+    Returns:
+        The area; None without a window or a 3D view.
+    """
     window = context.window
     if bpy.app.background or window is None:
         return None
@@ -88,15 +94,18 @@ def open_editor(context: bpy.types.Context, kind: str, direction: str, factor: f
 
 
 def free_region(area: bpy.types.Area, region: bpy.types.Region) -> tuple[float, float, float, float]:
-    """The part of a region that no toolbar, sidebar, header or box of the last operator lies over, less a small margin:
-    left, bottom, right, top in its pixels."""
+    """Find the part of a region that no toolbar, sidebar, header or redo panel covers, less a small margin.
+
+    Returns:
+        Left, bottom, right, top in its pixels.
+    """
     left, bottom, right, top = 0.0, 0.0, float(region.width), float(region.height)
     for other in area.regions:
         x, y = other.x - region.x, other.y - region.y
         over = x < region.width and y < region.height and x + other.width > 0 and y + other.height > 0
         if other.type == region.type or min(other.width, other.height) <= 1 or not over:
             continue
-        if other.type == "HUD":  # stands free in the lower left corner: above it, or right of it where it is tall
+        if other.type == "HUD":  # floats in the lower left corner: stay above it, or right of it where it is tall
             if y + other.height < 0.5 * region.height:
                 bottom = max(bottom, y + other.height)
             else:
@@ -109,11 +118,12 @@ def free_region(area: bpy.types.Area, region: bpy.types.Region) -> tuple[float, 
 
 
 def largest_editor(screen: bpy.types.Screen, kind: str) -> bpy.types.Area | None:
-    """The largest editor of a kind; None where there is none."""
+    """Return the largest editor of a kind; None where there is none."""
     return max((area for area in screen.areas if area.type == kind), key=lambda a: a.width * a.height, default=None)
 
 
 def _split(context, window, kind: str, direction: str, factor: float) -> bpy.types.Area | None:
+    """Split the largest 3D view; return the new editor, or None without a 3D view."""
     view = largest_editor(window.screen, "VIEW_3D")
     if view is None:
         return None

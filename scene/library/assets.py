@@ -1,7 +1,7 @@
 """Motions as assets: actions with a catalog, tags, a description and a picture of their key pose.
 
-Works without a window: pictures are drawn by the core. Catalogs stand in Blender's own text beside the file; each has
-an identity that follows from its name, so that the same catalog is the same everywhere.
+Works without a window: pictures are rendered by the core. Catalogs are in Blender's own text file beside the .blend;
+each has an identity that follows from its name, so that the same catalog is the same everywhere.
 """
 
 from __future__ import annotations
@@ -32,8 +32,16 @@ _SPACE = uuid.UUID("6a8b2d0e-6f0f-5f0c-9d7b-0f3f5b3d7a11")
 
 @dataclass(frozen=True, eq=False)
 class Draft:
-    """A motion on its way to be an asset. frame: the pose that its picture shows; action: the name of the action that
-    plays it already, "" where one is to be made."""
+    """A motion that will become an asset.
+
+    Attributes:
+        name: of the asset.
+        motion: its frames.
+        labels: its labels, used as tags.
+        frame: the pose that its picture shows.
+        description: description of the asset.
+        action: name of the action that plays it already, "" to create one.
+    """
 
     name: str
     motion: "Motion"
@@ -44,8 +52,10 @@ class Draft:
 
 
 def draft(name: str, motion: "Motion", rows, told: str = "", action: str = "") -> Draft:
-    """A draft from a motion and its rows of words: the picture shows the first key moment, else the middle of the
-    longest row."""
+    """Build a draft from a motion and its annotation rows.
+
+    The picture shows the first key moment, else the middle of the longest row.
+    """
     from ...beyond_mocap.library.listing import words_of
 
     keys = [row.key for row in rows if row.key is not None]
@@ -56,7 +66,7 @@ def draft(name: str, motion: "Motion", rows, told: str = "", action: str = "") -
 
 
 def picture(one: Draft) -> np.ndarray | None:
-    """Its picture (256, 256, 4); None for a skeleton on which no body can be put."""
+    """Render the picture (256, 256, 4) of a draft; None for a skeleton that cannot carry a body."""
     from ...beyond_mocap.appearance.picture import pose_picture
 
     try:
@@ -66,21 +76,29 @@ def picture(one: Draft) -> np.ndarray | None:
 
 
 def catalog_of(words: Iterable[str]) -> str:
-    """The catalog of a motion with these words: its action, else its gait, else "Other"."""
+    """Choose the catalog of a motion with these labels: its action, else its gait, else "Other"."""
     words = tuple(words)
     known = [word for word in words if word in DISCRETE] or [word for word in words if word in LOCOMOTION]
     return f"{TOP}/{(known or ['other'])[0].replace('_', ' ').capitalize()}"
 
 
 def catalog_id(catalog: str) -> str:
-    """A catalog's identity, the same in every file."""
+    """Compute a catalog's identity, the same in every file."""
     return str(uuid.uuid5(_SPACE, catalog))
 
 
 def make(context: bpy.types.Context, drafts: list[Draft], pictures: list,
          apart: bool = False) -> list[bpy.types.Action]:
-    """The drafts as assets: their own actions marked, or new ones made; returns the actions. apart: own actions are
-    left as they are, and copies of them marked."""
+    """Create assets from drafts: their own actions are marked, or new ones created.
+
+    Args:
+        context: of Blender.
+        drafts: the motions.
+        pictures: (H, W, 4) arrays or None.
+        copy_actions: leave own actions as they are, and mark copies of them.
+    Returns:
+        The actions.
+    """
     made, rigs = [], []
     try:
         for one, pixels in zip(drafts, pictures):
@@ -103,7 +121,7 @@ def make(context: bpy.types.Context, drafts: list[Draft], pictures: list,
 
 
 def mark(item: bpy.types.Action, one: Draft, pixels: np.ndarray | None) -> None:
-    """An action as an asset: catalog, tags, description, picture."""
+    """Mark an action as an asset with catalog, tags, description and picture."""
     item.asset_mark()
     about = item.asset_data
     about.catalog_id = catalog_id(catalog_of(one.words))
@@ -119,15 +137,20 @@ def mark(item: bpy.types.Action, one: Draft, pixels: np.ndarray | None) -> None:
 
 
 def define_catalogs(folder: str | Path, catalogs: Iterable[str]) -> Path:
-    """Add catalogs to the definitions that hold for files in `folder`: the nearest above it, else its own, written
-    beside and renamed; returns that file. InputError where it cannot be written."""
+    """Add catalogs to the definitions for files in `folder`: the nearest file above it, else a new one in it.
+
+    Returns:
+        The file; it is written under another name and renamed.
+    Raises:
+        InputError: if it cannot be read or written.
+    """
     folder = Path(folder)
     target = next((place / CATALOGS for place in (folder, *folder.parents) if (place / CATALOGS).is_file()),
                   folder / CATALOGS)
     try:
         text = target.read_text("utf-8") if target.is_file() else _HEAD
     except (OSError, UnicodeDecodeError) as error:
-        raise InputError(target, f"cannot be read ({error})", "Blender's catalogs", "mend or remove the file") from None
+        raise InputError(target, f"cannot be read ({error})", "Blender's catalogs", "remove the file") from None
     new = [name for name in sorted({TOP, *catalogs}) if catalog_id(name) not in text]
     if not new:
         return target
@@ -137,5 +160,5 @@ def define_catalogs(folder: str | Path, catalogs: Iterable[str]) -> Path:
 
 
 def write_library(path: Path, actions: list[bpy.types.Action]) -> None:
-    """Actions as a .blend of their own, written beside and renamed; InputError where that cannot be done."""
+    """Write actions to a .blend of their own, completely or not at all; InputError where that fails."""
     export.saved(path, lambda part: bpy.data.libraries.write(part, set(actions), fake_user=True, compress=True))

@@ -1,11 +1,11 @@
-"""The library's clips as a list to look through, on the window manager: it is not saved with a file, nor undone.
+"""The library's clips as a list for browsing, stored on the window manager: neither saved with a file nor undone.
 
-What was listed is kept here in full; the list shows what fits the words that are looked for, in the chosen order. Both
-change it when they are set, so that drawing it costs nothing.
+The complete list is kept in this module; the panel's list shows the clips that match the search, in the chosen order.
+Both properties update the list when they are set, so that drawing costs nothing.
 
-From time to time a thread looks whether the library's folder has changed, and says so; it never builds by itself. The
-folder is only listed (names, sizes, times). Where it is gone, it is looked for beside the file: a project that was
-copied elsewhere as a whole still finds its library.
+A thread checks from time to time whether the library's folder has changed and shows a message; it never builds. The
+folder is only listed (names, sizes, times). A missing folder is searched beside the .blend: a project that was copied
+as a whole still finds its library.
 """
 
 from __future__ import annotations
@@ -29,55 +29,62 @@ if TYPE_CHECKING:
     from ...beyond_mocap.library.listing import Listed
 
 ORDERS = (("NAME", "Name", "By folder and name"),
-          ("WORDS", "Words", "By key moment or gait"),
+          ("WORDS", "Labels", "By key moment or gait"),
           ("SECONDS", "Length", "Longest first"),
           ("SPEED", "Speed", "Fastest first"),
           ("QUALITY", "Quality", "Best first"))
 
-SECONDS = 4.0  # between two looks
+SECONDS = 4.0  # seconds between two scans of the folder
 
-_looking: dict = {}  # the thread that is looking, and what it saw
+_looking: dict = {}  # the scanning thread and its result
 
 
 @dataclass
 class _Kept:
-    """What was listed last: the clips, and the files as they were then (`list_files`)."""
+    """The last listing: the clips, and the files at that time (`list_files`)."""
 
     clips: tuple["Listed", ...] = ()
     files: dict[str, tuple[int, int]] = field(default_factory=dict)
 
 
 class BeyondMocapClip(bpy.types.PropertyGroup):
-    """One clip of the list; `name` is its file's name without ending."""
+    """One clip of the list; `name` is its file's name without ending"""
 
     path: StringProperty(name="File", description="Below the library's folder")
-    words: StringProperty(name="Words", description="All words that it carries")
-    brief: StringProperty(name="Shows", description="The first of its words")
+    words: StringProperty(name="Labels", description="All labels of the clip")
+    brief: StringProperty(name="Shows", description="The clip's first label")
     seconds: FloatProperty(name="Length", unit="TIME_ABSOLUTE", description="Seconds")
     figures: StringProperty(name="Figures", description="Length and speeds")
     mark: IntProperty(name="Quality", description="0 good, 1 fair, 2 poor, 3 not measured")
-    told: StringProperty(name="Quality", description="Lines 'name: value'")
+    told: StringProperty(name="Quality", description="Lines with a name and a value")
 
 
 class BeyondMocapClips(bpy.types.PropertyGroup):
-    """The list of clips, and how it is looked through."""
+    """The list of clips, its search and its order"""
 
     attached_to = ("WindowManager.beyond_mocap_clips",)
-    folder: StringProperty(description="The setting of the library's folder when the list was filled")
-    shown: CollectionProperty(type=BeyondMocapClip, description="The clips that fit what is looked for")
-    active: IntProperty(name="Clip", min=0, description="The clip that is described below the list")
-    total: IntProperty(description="Number of clips, shown or not")
+    folder: StringProperty(description="The library folder of the list")
+    shown: CollectionProperty(type=BeyondMocapClip, description="The clips that match the search")
+    active: IntProperty(name="Clip", min=0, description="The clip described below the list")
+    total: IntProperty(description="Number of clips in the library")
     find: StringProperty(
         name="Find", options={"TEXTEDIT_UPDATE"}, update=_refill,
-        description="Show only clips with this in their name or words; of several words each has to be there",
+        description="Show only clips whose name or labels contain all of these words",
     )
     order: EnumProperty(name="Order", items=ORDERS, update=_refill, description="Order of the clips")
-    missing: BoolProperty(description="Whether the library's folder was not there when it was last looked for")
-    news: StringProperty(description="What has changed in the folder since the list was filled; empty: nothing")
+    missing: BoolProperty(description="Whether the library folder was missing at the last check")
+    news: StringProperty(description="Changes in the folder since the list was filled; empty for none")
 
 
 def keep(manager: bpy.types.WindowManager, folder: str, clips, files) -> None:
-    """List the clips of a library. folder: as the setting spells it; files: what `list_files` saw."""
+    """Store the clips of a library in the list.
+
+    Args:
+        manager: the window manager.
+        folder: as the setting spells it.
+        clips: all of them.
+        files: as `list_files` returned them.
+    """
     _kept.clips, _kept.files = tuple(clips), dict(files)
     manager.beyond_mocap_clips.folder = folder
     manager.beyond_mocap_clips.news = ""
@@ -86,7 +93,7 @@ def keep(manager: bpy.types.WindowManager, folder: str, clips, files) -> None:
 
 
 def say(manager: bpy.types.WindowManager, path: str, rows) -> None:
-    """Show the words of a clip as they were just written: `ClipAnnotation`s."""
+    """Update the labels of a clip that were just written, from its annotation rows."""
     from ...beyond_mocap.library.listing import words_of
 
     words, moments = words_of(rows)
@@ -97,7 +104,7 @@ def say(manager: bpy.types.WindowManager, path: str, rows) -> None:
 
 
 def clear(manager: bpy.types.WindowManager | None = None) -> None:
-    """Forget the list."""
+    """Clear the list."""
     _kept.clips, _kept.files = (), {}
     if manager is not None:
         manager.beyond_mocap_clips.folder = manager.beyond_mocap_clips.news = ""
@@ -105,12 +112,12 @@ def clear(manager: bpy.types.WindowManager | None = None) -> None:
 
 
 def files() -> dict[str, tuple[int, int]]:
-    """The library's files when the list was filled: path -> size and time of change."""
+    """Return the library's files when the list was filled: path -> size and modification time."""
     return _kept.files
 
 
 def fill(manager: bpy.types.WindowManager) -> None:
-    """Show the clips that fit, in order; the active one stays active where it is still shown."""
+    """Show the clips that match, in order; the active one stays active if it is still shown."""
     listing = manager.beyond_mocap_clips
     before = active(manager)
     path = before.path if before is not None else ""
@@ -121,7 +128,7 @@ def fill(manager: bpy.types.WindowManager) -> None:
     for clip in sorted(chosen, key=_KEYS[listing.order]):
         row = listing.shown.add()
         row.name, row.path, row.words = Path(clip.path).stem, clip.path, " ".join(clip.words)
-        row.brief = find_label(clip.words[0]).title if clip.words else "no words"
+        row.brief = find_label(clip.words[0]).title if clip.words else "no labels"
         row.seconds, row.mark = clip.seconds, clip.mark
         row.figures, row.told = _figures(clip), "\n".join(clip.told)
     paths = [row.path for row in listing.shown]
@@ -129,15 +136,17 @@ def fill(manager: bpy.types.WindowManager) -> None:
 
 
 def active(manager: bpy.types.WindowManager) -> BeyondMocapClip | None:
-    """The clip chosen in the list; None while it is empty."""
+    """Return the clip chosen in the list; None while it is empty."""
     listing = manager.beyond_mocap_clips
     return listing.shown[listing.active] if 0 <= listing.active < len(listing.shown) else None
 
 
 def list_files(folder: str) -> dict[str, tuple[int, int]] | None:
-    """All recordings and words below a folder: path -> (size, time of change in ns); None where there is no folder.
+    """List all recordings and label files below a folder: path -> (size, modification time in ns); None without the
+    folder.
 
-    Plain strings and as few calls as can be, since it shares the interpreter with the window."""
+    Uses plain strings and few calls, since it shares the interpreter with the window.
+    """
     if not os.path.isdir(folder):
         return None
     found = {}
@@ -151,27 +160,32 @@ def list_files(folder: str) -> dict[str, tuple[int, int]] | None:
 
 
 def holds_recordings(folder: str) -> bool:
-    """Whether there is any recording below a folder; looks no farther than the first."""
+    """Whether there is any recording below a folder; stops at the first."""
     return any(not _is_words(path) for path in _below(folder))
 
 
 def tell_news(before: dict, now: dict) -> str:
-    """What is new, changed or gone between two looks, in a line; empty where all is as it was."""
-    kinds = {"clip": lambda name: not _is_words(name), "words file": _is_words}
+    """Describe in one line what is new, changed or removed between two scans; empty for no change."""
+    kinds = {"clip": lambda name: not _is_words(name), "label file": _is_words}
     told = []
     for kind, is_kind in kinds.items():
         new = [name for name in now if name not in before and is_kind(name)]
         gone = [name for name in before if name not in now and is_kind(name)]
         changed = [name for name in now if name in before and now[name] != before[name] and is_kind(name)]
-        for names, what in ((new, "new"), (changed, "changed"), (gone, "gone")):
+        for names, what in ((new, "new"), (changed, "changed"), (gone, "removed")):
             if names:
                 told.append(f"{len(names)} {what} {kind}{'' if len(names) == 1 else 's'}")
     return ", ".join(told)
 
 
 def found_again(folder: str, blend: str) -> str:
-    """Where a missing folder may be now: its own last parts, as many as fit, beside the file or above it; empty where
-    there is no such folder with recordings. folder, blend: absolute paths."""
+    """Find the new place of a missing folder: its own last parts, as many as match, beside the .blend or above it.
+
+    Args:
+        folder, blend: absolute paths.
+    Returns:
+        The folder; empty where no such folder with recordings exists.
+    """
     parts = Path(folder).parts[1:]
     for count in range(len(parts), 0, -1):
         for place in list(Path(blend).parents)[:4]:
@@ -182,14 +196,14 @@ def found_again(folder: str, blend: str) -> str:
 
 
 def check_folder(scene: bpy.types.Scene) -> None:
-    """Notes whether the scene's library folder is there."""
+    """Update whether the scene's library folder is missing."""
     folder = absolute(scene.beyond_mocap.library_folder)
     listing = bpy.context.window_manager.beyond_mocap_clips
     listing.missing = bool(folder) and not os.path.isdir(folder)
 
 
 def relink_library(scene: bpy.types.Scene) -> str:
-    """Where the scene's library folder is missing and lies beside the file, set it so; returns the new place or ""."""
+    """Relink the scene's missing library folder to one beside the .blend; returns the new folder or ""."""
     settings = scene.beyond_mocap
     folder = absolute(settings.library_folder)
     if not folder or os.path.isdir(folder) or not bpy.data.filepath:
@@ -209,11 +223,12 @@ def _fits(clip: "Listed", asked: str) -> bool:
 
 
 def _figures(clip: "Listed") -> str:
-    text = f"{clip.seconds:.1f} s" if clip.seconds else "length not known"
+    """Describe length, speeds and key moments of a clip."""
+    text = f"{clip.seconds:.1f} s" if clip.seconds else "unknown length"
     if not math.isnan(clip.speed):
         text += f", {clip.speed:.1f} m/s (to {clip.fastest:.1f})"
     if clip.moments:
-        text += f", {clip.moments} {'moment' if clip.moments == 1 else 'moments'}"
+        text += f", {clip.moments} key {'moment' if clip.moments == 1 else 'moments'}"
     return text
 
 
@@ -222,7 +237,7 @@ def _is_words(name: str) -> bool:
 
 
 def _below(folder: str):
-    """The paths of all recordings and words below a folder; links are followed, each folder is looked into once."""
+    """Iterate over the paths of all recordings and label files below a folder; links are followed, each folder once."""
     from ...beyond_mocap.library.scan import CACHE_FOLDER, FOREIGN, TABLE_NAME
 
     wanted, seen = (".bvh", ".txt", TABLE_NAME, *FOREIGN), set()
@@ -245,12 +260,12 @@ def _after_load() -> None:
     for scene in [scene for scene in bpy.data.scenes if scene.library is None]:
         found = relink_library(scene)
         if found:
-            print(f"Beyond Mocap: the library of {scene.name} was moved and found again in {found}")
+            print(f"Beyond Mocap: the library folder of {scene.name} was moved and is now {found}")
     check_folder(bpy.context.scene)
 
 
 def _look_again() -> float:
-    """Start a look where one is asked for and none runs; take in what it saw."""
+    """Start a scan when due; apply the result of a finished one. Returns seconds until the next call."""
     scene, manager = bpy.context.scene, bpy.context.window_manager
     if scene is None or not scene.beyond_mocap.library_watch:
         _looking.clear()
@@ -277,9 +292,9 @@ def _begin(folder: str) -> None:
 
 
 def _take_in(manager: bpy.types.WindowManager, setting: str) -> None:
-    """Writes what was seen, where it is news, and has it drawn."""
+    """Write the scan's result if it is new, and redraw."""
     listing = manager.beyond_mocap_clips
-    if _looking["folder"] != absolute(setting) or "files" not in _looking["saw"]:  # moved on, or the look failed
+    if _looking["folder"] != absolute(setting) or "files" not in _looking["saw"]:  # stale, or the scan failed
         return
     saw = _looking["saw"]["files"]
     missing = saw is None

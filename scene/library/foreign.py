@@ -1,8 +1,8 @@
 """Motions in files that Blender's own importers read: FBX, glTF, USD.
 
-A file is imported into a scene of its own, its armature is sampled at the rate of its keys, and all that came in is
-taken away again. What comes out are joints where the bones' heads were, in metres, Z up, whatever the file's axes,
-units, rest pose and bone directions are.
+A file is imported into a temporary scene, its armature is sampled at the rate of its keys, and everything imported is
+removed again. The result has joints at the bones' heads, in metres, Z up, whatever the file's axes, units, rest pose
+and bone directions are.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from ..core.set_aside import scene_aside
 if TYPE_CHECKING:
     from ...beyond_mocap.files.bvh.bvh import BvhClip
 
-LEAST, MOST = 24.0, 240.0  # frames per second at which sparse or very dense keys are sampled
+LEAST, MOST = 24.0, 240.0  # limits of the frames per second at which keys are sampled
 _USD = (".usd", ".usda", ".usdc", ".usdz")
 
 
@@ -36,7 +36,8 @@ class Take(NamedTuple):
 
 
 def read(path: str | Path) -> list[Take]:
-    """All animations of the file's largest armature, the longest first; InputError where it has none or is broken."""
+    """Read all animations of the file's largest armature, the longest first; InputError where it has none or is broken.
+    """
     path = Path(path)
     if not path.is_file():
         raise InputError(path, "no such file", "a file with an animated armature", "check the path")
@@ -53,7 +54,8 @@ def read(path: str | Path) -> list[Take]:
 
 
 def as_clip(motion: Motion) -> "BvhClip":
-    """The motion as a library would read it from BVH: joints above the hips folded in, size checked and told."""
+    """Convert a motion to a clip as a library reads it from BVH: joints above the hips merged, size checked and noted.
+    """
     from ...beyond_mocap.files.bvh import bvh
 
     with tempfile.TemporaryDirectory() as room:
@@ -63,13 +65,16 @@ def as_clip(motion: Motion) -> "BvhClip":
 
 
 class Queue:
-    """The foreign recordings of a library that are to be converted, one at a time, so that a window stays alive.
+    """The recordings of a library that need a conversion, one at a time, so that a window stays responsive.
 
-    todo: those that wait; total: how many there were; notes: what came of it, one line for each that asks for a look.
+    Attributes:
+        remaining: those that remain.
+        total: number at the start.
+        notes: results, one line for each that needs attention.
     """
 
     def __init__(self, folder: str | Path, cache_dir: str | None):
-        """Looks which recordings below `folder` wait; InputError where there is no folder."""
+        """Find the recordings below `folder` that need a conversion; InputError where there is no folder."""
         from ...beyond_mocap.library import cache
         from ...beyond_mocap.library.scan import Conversions, own_recordings
 
@@ -79,15 +84,15 @@ class Queue:
         self.total, self.notes = len(self.todo), []
 
     def step(self) -> None:
-        """Convert the next one; one that cannot be converted is told and left out."""
+        """Convert the next one; one that cannot be converted is noted and skipped."""
         from ...beyond_mocap.library.scan import stamp_of
 
         path = self.todo.pop(0)
-        stamp = stamp_of(path)  # before it is read: what is changed meanwhile is converted again
+        stamp = stamp_of(path)  # before it is read: a file that changes meanwhile is converted again
         try:
             self._keep(path, read(path), stamp)
         except InputError as error:
-            self.notes.append(f"left out: {error}")
+            self.notes.append(f"skipped: {error}")
 
     def _keep(self, path: Path, takes: list[Take], stamp: list[int]) -> None:
         from ...beyond_mocap.files.bvh import bvh
@@ -96,23 +101,23 @@ class Queue:
         self.conversions.keep(path, stamp)
         if len(takes) > 1:
             others = ", ".join(take.name for take in takes[1:4])
-            self.notes.append(f"{path.name}: the longest of {len(takes)} animations is its clip, left out {others}")
+            self.notes.append(f"{path.name}: only the longest of {len(takes)} animations is used; skipped: {others}")
 
 
 def _bring_in(path: Path) -> None:
-    """Import by the first of Blender's importers for this ending that it has and that reads the file."""
+    """Import by the first of Blender's importers for this ending that exists and reads the file."""
     importers = [operator for operator in _importers(path.suffix.lower()) if _exists(operator)]
     if not importers:
-        raise InputError(path, "no importer for it in this Blender", "FBX, glTF or USD with its importer switched on",
-                         "look in the preferences under Add-ons")
-    told = "nothing came in"
+        raise InputError(path, "this Blender has no importer for it", "FBX, glTF or USD with an enabled importer",
+                         "enable it in the preferences under Add-ons")
+    told = "nothing was imported"
     for operator in importers:
         try:
             if operator(filepath=str(path)) == {"FINISHED"} and bpy.context.scene.objects:
                 return
         except Exception as error:  # an importer may fail in any way on a broken file
             told = (str(error).strip().splitlines() or [type(error).__name__])[-1]
-    raise InputError(path, f"cannot be read ({told})", "an intact file", "export it anew")
+    raise InputError(path, f"cannot be read ({told})", "an intact file", "export it again")
 
 
 def _importers(ending: str) -> list:
@@ -125,14 +130,16 @@ def _importers(ending: str) -> list:
 
 
 def _usd_rate(path: Path) -> int:
-    """Time codes per second of a USD file, which its importer takes as frames; 24, USD's own default, where Blender
-    brings no reader that tells."""
+    """Read the time codes per second of a USD file, which its importer takes as frames.
+
+    24, USD's own default, where Blender has no module that reads them.
+    """
     try:
         bpy.utils.expose_bundled_modules()
         from pxr import Usd
 
         return max(1, round(Usd.Stage.Open(str(path)).GetTimeCodesPerSecond()))
-    except Exception:  # no such module, or a broken file, of which the importer will tell
+    except Exception:  # no such module, or a broken file, which the importer will report
         return 24
 
 
@@ -145,10 +152,10 @@ def _exists(operator) -> bool:
 
 
 def _largest_rig(path: Path, scene: bpy.types.Scene) -> bpy.types.Object:
-    """The armature with most bones; all else that does not carry it is taken out, so that frames are quick."""
+    """Find the armature with most bones; objects that do not carry it are removed, so that frames are quick."""
     rigs = [item for item in scene.objects if item.type == "ARMATURE" and len(item.data.bones)]
     if not rigs:
-        raise InputError(path, "no armature in it", "a body with bones", "export the skeleton along with its animation")
+        raise InputError(path, "no armature", "a body with bones", "export the skeleton with its animation")
     rig = max(rigs, key=lambda item: len(item.data.bones))
     carriers, item = {rig.name}, rig
     while item.parent is not None:
@@ -160,7 +167,7 @@ def _largest_rig(path: Path, scene: bpy.types.Scene) -> bpy.types.Object:
 
 
 def _actions(path: Path, rig: bpy.types.Object) -> list[tuple[bpy.types.Action, object]]:
-    """The actions that the armature plays or keeps on its NLA tracks, each once with the slot that fits."""
+    """Collect the actions that the armature plays or has on its NLA tracks, each once with its matching slot."""
     data = rig.animation_data
     found: dict = {}
     if data is not None:
@@ -177,7 +184,7 @@ def _actions(path: Path, rig: bpy.types.Object) -> list[tuple[bpy.types.Action, 
 
 
 def _sampled(path: Path, scene: bpy.types.Scene, rig: bpy.types.Object, action, slot) -> Take:
-    """One action, frame by frame."""
+    """Sample one action, frame by frame."""
     channels.assign(rig, action, slot)
     fps, times = _times(action, rig.animation_data.action_slot, scene.render.fps / scene.render.fps_base)
     bones = _tree(rig)
@@ -188,14 +195,14 @@ def _sampled(path: Path, scene: bpy.types.Scene, rig: bpy.types.Object, action, 
         scene.frame_set(int(np.floor(time)), subframe=float(time - np.floor(time)))
         rig.pose.bones.foreach_get("matrix", posed[number].reshape(-1))
         world[number] = np.array(rig.matrix_world)
-    matrices = world[:, None] @ posed[:, order].transpose(0, 1, 3, 2).astype(float)  # Blender gives columns first
+    matrices = world[:, None] @ posed[:, order].transpose(0, 1, 3, 2).astype(float)  # Blender stores columns
     if not np.all(np.isfinite(matrices)):
-        raise InputError(path, f"action {action.name} with numbers that are none", "an intact file", "export it anew")
+        raise InputError(path, f"NaN or infinite values in action {action.name}", "an intact file", "export it again")
     return Take(action.name, _motion(path, rig, bones, matrices=matrices, world=world[0], fps=fps))
 
 
 def _times(action, slot, rate: float) -> tuple[float, np.ndarray]:
-    """Frames per second of the keys, within LEAST and MOST, and the scene frames (T,) to look at."""
+    """List the frames per second of the keys, within LEAST and MOST, and the scene frames (T,) to sample."""
     keys = set()
     for (path, _), curve in channels.curves(action, slot).items():
         if path.startswith("pose.bones"):
@@ -213,21 +220,32 @@ def _times(action, slot, rate: float) -> tuple[float, np.ndarray]:
 
 
 def _tree(rig: bpy.types.Object) -> list[bpy.types.Bone]:
-    """The bones of the largest tree, parents first."""
+    """List the bones of the largest tree, parents first."""
     roots = [bone for bone in rig.data.bones if bone.parent is None]
     bones = [max(roots, key=lambda bone: len(bone.children_recursive))]
-    for bone in bones:  # grows while it is walked
+    for bone in bones:  # grows during the loop
         bones.extend(bone.children)
     return bones
 
 
 def _motion(path: Path, rig, bones, matrices: np.ndarray, world: np.ndarray, fps: float) -> Motion:
-    """Joints from bones. matrices (T, B, 4, 4): the bones in the world, metres; world (4, 4): the armature there."""
+    """Build a motion from bones.
+
+    Args:
+        path: for messages.
+        rig: the armature.
+        bones: of one tree, parents first.
+        matrices: (T, B, 4, 4) the bones in the world, metres.
+        world: (4, 4) the armature in the world.
+        fps: frames per second.
+    Returns:
+        The motion.
+    """
     names = [bone.name for bone in bones]
     parents = [-1] + [names.index(bone.parent.name) for bone in bones[1:]]
     scales = np.linalg.norm(matrices[..., :3, :3], axis=-2)
     if scales.min() < 1e-6:
-        raise InputError(path, "a bone of no size", "bones with a size", "apply the scale before exporting")
+        raise InputError(path, "a bone of size zero", "bones with a size", "apply the scale before exporting")
     turns = quaternion.from_matrix(matrices[..., :3, :3] / scales[..., None, :])
     rest = np.array([world @ np.array(bone.matrix_local) for bone in bones])
     rest = quaternion.from_matrix(rest[:, :3, :3] / np.linalg.norm(rest[:, :3, :3], axis=-2)[:, None, :])

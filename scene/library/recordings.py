@@ -1,8 +1,8 @@
-"""Single recordings of the library in the scene: read as they were recorded, on an armature of their own, with their
-words as NLA strips on it.
+"""Single recordings of the library in the scene: as recorded, on an armature of their own, with their labels as NLA
+strips.
 
-The strips are a player's own (`lanes`, `lay_strips`); their clock stands at 0 seconds on the frame on which the
-armature plays the recording's first.
+The strips are of the same kind as a player's (`lanes`, `lay_strips`); their clock is at 0 seconds on the frame on which
+the armature plays the recording's first.
 """
 
 from __future__ import annotations
@@ -30,14 +30,22 @@ RATE, COUNT = "beyond_mocap_fps", "beyond_mocap_frames"  # custom properties: th
 
 
 def folder_of(settings) -> Path:
-    """The library's folder."""
+    """Return the library's folder."""
     return Path(absolute(settings.library_folder))
 
 
 def file_of(settings, path: str, folder: str = "") -> tuple[Path, float | None]:
-    """The BVH file to read for a clip, and the metres per unit to read it with (None: guessed). path: below the
-    library's folder; folder: as a setting spells it, the scene's own where empty. InputError where it is missing, or
-    waits to be converted."""
+    """Find the BVH file to read for a clip.
+
+    Args:
+        settings: of the scene.
+        path: below the library's folder.
+        folder: as a setting spells it; empty for the scene's own.
+    Returns:
+        The file, and metres per unit (None: guessed).
+    Raises:
+        InputError: if the file is missing or not converted yet.
+    """
     from ...beyond_mocap.library import cache
     from ...beyond_mocap.library.scan import Conversions, is_foreign
 
@@ -45,14 +53,14 @@ def file_of(settings, path: str, folder: str = "") -> tuple[Path, float | None]:
     file = where / path
     conversions = Conversions(where, cache.place(where, preferences.cache_folder(str(where)))[0])
     if not file.is_file():
-        raise InputError(file, "no such file", "a clip of the library", "press Build Library to list its clips anew")
+        raise InputError(file, "no such file", "a clip of the library", "press Build Library to update the list")
     if not conversions.stands(file):
-        raise InputError(file, "not converted yet", "a clip that was converted", "press Build Library")
+        raise InputError(file, "not converted yet", "a converted clip", "press Build Library")
     return conversions.readable(file), None if is_foreign(file) else settings.library_unit or None
 
 
 def read_recording(settings, path: str, folder: str = "") -> tuple["Motion", tuple[str, ...]]:
-    """The motion of a clip and what its reader decided; arguments and errors as `file_of`."""
+    """Read the motion of a clip and its reader's notes; arguments and errors as `find_clip_file`."""
     from ...beyond_mocap.files.bvh import bvh
 
     clip = bvh.read(*file_of(settings, path, folder))
@@ -60,7 +68,7 @@ def read_recording(settings, path: str, folder: str = "") -> tuple["Motion", tup
 
 
 def show_recording(context: bpy.types.Context, motion: "Motion", path: str, dressed: bool) -> bpy.types.Object:
-    """A new armature that plays a clip from the scene's first frame, chosen and active; returns it."""
+    """Create an armature that plays a clip from the scene's first frame, selected and active; returns it."""
     scene, name = context.scene, Path(path).stem
     rig = armature.create(context, motion.skeleton, name, context.collection)
     rig[PATH], rig[FOLDER] = path, scene.beyond_mocap.library_folder
@@ -72,45 +80,47 @@ def show_recording(context: bpy.types.Context, motion: "Motion", path: str, dres
 
 
 def shown_clip(thing: bpy.types.Object | None) -> str:
-    """The clip (below its library's folder) that an object shows; "" where it shows none."""
+    """Return the clip (below its library's folder) that an object shows; "" where it shows none."""
     return thing.get(PATH, "") if thing is not None and thing.type == "ARMATURE" else ""
 
 
 def clip_file(rig: bpy.types.Object) -> tuple[Path, Path]:
-    """The file of the clip that an armature shows, and its library's folder."""
+    """Return the file of the clip that an armature shows, and its library's folder."""
     folder = Path(absolute(rig[FOLDER]))
     return folder / rig[PATH], folder
 
 
 def lay_words(rig: bpy.types.Object, scene: bpy.types.Scene, motion: "Motion", timeline: Timeline) -> None:
-    """Let the armature's strips say `timeline`: seconds from the recording's first frame."""
+    """Write `timeline`, in seconds from the recording's first frame, to the armature's strips."""
     lay_strips.check_editable(rig)
     rig[RATE], rig[COUNT] = motion.fps, len(motion)
     lay_strips.write(rig, timeline, _clock(rig, scene), (0.0, motion.duration))
 
 
 def read_words(rig: bpy.types.Object) -> tuple[ClipAnnotation, ...]:
-    """What the armature's strips say, as rows in frames of the recording; InputError where it has no strips, or where
-    they say nothing."""
+    """Read the armature's strips as rows in frames of the recording; InputError where there are no strips or no labels.
+    """
     if RATE not in rig:
-        raise InputError(rig.name, "no strips with words", "a clip opened with Annotate Clip")
+        raise InputError(rig.name, "no strips with labels", "a clip opened with Annotate Clip")
     return read_words_at(rig, rig[RATE], rig[COUNT])
 
 
 def read_words_at(rig: bpy.types.Object, fps: float, count: int) -> tuple[ClipAnnotation, ...]:
-    """What an armature's strips say, in frames of a motion of `count` frames at `fps`; InputError as `read_words`."""
+    """Read an armature's strips in frames of a motion of `count` frames at `fps`; InputError as `read_labels`."""
     from ...beyond_mocap.library.keep_words import within
 
     timeline = lanes.read(rig, f"strips of {rig.name}")
     rows = within(clip_annotations(timeline, fps), count) if timeline is not None else ()
     if not rows:
-        raise InputError(rig.name, "strips that say nothing", "at least one strip or marker", "press Propose Words")
+        raise InputError(rig.name, "no labels in the strips", "at least one strip or marker", "press Propose Labels")
     return rows
 
 
 def remove_clip(rig: bpy.types.Object) -> None:
-    """Take the armature, its body and its actions out of the file, where nobody else uses them. What the user hung on
-    it stays where it is, and an action that was made an asset stays too."""
+    """Remove the armature, its body and its actions from the file where nothing else uses them.
+
+    Objects that the user parented to it stay in place, and an action that was made an asset stays too.
+    """
     things = [rig, *(child for child in rig.children if _moved_by(child, rig))]
     for child in rig.children:
         if child not in things:
@@ -127,7 +137,7 @@ def remove_clip(rig: bpy.types.Object) -> None:
 
 
 def _moved_by(thing: bpy.types.Object, rig: bpy.types.Object) -> bool:
-    """Whether an object is a mesh that the armature bends, as its body is."""
+    """Whether an object is a mesh that the armature deforms, as its body is."""
     return thing.type == "MESH" and any(one.type == "ARMATURE" and one.object == rig for one in thing.modifiers)
 
 

@@ -1,8 +1,8 @@
-"""A trial as objects: a mesh with one vertex for each marker, played by `nodes`, its trajectories beside it, and the
-labels drawn over it.
+"""A trial as objects: a mesh with one vertex for each marker, played by `nodes`, with its trajectories and drawn
+labels.
 
-The trajectories hang on the cloud alone, in no collection, so that nobody sees them and they go with it. A vertex knows
-its marker by an attribute, so that vertices can be deleted: those markers are then left out.
+The trajectories belong to the cloud alone and are in no collection, so they are invisible and are removed with it. A
+vertex stores its marker in an attribute, so vertices can be deleted: those markers are then left out.
 """
 
 from __future__ import annotations
@@ -28,15 +28,26 @@ if TYPE_CHECKING:
 
 RADIUS = 0.007  # metres of a marker's sphere
 
-LABEL_WIDTH = 32  # pixels of a label, at a scale of 1
+LABEL_WIDTH = 32  # pixels of a label at an interface scale of 1
 LABEL_HEIGHT, RGBA, FREE = 11, (1.0, 1.0, 1.0, 0.9), (1.0, 0.65, 0.1, 1.0)
 
 
 def create(
     context: bpy.types.Context, trial: "MarkerTrial", name: str = "", start: float | None = None, collection=None
 ) -> bpy.types.Object:
-    """A cloud that plays a trial from the scene frame `start` (the scene's first if None); the scene is lengthened.
-    InputError where nothing can be seen, or the collection belongs to another file."""
+    """Create a cloud that plays a trial; the scene's end is extended.
+
+    Args:
+        context: with the scene.
+        trial: the trial.
+        name: of the cloud; "" uses the trial's.
+        start: scene frame of the first sample; None for the scene's first.
+        collection: for the cloud; None for the active one.
+    Returns:
+        The cloud.
+    Raises:
+        InputError: if no marker is visible, or the collection belongs to another file.
+    """
     scene, units, room = context.scene, units_per_metre(context.scene), collection or context.collection
     check(trial)
     if room.library is not None:
@@ -59,7 +70,11 @@ def create(
 
 
 def write(cloud: bpy.types.Object, trial: "MarkerTrial", scene: bpy.types.Scene) -> None:
-    """Let a cloud play other or cleaned trajectories, as fast as it did; what is known of a label stays by name."""
+    """Write other or cleaned trajectories to a cloud, at the same playback speed; settings of a label stay by its name.
+
+    Raises:
+        InputError: if no marker is visible, or the cloud belongs to another file.
+    """
     channels.check_local(cloud, cloud.data)
     check(trial)
     if cloud.data.is_editmode:
@@ -92,8 +107,11 @@ def write(cloud: bpy.types.Object, trial: "MarkerTrial", scene: bpy.types.Scene)
 
 
 def read(cloud: bpy.types.Object, scene: bpy.types.Scene) -> "MarkerTrial":
-    """The trial that a cloud plays, with its labels as they are now, in the cloud's own space. InputError where the
-    object has lost what it needs."""
+    """Read the trial that a cloud plays, with its present labels, in the cloud's own space.
+
+    Raises:
+        InputError: if the object has lost what it needs.
+    """
     from ...beyond_mocap.markers.trial import MarkerEvent, MarkerTrial
 
     modifier = nodes.modifier_of(cloud) if is_cloud(cloud) else None
@@ -103,7 +121,7 @@ def read(cloud: bpy.types.Object, scene: bpy.types.Scene) -> "MarkerTrial":
     kept, count, samples = cloud.beyond_mocap_cloud, nodes.get(modifier, "Markers"), nodes.get(modifier, "Samples")
     if len(mesh.vertices) != count * samples or len(kept.labels) != count or not samples:
         found = f"{len(mesh.vertices)} places for {count} markers and {samples} samples"
-        raise InputError(cloud.name, found, "one for each", "import the recording again")
+        raise InputError(cloud.name, found, "one per marker and sample", "import the recording again")
     places, seen = np.empty(3 * count * samples, np.float32), np.empty(count * samples, bool)
     mesh.attributes["position"].data.foreach_get("vector", places)
     mesh.attributes[nodes.SEEN].data.foreach_get("value", seen)
@@ -115,42 +133,45 @@ def read(cloud: bpy.types.Object, scene: bpy.types.Scene) -> "MarkerTrial":
                         name=cloud.name, subject=kept.subject)
     there = np.unique(markers(cloud))
     if not len(there):
-        raise InputError(cloud.name, "no vertex that is a marker", "one for each", "import the recording again")
+        raise InputError(cloud.name, "no vertex of a marker", "one vertex per marker", "import the recording again")
     return trial if len(there) == count else trial.only([trial.labels[i] for i in there])
 
 
 def start_frame(cloud: bpy.types.Object) -> float:
-    """The scene frame of the first sample. InputError where nothing plays the cloud."""
+    """Return the scene frame of the first sample; raise InputError where no modifier plays the cloud."""
     return float(nodes.get(_player(cloud), "Start"))
 
 
 def played_rate(cloud: bpy.types.Object, scene: bpy.types.Scene) -> float:
-    """Samples a second as the scene plays them: another than the recording's where the user slows it down. InputError
-    where nothing plays the cloud, or where it stands still or runs backwards."""
+    """Return the samples per second of the playback, which differ from the recording's in slow motion.
+
+    Raises:
+        InputError: if no modifier plays the cloud, or it is paused or runs backwards.
+    """
     step = float(nodes.get(_player(cloud), "Step"))
     if step <= 0.0:
-        raise InputError(cloud.name, f"a Step of {step:g}", "samples in a frame, above 0", "set it in the modifier")
+        raise InputError(cloud.name, f"a Step of {step:g}", "samples per frame, above 0", "set Step in the modifier")
     return step * frames_per_second(scene)
 
 
 def _player(cloud: bpy.types.Object) -> bpy.types.Modifier:
-    """The modifier that plays a cloud. InputError where it is gone."""
+    """Return the modifier that plays a cloud; raise InputError where it is missing."""
     modifier = nodes.modifier_of(cloud)
     if modifier is None:
         wanted, step = f"the modifier {nodes.NAME}", "import the recording again"
-        raise InputError(cloud.name, "nothing that plays it", wanted, step)
+        raise InputError(cloud.name, "no modifier that plays it", wanted, step)
     return modifier
 
 
 def _samples(modifier: bpy.types.Modifier | None) -> bpy.types.Mesh | None:
-    """The mesh of all samples that a modifier plays; None where it plays none, or some other object."""
+    """Return the mesh of all samples that a modifier plays; None where there is none."""
     holder = nodes.get(modifier, "Trajectories") if modifier is not None else None
     mesh = holder.data if holder is not None and holder.type == "MESH" else None
     return mesh if mesh is not None and nodes.SEEN in mesh.attributes else None
 
 
 def places_at(cloud: bpy.types.Object, frame: float) -> list[tuple[int, Vector]]:
-    """Markers that are seen on a scene frame and their places in the cloud's own space, quickly, in any mode."""
+    """Return the visible markers on a scene frame with their places in the cloud's own space, quickly, in any mode."""
     modifier = nodes.modifier_of(cloud)
     mesh = _samples(modifier)
     if mesh is None:
@@ -172,9 +193,9 @@ def places_at(cloud: bpy.types.Object, frame: float) -> list[tuple[int, Vector]]
 
 
 def markers(cloud: bpy.types.Object) -> np.ndarray:
-    """Which marker each vertex is: (V,) places in the list of labels; none where the mesh does not know."""
+    """Read the marker of each vertex: (V,) indices of labels; empty where the mesh has no such attribute."""
     mesh = cloud.data
-    if mesh.is_editmode:  # the mesh itself has no data meanwhile
+    if mesh.is_editmode:  # the mesh has no data in Edit Mode
         shape = bmesh.from_edit_mesh(mesh)
         layer = shape.verts.layers.int.get(nodes.MARKER)
         found = np.array([vertex[layer] for vertex in shape.verts] if layer is not None else [], np.int32)
@@ -187,14 +208,16 @@ def markers(cloud: bpy.types.Object) -> np.ndarray:
 
 
 def check(trial: "MarkerTrial") -> None:
-    """InputError where there is nothing to show."""
+    """Raise InputError where no marker is visible."""
     if not len(trial) or not trial.seen.any():
-        raise InputError(trial.name, "no marker is ever seen", "a recording with markers", "choose another file")
+        raise InputError(trial.name, "no marker is ever visible", "a recording with markers", "choose another file")
 
 
 def held(positions: np.ndarray) -> np.ndarray:
-    """Positions (T, M, 3) without gaps: what is not seen stands where it was seen last, or will be first; what is never
-    seen in the middle of all."""
+    """Fill the gaps of positions (T, M, 3) with the last visible place, or the next one at the start.
+
+    A marker that is never visible is placed in the middle of all.
+    """
     out, seen = positions.copy(), np.isfinite(positions).all(axis=-1)
     rows = np.arange(len(out))
     for marker in range(out.shape[1]):
@@ -207,7 +230,7 @@ def held(positions: np.ndarray) -> np.ndarray:
 
 
 def _relabel(cloud: bpy.types.Object, names: tuple[str, ...]) -> None:
-    """Other labels, as after markers were joined or left out; segment, landmark and role go along by name."""
+    """Replace the labels, as after markers were joined or left out; segment, landmark and role are kept by name."""
     kept, mesh = cloud.beyond_mocap_cloud, cloud.data
     known = {label.name.strip(): (label.segment, label.landmark, label.role) for label in kept.labels}
     mesh.clear_geometry()
@@ -222,7 +245,7 @@ def _relabel(cloud: bpy.types.Object, names: tuple[str, ...]) -> None:
 
 
 def _trajectories(name: str, places: np.ndarray, seen: np.ndarray) -> bpy.types.Object:
-    """The mesh of all samples (T, M, 3), on an object that stands in no collection."""
+    """Create the mesh of all samples (T, M, 3), on an object in no collection."""
     mesh = bpy.data.meshes.new(f"{name} trajectories")
     mesh.vertices.add(seen.size)
     mesh.attributes["position"].data.foreach_set("vector", places.astype(np.float32).ravel())
@@ -236,7 +259,7 @@ def _attribute(mesh: bpy.types.Mesh, name: str, kind: str, values: np.ndarray) -
 
 
 def visible_labels(context: bpy.types.Context) -> list[tuple[Vector, str, tuple]]:
-    """What is written where: (place in the world, label, colour) of every marker that is seen now."""
+    """List what is drawn: (place in the world, label, colour) of every visible marker."""
     thing = context.view_layer.objects.active
     if not context.scene.beyond_mocap_markers.names or not is_cloud(thing) or not thing.visible_get():
         return []
@@ -250,6 +273,7 @@ def visible_labels(context: bpy.types.Context) -> list[tuple[Vector, str, tuple]
 
 
 def _draw_labels() -> None:
+    """Draw the visible labels into the 3D view, without overlaps."""
     import blf
 
     context = bpy.context
@@ -260,7 +284,7 @@ def _draw_labels() -> None:
     for place, text, rgba in visible_labels(context):
         at = location_3d_to_region_2d(context.region, context.region_data, place)
         cell = at and (round(at.x / (LABEL_WIDTH * scale)), round(at.y / (LABEL_HEIGHT * scale)))
-        if cell and cell not in taken:  # one over the other cannot be read
+        if cell and cell not in taken:  # overlapping labels are unreadable
             taken.add(cell)
             blf.color(0, *rgba)
             blf.position(0, at.x + 6 * scale, at.y + 3 * scale, 0)

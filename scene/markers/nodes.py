@@ -1,10 +1,8 @@
-"""The node group that plays markers, and the lines between those of a segment: each vertex of a cloud goes where the
-trajectories say at the scene's time.
+"""The node group that plays markers, and the edges between the markers of a segment.
 
-
-The trajectories are a mesh of their own, sample after sample, in each as many vertices as the cloud has. It is Blender
-that samples them, so that a saved file plays without the extension. Where a marker is not seen, it has neither sphere
-nor lines.
+The trajectories are a mesh, sample after sample, each with as many vertices as the cloud has. Blender itself samples
+them at the scene's time, so a saved file plays without the extension. A marker that is not visible has neither sphere
+nor edges.
 """
 
 from __future__ import annotations
@@ -19,25 +17,25 @@ from ..core.material import colour
 
 NAME = "Marker Cloud"
 SEEN, SIDE, MARKER = "seen", "side", "marker"
-"""Attributes: of the trajectories, whether a sample was seen; of a cloud's vertices, a place in COLOURS, and which
-marker it is."""
+"""Attributes: of the trajectories, whether a sample is visible; of a cloud's vertices, an index into COLOURS, and the
+index of the marker."""
 COLOURS = (("Marker", (0.80, 0.80, 0.80)), ("Marker left", (0.80, 0.05, 0.03)), ("Marker right", (0.03, 0.50, 0.08)),
            ("Marker without segment", (0.95, 0.55, 0.02)))
 INPUTS = (("Trajectories", "NodeSocketObject", None, "The mesh of all samples"),
-          ("Markers", "NodeSocketInt", 1, "Vertices of a sample"),
-          ("Samples", "NodeSocketInt", 1, "How many samples there are"),
+          ("Markers", "NodeSocketInt", 1, "Vertices per sample"),
+          ("Samples", "NodeSocketInt", 1, "Number of samples"),
           ("Start", "NodeSocketFloat", 1.0, "Scene frame of the first sample"),
-          ("Step", "NodeSocketFloat", 1.0, "Samples in a scene frame"),
-          ("Radius", "NodeSocketFloat", 0.007, "Of the spheres, in Blender units"),
-          ("Lines", "NodeSocketBool", True, "Draw lines between a segment's markers"))
+          ("Step", "NodeSocketFloat", 1.0, "Samples per scene frame"),
+          ("Radius", "NodeSocketFloat", 0.007, "Radius of the spheres in Blender units"),
+          ("Lines", "NodeSocketBool", True, "Draw lines between the markers of a segment"))
 
-NEIGHBOURS = 3  # edges that each marker begins
+NEIGHBOURS = 3  # nearest markers to which each one gets an edge
 
 _waiting: list[bool] = []
 
 
 def group() -> bpy.types.NodeTree:
-    """The node group, made where the file does not have it yet."""
+    """Return the node group; create it if the file does not have it yet."""
     found = bpy.data.node_groups.get(NAME)
     if found is not None and all(name in found.interface.items_tree for name, *_ in INPUTS):
         return found
@@ -54,7 +52,7 @@ def group() -> bpy.types.NodeTree:
 
 
 def hang(cloud: bpy.types.Object, values: dict) -> bpy.types.Modifier:
-    """The modifier that plays a cloud, with the inputs in `values` by name."""
+    """Add the modifier that plays a cloud, with inputs by name."""
     modifier = cloud.modifiers.new(NAME, "NODES")
     modifier.node_group = group()
     modifier.show_on_cage = True
@@ -64,7 +62,7 @@ def hang(cloud: bpy.types.Object, values: dict) -> bpy.types.Modifier:
 
 
 def modifier_of(cloud: bpy.types.Object) -> bpy.types.Modifier | None:
-    """The modifier that plays a cloud; None where there is none."""
+    """Find the modifier that plays a cloud; None where there is none."""
     nodes = (found for found in cloud.modifiers if found.type == "NODES" and found.node_group is not None)
     return next((found for found in nodes if "Trajectories" in found.node_group.interface.items_tree), None)
 
@@ -80,7 +78,7 @@ def put(modifier: bpy.types.Modifier, name: str, value) -> None:
 
 
 def get(modifier: bpy.types.Modifier, name: str):
-    """An input by its name."""
+    """Return an input by its name."""
     identifier = modifier.node_group.interface.items_tree[name].identifier
     if hasattr(modifier, "properties"):
         return getattr(modifier.properties.inputs, identifier).value
@@ -88,15 +86,15 @@ def get(modifier: bpy.types.Modifier, name: str):
 
 
 class _Builder:
-    """Puts the nodes of the group together."""
+    """Builds the nodes of the group."""
 
     def __init__(self, tree: bpy.types.NodeTree):
-        """tree: empty, with its inputs and outputs."""
+        """Start with an empty tree that has its inputs and outputs."""
         self.tree = tree
         self.inputs = self.node("NodeGroupInput").outputs
 
     def node(self, kind: str, *sources, **settings):
-        """A node with these settings, its first sockets fed from `sources` (sockets or values; None leaves one)."""
+        """Add a node; its first sockets are fed from `sources` (sockets or values; None leaves one as it is)."""
         node = self.tree.nodes.new(kind)
         node.location = (220 * (len(self.tree.nodes) % 12), -220 * (len(self.tree.nodes) // 12))
         for name, value in settings.items():
@@ -110,23 +108,23 @@ class _Builder:
         return node
 
     def out(self, kind: str, *sources, **settings):
-        """The first output of such a node."""
+        """Add a node and return its first output."""
         return next(socket for socket in self.node(kind, *sources, **settings).outputs if socket.enabled)
 
     def number(self, operation: str, *sources):
-        """Arithmetic."""
+        """Add arithmetic."""
         return self.out("ShaderNodeMath", *sources, operation=operation)
 
     def whole(self, operation: str, *sources):
-        """Arithmetic of whole numbers, exact for any number of samples."""
+        """Add integer arithmetic, exact for any number of samples."""
         return self.out("FunctionNodeIntegerMath", *sources, operation=operation)
 
     def logic(self, operation: str, *sources):
-        """And, or, not."""
+        """Add and, or, not."""
         return self.out("FunctionNodeBooleanMath", *sources, operation=operation)
 
     def build(self) -> None:
-        """The whole group."""
+        """Build the whole group."""
         points, seen = self.sampled()
         moved = self.out("GeometryNodeSetPosition", self.inputs["Geometry"], None, points)
         kept = self.out("GeometryNodeStoreNamedAttribute", moved, None, SEEN, seen, data_type="BOOLEAN", domain="POINT")
@@ -139,7 +137,7 @@ class _Builder:
         self.node("NodeGroupOutput", joined.outputs[0])
 
     def sampled(self):
-        """Where each vertex is now, and whether it was seen: between two samples both, where both were seen."""
+        """Return where each vertex is now, and whether it is visible: interpolated where both samples are visible."""
         frame = self.node("GeometryNodeInputSceneTime").outputs["Frame"]
         row = self.number("MULTIPLY", self.number("SUBTRACT", frame, self.inputs["Start"]), self.inputs["Step"])
         end = self.whole("SUBTRACT", self.inputs["Samples"], 1)
@@ -154,7 +152,7 @@ class _Builder:
         return points, self.out("GeometryNodeSwitch", late, saw, sees, input_type="BOOLEAN")
 
     def sample(self, row):
-        """Place and sight of each vertex in one sample."""
+        """Return place and visibility of each vertex in one sample."""
         about = self.node("GeometryNodeObjectInfo", self.inputs["Trajectories"], transform_space="ORIGINAL")
         marker = self.out("GeometryNodeInputNamedAttribute", MARKER, data_type="INT")
         at = self.whole("ADD", self.whole("MULTIPLY", row, self.inputs["Markers"]), marker)
@@ -165,7 +163,7 @@ class _Builder:
         return place, self.out("GeometryNodeSampleIndex", geometry, sight, at, data_type="BOOLEAN", domain="POINT")
 
     def spheres(self, points, shown, number: int):
-        """Spheres on the seen markers of one colour."""
+        """Return spheres on the visible markers of one colour."""
         side = self.out("GeometryNodeInputNamedAttribute", SIDE, data_type="INT")
         mine = self.out("FunctionNodeCompare", side, number, data_type="INT", operation="EQUAL")
         ball = self.out("GeometryNodeMeshIcoSphere", self.inputs["Radius"], 2)
@@ -176,7 +174,7 @@ class _Builder:
 
 @contextmanager
 def draw_later():
-    """Lines wait: many labels are changed, and drawn at the end."""
+    """Defer drawing of edges while many labels change."""
     _waiting.append(True)
     try:
         yield
@@ -185,7 +183,7 @@ def draw_later():
 
 
 def draw_lines(cloud: bpy.types.Object) -> None:
-    """Write edges and colours by the segments of the labels, in edit mode too; what is selected stays selected."""
+    """Write edges and colours by the segments of the labels, in Edit Mode too; the selection stays."""
     mesh, labels = cloud.data, cloud.beyond_mocap_cloud.labels
     if _waiting or cloud.library is not None or mesh.library is not None:
         return
@@ -213,7 +211,14 @@ def draw_lines(cloud: bpy.types.Object) -> None:
 
 
 def edges(places: np.ndarray, segments: list[str]) -> list[tuple[int, int]]:
-    """Pairs of markers: each with its nearest of the same segment. places: (M, 3); segments: "" belongs to none."""
+    """Find pairs of markers: each with its nearest ones of the same segment.
+
+    Args:
+        places: (M, 3).
+        segments: name for each marker, "" for none.
+    Returns:
+        Index pairs, sorted.
+    """
     found = set()
     for segment in sorted({name for name in segments if name}):
         mine = np.flatnonzero([name == segment for name in segments])
@@ -225,7 +230,7 @@ def edges(places: np.ndarray, segments: list[str]) -> list[tuple[int, int]]:
 
 
 def side(segment: str) -> int:
-    """Which of `nodes.COLOURS` a segment's markers have."""
+    """Return the index into COLOURS for the markers of a segment."""
     if not segment:
         return 3
     return 1 if segment.startswith("Left") else 2 if segment.startswith("Right") else 0

@@ -1,4 +1,4 @@
-"""The labels of a cloud as a marker set of the core, and a marker set on the labels of a cloud."""
+"""Convert the labels of a cloud to a marker set of the core, and apply a marker set to the labels of a cloud."""
 
 from __future__ import annotations
 
@@ -18,17 +18,27 @@ OWN = "own"
 
 
 def of_cloud(cloud: bpy.types.Object, name: str = "") -> "MarkerSet":
-    """The marker set that a cloud's labels describe, with what its static trial and the set that was applied say of
-    markers that the cloud itself lacks. InputError where no segment has a marker, or names are wrong."""
+    """Build the marker set that a cloud's labels describe.
+
+    Markers that the cloud lacks come from its static trial and the set that was applied last.
+
+    Args:
+        cloud: the cloud.
+        name: of the set; "" uses the cloud's.
+    Returns:
+        The marker set.
+    Raises:
+        InputError: if no marker has a segment, or names are wrong.
+    """
     from ...beyond_mocap.markers.files.marker_set_text import parse_marker_set
     from ...beyond_mocap.markers.model.marker_set import MarkerSet
 
     kept = cloud.beyond_mocap_cloud
     told = {row.name: (row.segment.strip(), row.landmark, row.role) for row in kept.labels}
     if not any(segment for segment, *_ in told.values()):
-        raise InputError(cloud.name, "no marker belongs to a segment", "some that do",
+        raise InputError(cloud.name, "no marker has a segment", "markers with segments",
                          "load a marker set, or select markers in Edit Mode and press Assign")
-    before = parse_marker_set(kept.set_text, cloud.name) if kept.set_text else None  # that was applied last
+    before = parse_marker_set(kept.set_text, cloud.name) if kept.set_text else None  # the set that was applied last
     if is_cloud(kept.static):
         told = {row.name: (row.segment.strip(), row.landmark, "STATIC") for row in kept.static.beyond_mocap_cloud.labels
                 if row.role not in ("BALL", "OTHER") and row.segment.strip()} | told  # fmt: skip
@@ -49,7 +59,7 @@ def of_cloud(cloud: bpy.types.Object, name: str = "") -> "MarkerSet":
 
 
 def _rows_of(marker_set: "MarkerSet") -> dict[str, tuple[str, str, str]]:
-    """Segment, landmarks and role of every label of a set."""
+    """Return segment, landmarks and role of every label of a set."""
     marks: dict[str, list[str]] = {}
     for landmark, labels in marker_set.landmarks.items():
         for label in labels:
@@ -60,7 +70,7 @@ def _rows_of(marker_set: "MarkerSet") -> dict[str, tuple[str, str, str]]:
 
 
 def apply(cloud: bpy.types.Object, marker_set: "MarkerSet") -> list[str]:
-    """Give a cloud's labels the names, segments and roles of a marker set; returns lines about what does not fit."""
+    """Apply names, segments and roles of a marker set to a cloud's labels; return messages on what does not fit."""
     from ...beyond_mocap.markers.files.marker_set_text import marker_set_text
     from ...beyond_mocap.markers.model.marker_set import named_as
     from .cloud import read
@@ -79,14 +89,14 @@ def apply(cloud: bpy.types.Object, marker_set: "MarkerSet") -> list[str]:
 
 
 def role(marker_set: "MarkerSet", label: str) -> str:
-    """A label's role in a set."""
+    """Return a label's role in a set."""
     table = (("BALL", marker_set.ball), ("OTHER", marker_set.other), ("STATIC", marker_set.static),
              ("OPTIONAL", marker_set.optional))
     return next((name for name, labels in table if label in labels), "NEEDED")
 
 
 def recognised(labels: tuple[str, ...]) -> "MarkerSet":
-    """The shipped set that these labels are of. InputError where none fits."""
+    """Choose the shipped set of these labels; raise InputError where none fits."""
     from ...beyond_mocap.markers.files.marker_set_text import shipped_sets
     from ...beyond_mocap.markers.model.marker_set import recognise
 
@@ -94,7 +104,7 @@ def recognised(labels: tuple[str, ...]) -> "MarkerSet":
 
 
 def assign(cloud: bpy.types.Object, names: list[str], segment: str) -> None:
-    """Let these markers belong to a segment; "" frees them."""
+    """Assign markers to a segment; "" removes them from it."""
     from ...beyond_mocap.markers.model.template import JOINTS
 
     if segment and segment not in JOINTS:
@@ -110,7 +120,7 @@ def assign(cloud: bpy.types.Object, names: list[str], segment: str) -> None:
 
 
 def chosen(cloud: bpy.types.Object) -> list[str]:
-    """Labels of the vertices that are selected; outside Edit Mode that of the list's row."""
+    """List the labels of the selected vertices; outside Edit Mode that of the active row."""
     from .cloud import markers
 
     if not is_cloud(cloud):

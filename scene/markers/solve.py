@@ -1,6 +1,9 @@
-"""From a cloud to a body: what the recipe gets, and what its result becomes in the scene: the body, its model as a text
-of the file, and the ball that left the hand. Reconstructions are kept at the recording's own rate, which an action has
-not, as long as Blender runs, under names that a cloud keeps."""
+"""From a cloud to a body: the request of a reconstruction, and its result in the scene: body, model text and thrown
+ball.
+
+Reconstructions are stored in memory at the recording's own rate, which an action does not have, under names that a
+cloud keeps.
+"""
 
 from __future__ import annotations
 
@@ -35,18 +38,29 @@ if TYPE_CHECKING:
     from ...beyond_mocap.markers.trial import MarkerTrial
     from ...beyond_mocap.motion.motion import Motion
 
-MADE = "beyond_mocap_reconstructed"  # custom property of actions made here; no group has its name
-THROWN = "beyond_mocap_thrown"  # custom property of balls (their mesh's radius) and actions made here; no group's name
+MADE = "beyond_mocap_reconstructed"  # custom property of actions created here; no property group has this name
+THROWN = "beyond_mocap_thrown"  # custom property of balls (their mesh's radius) and actions created here
 SKIN = (0.55, 0.55, 0.60)
-MOST_KEPT = 30  # reconstructions
+MOST_KEPT = 30  # reconstructions in memory
 _numbers = itertools.count(1)
-_session = uuid.uuid4().hex[:8]  # part of every name, so that none of another session is taken for one of this
+# Part of every name, so that names of another session are not confused with those of this one.
+_session = uuid.uuid4().hex[:8]
 _made: dict[str, "Reconstruction"] = {}
 
 
 @dataclass(frozen=True)
 class Order:
-    """All that the recipe needs of a cloud, without bpy. cloud: its name; add: the clip to write, with `words`."""
+    """Everything that a reconstruction needs of a cloud, without bpy.
+
+    Attributes:
+        cloud: its name.
+        trial: its markers.
+        static: its static trial, or None.
+        model: its model, or None.
+        settings: the options.
+        add: path of the clip to write, or None.
+        words: labels of that clip.
+    """
 
     cloud: str
     trial: "MarkerTrial"
@@ -58,7 +72,9 @@ class Order:
 
 
 def order_of(scene: bpy.types.Scene, cloud: bpy.types.Object) -> Order:
-    """What is asked of a cloud by its own settings and the scene's. InputError where something is missing."""
+    """Build the request of a cloud from its own settings and the scene's; raise InputError where something is
+    missing.
+    """
     channels.check_local(cloud, cloud.data)
     kept, chosen = cloud.beyond_mocap_cloud, scene.beyond_mocap_markers
     trial = clouds.read(cloud, scene)
@@ -71,18 +87,20 @@ def order_of(scene: bpy.types.Scene, cloud: bpy.types.Object) -> Order:
 
 
 def _static_of(cloud: bpy.types.Object, scene: bpy.types.Scene) -> bpy.types.Object | None:
-    """The cloud that stands for its model. InputError where it was deleted: the field keeps what is in no scene."""
+    """Find the static trial of a cloud; raise InputError where it was deleted, since the pointer keeps deleted
+    objects.
+    """
     kept = cloud.beyond_mocap_cloud
     if kept.use_model or not is_cloud(kept.static) or kept.static == cloud:
         return None
     if scene.objects.get(kept.static.name) != kept.static:
-        raise InputError(cloud.name, f"its static trial {kept.static.name} is gone from the scene",
-                         "a cloud that is there", "choose another, or clear the field")
+        raise InputError(cloud.name, f"its static trial {kept.static.name} is not in the scene",
+                         "a cloud of this scene", "choose another, or clear the field")
     return kept.static
 
 
 def settings_of(cloud: bpy.types.Object, chosen, words: tuple[str, ...] = ()) -> "ReconstructSettings":
-    """The recipe's settings; the marker set is the cloud's own where its markers have segments."""
+    """Build the options of a reconstruction; the marker set is the cloud's own where its markers have segments."""
     from ...beyond_mocap.markers.reconstruct import ReconstructSettings
 
     assigned = any(row.segment for row in cloud.beyond_mocap_cloud.labels)
@@ -93,17 +111,21 @@ def settings_of(cloud: bpy.types.Object, chosen, words: tuple[str, ...] = ()) ->
 
 
 def clip_place(scene: bpy.types.Scene, name: str) -> Path:
-    """Where the clip goes in the library's folder. InputError where there is none, or where the name is taken."""
+    """Find a free path for the clip in the library folder; raise InputError without a folder, or where the name is
+    taken.
+    """
     from ...beyond_mocap.library.keep_words import free_place
 
     folder = scene.beyond_mocap.library_folder
     if not folder:
-        raise InputError("library", "no folder is chosen", "one", "choose it in the panel Library")
+        raise InputError("library", "no folder", "a library folder", "choose it in the panel Library")
     return free_place(Path(absolute(folder)), bpy.path.clean_name(name))
 
 
 def show(context: bpy.types.Context, cloud: bpy.types.Object, made: "Reconstruction") -> bpy.types.Object:
-    """The result beside the cloud: an armature that moves with it, and what is told in the panel; returns it."""
+    """Show the result beside the cloud: an armature that moves with it, and messages in the panel; return the
+    armature.
+    """
     scene, kept = context.scene, cloud.beyond_mocap_cloud
     thing = kept.body
     if thing is None or not is_alone(cloud, scene, "body") or not fits(thing, made, scene):
@@ -128,27 +150,27 @@ def show(context: bpy.types.Context, cloud: bpy.types.Object, made: "Reconstruct
 
 
 def fits(thing: bpy.types.Object, made: "Reconstruction", scene: bpy.types.Scene) -> bool:
-    """Whether a body from before has the same bones and may be written to."""
+    """Return whether an earlier body has the same bones and may be overwritten."""
     if thing.type != "ARMATURE" or thing.library is not None or thing.name not in scene.objects:
         return False
     return armature.skeleton_of(thing, scene).same_bones(made.motion.skeleton, 1e-4)
 
 
 def figures(made: "Reconstruction") -> list[str]:
-    """Lines "name: value" for the panel."""
+    """List lines "name: value" for the panel."""
     residual = made.solved.residual
     away = 1000.0 * residual[np.isfinite(residual)]
     lines = [f"Frames: {len(made.motion)} at {made.motion.fps:g}/s", f"Joints: {len(made.motion.skeleton)}"]
     lines.append(f"Markers: {len(made.model.markers)}")
     if len(away):
-        lines += [f"Markers off: {away.mean():.1f} mm", f"95 % of them: below {np.percentile(away, 95.0):.1f} mm"]
+        lines += [f"Mean residual: {away.mean():.1f} mm", f"95 % below: {np.percentile(away, 95.0):.1f} mm"]
     spent = sum(value for name, value in made.seconds.items() if name != "total")
-    lines.append(f"Took: {spent:.1f} s")
+    lines.append(f"Time: {spent:.1f} s")
     return lines
 
 
 def add(order: Order, made: "Reconstruction") -> list[str]:
-    """Write the clip and its words into the library, where that was asked for; lines about it."""
+    """Write the clip and its labels to the library, if requested; return messages."""
     if order.add is None:
         return []
     from ...beyond_mocap.library.keep_words import add_clip
@@ -159,7 +181,7 @@ def add(order: Order, made: "Reconstruction") -> list[str]:
 
 
 def keep_model(cloud: bpy.types.Object, model: "MarkerModel") -> None:
-    """Keep a model with a cloud; a text that other clouds use too stays as it is."""
+    """Store a model with a cloud; a text that other clouds use stays unchanged."""
     from ...beyond_mocap.markers.files.model_json import model_text
 
     kept = cloud.beyond_mocap_cloud
@@ -171,20 +193,23 @@ def keep_model(cloud: bpy.types.Object, model: "MarkerModel") -> None:
 
 
 def model_of(cloud: bpy.types.Object) -> "MarkerModel":
-    """The model of a cloud. InputError where there is none, or none that can be read."""
+    """Read the model of a cloud; raise InputError where there is none, or it cannot be read."""
     from ...beyond_mocap.markers.files.model_json import parse_model
 
     text = cloud.beyond_mocap_cloud.model
     if text is None:
-        raise InputError(cloud.name, "no model", "one", "press Reconstruct without Use Model, or load a model")
+        raise InputError(cloud.name, "no model", "a model", "press Reconstruct without Use Model, or load a model")
     return parse_model(text.as_string(), text.name)
 
 
 def release_order(
     scene: bpy.types.Scene, cloud: bpy.types.Object
 ) -> tuple[str, "MarkerTrial", "Motion", "ReleaseSettings"]:
-    """What is asked of a cloud: its name, its markers as recorded, on the motion's floor, the motion, the settings.
-    InputError where its body has not been reconstructed in this session."""
+    """Build the request of a release: the cloud's name, its markers on the motion's floor, the motion, the settings.
+
+    Raises:
+        InputError: if the body was not reconstructed in this session.
+    """
     from ...beyond_mocap.markers.release.release import ReleaseSettings
 
     channels.check_local(cloud, cloud.data)
@@ -201,7 +226,7 @@ def release_order(
 
 
 def show_release(context: bpy.types.Context, cloud: bpy.types.Object, found: "Release") -> bpy.types.Object:
-    """The ball on its way, the release on the timeline, and figures in the panel; returns the ball."""
+    """Show the ball on its trajectory, the release on the timeline, and figures in the panel; return the ball."""
     scene, kept, thing = context.scene, cloud.beyond_mocap_cloud, cloud.beyond_mocap_cloud.ball
     lost = thing is None or thing.library is not None or thing.name not in scene.objects
     if lost or not is_alone(cloud, scene, "ball"):
@@ -227,17 +252,17 @@ def show_release(context: bpy.types.Context, cloud: bpy.types.Object, found: "Re
 
 
 def release_lines(found: "Release") -> list[str]:
-    """Lines "name: value" for the panel."""
-    told = [f"Speed: {found.speed:.1f} ± {found.speed_sigma:.1f} m/s", f"That is: {3.6 * found.speed:.0f} km/h",
-            f"Released: {found.time:.3f} s ± {1000.0 * found.time_sigma:.0f} ms", f"Hand: {found.side}",
-            f"Told by: {found.how}"]
+    """List lines "name: value" for the panel."""
+    told = [f"Speed: {found.speed:.1f} ± {found.speed_sigma:.1f} m/s", f"In km/h: {3.6 * found.speed:.0f} km/h",
+            f"Release: {found.time:.3f} s ± {1000.0 * found.time_sigma:.0f} ms", f"Hand: {found.side}",
+            f"Estimated from: {found.how}"]
     if found.radar is not None:
         told.append(f"Radar: {found.radar:.1f} m/s, {100.0 * (found.speed / found.radar - 1.0):+.1f} %")
     return [*told, *found.notes]
 
 
 def keep_reconstruction(made: "Reconstruction") -> str:
-    """Keep it; returns its name."""
+    """Store a reconstruction; return its name."""
     name = f"markers-{_session}-{next(_numbers)}"
     _made[name] = made
     while len(_made) > MOST_KEPT:
@@ -246,10 +271,10 @@ def keep_reconstruction(made: "Reconstruction") -> str:
 
 
 def reconstruction_of(name: str) -> "Reconstruction | None":
-    """The one of that name; None where this session has not made it."""
+    """Return the reconstruction of that name; None if it is not of this session."""
     return _made.get(name)
 
 
 def forget_reconstructions() -> None:
-    """Forget everything."""
+    """Clear all stored reconstructions."""
     _made.clear()

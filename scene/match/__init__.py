@@ -1,1 +1,1 @@
-"""Matches in the scene: everybody in kit, pitch, ball and cameras."""
+"""Matches in the scene: players in kits, pitch, ball and cameras."""

@@ -1,5 +1,8 @@
-"""Bodies of a match: one armature, one mesh a kit and one a number, shared by all whose bones agree. Numbers are
-Blender's own digits, cut fine enough to lie on the cloth, big on the back, small in front."""
+"""Create the characters of a match: one armature, one mesh per kit and one per number, shared by all with the same
+bones.
+
+Numbers use Blender's own digits, subdivided finely enough to follow the shirt, large on the back and small in front.
+"""
 
 from __future__ import annotations
 
@@ -20,13 +23,22 @@ from .load import Person
 if TYPE_CHECKING:
     from ...beyond_mocap.appearance.body import BodyMesh
 
-SIZES = {"back": 0.235, "chest": 0.095}  # metres that digits are tall
-WIDEST = {"back": 0.26, "chest": 0.13}  # metres that two digits may take
-FINE = 0.018  # metres between cuts
+SIZES = {"back": 0.235, "chest": 0.095}  # m, height of digits
+WIDEST = {"back": 0.26, "chest": 0.13}  # m, largest width of a number
+FINE = 0.018  # m between cuts of the digits
 
 
 class Wardrobe:
-    """Dresses people; what has been made for one serves all others that it fits."""
+    """Create characters; datablocks created for one are shared with all others they fit.
+
+    Attributes:
+        context: Blender's context.
+        colours: "#RRGGBB" of shirts by team.
+        bones: armature data by fit key.
+        shapes: built shapes by key, and by mesh what its weights are built from.
+        meshes: meshes by key.
+        materials: by kit and part.
+    """
 
     def __init__(self, context: bpy.types.Context, colours: dict[str, str]):
         self.context, self.colours = context, colours
@@ -36,7 +48,14 @@ class Wardrobe:
         self.cloths: dict[tuple, bpy.types.Material] = {}
 
     def dress(self, person: Person, collection) -> list[bpy.types.Object]:
-        """An armature, and the meshes on it: body, and shirt number where he has one."""
+        """Create an armature and the meshes on it: body, and shirt number if there is one.
+
+        Args:
+            person: the player or referee.
+            collection: where the objects go.
+        Returns:
+            The armature, then its meshes.
+        """
         example = person.motions[0][1]
         fits = _fits(example.skeleton)
         who = ours.mark(self._armature(example, label(person), collection, fits))
@@ -67,14 +86,15 @@ class Wardrobe:
         return ours.mark(thing)
 
     def _shape(self, example: Motion, fits: tuple):
-        """The low-poly body on those bones."""
-        from ...beyond_mocap.appearance.body import low_poly_body  # brings scipy, which is slow to import
+        """Build the low-poly body for these bones."""
+        from ...beyond_mocap.appearance.body import low_poly_body  # imports scipy, which is slow
 
         if fits not in self.shapes:
             self.shapes[fits] = low_poly_body(example.skeleton, example=example)
         return self.shapes[fits]
 
     def _body(self, example: Motion, fits: tuple, kit: Kit) -> bpy.types.Mesh:
+        """Create the body mesh of a kit, or return the existing one."""
         from ...beyond_mocap.appearance.body import MATERIALS
 
         key = (fits, kit.name)
@@ -90,6 +110,7 @@ class Wardrobe:
         return self.meshes[key]
 
     def _number(self, example: Motion, fits: tuple, kit: Kit, number: int) -> bpy.types.Mesh:
+        """Create the mesh of a shirt number in a kit's colours, or return the existing one."""
         key = (fits, number, kit.name)
         if key not in self.meshes:
             drawn = (fits, number)
@@ -103,21 +124,21 @@ class Wardrobe:
         return self.meshes[key]
 
     def _cloth(self, kit: Kit, part: str) -> bpy.types.Material:
-        """The one material that all of a kit wear."""
+        """Find or create the material that all of a kit share."""
         key = (kit.name, part)
         if key not in self.cloths:
             self.cloths[key] = cloth(kit, part)
         return self.cloths[key]
 
     def _mesh(self, name: str, fits: tuple, vertices: np.ndarray, faces) -> bpy.types.Mesh:
-        """A mesh in the armature's own space from vertices (V, 3) m around the resting root."""
+        """Create a mesh in the armature's own space from vertices (V, 3) m around the resting root."""
         root = np.array(self.bones[fits].bones[0].head_local)
         mesh = bpy.data.meshes.new(name)
         mesh.from_pydata((vertices * units_per_metre(self.context.scene) + root).tolist(), [], faces)
         return mesh
 
     def _weigh(self, thing: bpy.types.Object, mesh: bpy.types.Mesh, who: bpy.types.Object) -> None:
-        """A vertex group per bone, filled in runs of equal weight; the mesh keeps them for all who wear it."""
+        """Assign a vertex group per bone, in runs of equal weight; the mesh keeps them for all its users."""
         names, joints, weights = self.shapes[mesh]
         for joint, name in enumerate(names):
             share = np.sum(np.where(joints == joint, weights, 0.0), axis=1)
@@ -130,7 +151,7 @@ class Wardrobe:
 
 
 def label(person: Person) -> str:
-    """What an object of his is called: team, number, name."""
+    """Build the name of a character's objects: team, number, name."""
     number = f" {person.number}" if person.number >= 0 else ""
     known = person.name if person.name and person.name != person.id else ""
     return " ".join(part for part in (f"{person.team.capitalize()}{number}", known) if part)
@@ -138,8 +159,17 @@ def label(person: Person) -> str:
 
 def number_shapes(number: int, body: "BodyMesh", skeleton: Skeleton,
                   example: Motion) -> tuple[np.ndarray, list[tuple[int, ...]], np.ndarray, np.ndarray]:
-    """Vertices (V, 3) m in the rest pose, faces, joints (V, 6) and weights (V, 6) of `number` on back and chest."""
-    from ...beyond_mocap.appearance.shirt_number import on_shirt  # brings scipy, which is slow to import
+    """Build the shapes of a shirt number on back and chest.
+
+    Args:
+        number: of the shirt.
+        body: the body it lies on.
+        skeleton: of the body.
+        example: a motion of the player.
+    Returns:
+        Vertices (V, 3) m in the rest pose, faces, joints (V, 6) and weights (V, 6).
+    """
+    from ...beyond_mocap.appearance.shirt_number import on_shirt  # imports scipy, which is slow
 
     scale = float(np.ptp(body.vertices, axis=0).max()) / 1.8
     vertices, faces, joints, weights = [], [], [], []
@@ -155,12 +185,12 @@ def number_shapes(number: int, body: "BodyMesh", skeleton: Skeleton,
 
 
 def _fits(skeleton) -> tuple:
-    """Equal for skeletons on which the same armature and meshes serve."""
+    """Build a key that is equal for skeletons that can share armature and meshes."""
     return skeleton.names, skeleton.parents, np.round(skeleton.offsets, 6).tobytes()
 
 
 def _digits(text: str, tall: float, widest: float) -> tuple[np.ndarray, list[tuple[int, ...]]]:
-    """Points (N, 2) m around the text's middle, to the right and up, and polygons that look at the reader."""
+    """Build points (N, 2) m around the text's middle, right and up, and polygons that face the reader."""
     mesh = _filled(text)
     shape = bmesh.new()
     shape.from_mesh(mesh)
@@ -170,6 +200,7 @@ def _digits(text: str, tall: float, widest: float) -> tuple[np.ndarray, list[tup
     low, high = points.min(axis=0), points.max(axis=0)
     middle, scale = (low + high) / 2.0, tall / (high[1] - low[1])
     scale = np.array([min(scale, widest / (high[0] - low[0])), scale])
+    # Cut the flat digits into cells of CUT_DISTANCE, so that they can follow the shirt.
     for axis in (0, 1):
         for at in np.arange(low[axis], high[axis], FINE / scale[axis])[1:]:
             place, normal = np.zeros(3), np.zeros(3)
@@ -185,7 +216,7 @@ def _digits(text: str, tall: float, widest: float) -> tuple[np.ndarray, list[tup
 
 
 def _filled(text: str) -> bpy.types.Mesh:
-    """The text as a flat mesh, in Blender's built-in font."""
+    """Create a flat mesh of the text, in Blender's built-in font."""
     curve = bpy.data.curves.new("Number", "FONT")
     curve.body, curve.resolution_u = text, 4
     thing = bpy.data.objects.new("Number", curve)

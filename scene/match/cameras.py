@@ -1,8 +1,8 @@
-"""Cameras of a match: one from the stand that follows the ball, and one in the head of any player.
+"""Cameras of a match: one in the stand that follows the ball, and one in the head of any player.
 
-The stand's camera turns on an aim that glides after the ball, and zooms so that it always shows about the same stretch
-of pitch. The player's one sits where his eyes are and looks where they look: the way his face is turned, and from there
-towards the ball as far as eyes turn in a head.
+The stand's camera tracks a target that follows the ball smoothly, and zooms so that it always shows about the same
+width of pitch. The player's camera is at their eyes and looks where they look: in the direction of the face, and from
+there towards the ball within the range of the eyes.
 """
 
 from __future__ import annotations
@@ -21,21 +21,30 @@ from ..core.measure import frames_per_second, units_per_metre
 from . import ours
 
 STAND, EYES = "Match Broadcast", "Match Eyes"
-FROM = (0.0, 26.0, 17.0)  # metres: along the pitch, behind the touch line, above the ground
-SEEN, NEAREST = 33.0, 55.0  # metres across that the stand's camera shows; how near the ball may come to it
-GLIDE = 0.9  # s, of the bell by which its aim is smoothed
+FROM = (0.0, 26.0, 17.0)  # m: along the pitch, behind the touch line, above the ground
+SEEN, NEAREST = 33.0, 55.0  # m: width shown by the stand's camera; least distance to the ball used for zoom
+GLIDE = 0.9  # s, Gaussian smoothing of its target
 SENSOR = 36.0  # mm
-EYE = (0.115, 0.04)  # metres from the head joint's middle of the eyes, ahead and up, for 1.80 m
-NEAR = 0.1  # metres from the eyes that are not seen: brows and nose
-WIDE = 18.0  # mm of the player's lens: 90 degrees, as much as one notices
-EYES_TURN = np.radians(35.0)  # that eyes turn in a head, more than that is the head's own
-STEADY = 0.12  # s, of the bell by which the gaze is smoothed
-UP = np.tan(np.radians(18.0))  # how steeply a gaze rises at most: higher things are in the picture's upper half
-RESTS = np.radians(12.0)  # that a gaze without a ball looks below the face's axis
+EYE = (0.115, 0.04)  # m from the head joint to the middle of the eyes, ahead and up, for 1.80 m
+NEAR = 0.1  # m from the eyes that are clipped: brows and nose
+WIDE = 18.0  # mm, the player's lens: 90 degrees
+EYES_TURN = np.radians(35.0)  # rad, how far eyes rotate in the head
+STEADY = 0.12  # s, Gaussian smoothing of the gaze
+UP = np.tan(np.radians(18.0))  # steepest rise of a gaze: higher objects are in the upper half of the picture
+RESTS = np.radians(12.0)  # rad, how far a gaze without a ball points below the face's axis
 
 
 def broadcast(scene: bpy.types.Scene, size: tuple[float, float], frames: np.ndarray, seen: np.ndarray):
-    """The camera from the stand over scene frames (F,), whose middle follows `seen` (F, 2) m; size: of the pitch."""
+    """Create the camera in the stand.
+
+    Args:
+        scene: the scene.
+        size: length and width of the pitch, m.
+        frames: (F,) scene frames.
+        targets: (F, 2) m, what it follows.
+    Returns:
+        The camera.
+    """
     units, home = units_per_metre(scene), ours.part(scene, "cameras")
     aim = ours.mark(bpy.data.objects.new("Match Broadcast aim", None))
     aim.empty_display_size = 0.5 * units
@@ -60,13 +69,22 @@ def broadcast(scene: bpy.types.Scene, size: tuple[float, float], frames: np.ndar
 
 
 def stand_of(scene: bpy.types.Scene) -> bpy.types.Object | None:
-    """The camera in the stand; None where there is none."""
+    """Find the camera in the stand; None if there is none."""
     return next((thing for thing in ours.things(scene, "cameras") if thing.get(ours.MARK) == STAND), None)
 
 
 def eyes(scene: bpy.types.Scene, who: bpy.types.Object, ball: bpy.types.Object | None) -> bpy.types.Object:
-    """The camera in the head of the armature `who`, made or moved there. InputError where it plays nothing, or has no
-    head."""
+    """Create the camera in a player's head, or move the existing one there.
+
+    Args:
+        scene: the scene.
+        body: the player's armature.
+        ball: the ball the player looks at, None: none.
+    Returns:
+        The camera.
+    Raises:
+        InputError: if the armature plays no action, or has no head.
+    """
     first = action.first_frame(who)
     if first is None:
         raise InputError(who.name, "it plays no action", "a player of a shown match", "press Show Match")
@@ -84,15 +102,21 @@ def eyes(scene: bpy.types.Scene, who: bpy.types.Object, ball: bpy.types.Object |
 
 
 def view_of(motion: Motion, target: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
-    """Place (T, 3) m and rotation (T, 4) of a camera at a body's eyes. target: (T, 3) m of what it would look at, NaN
-    where there is nothing."""
-    from ...beyond_mocap.motion.retargeting.neutral import neutral_stance  # brings scipy, which is slow to import
+    """Compute a camera at a body's eyes.
+
+    Args:
+        motion: T frames.
+        target: (T, 3) m of what the player looks at, NaN where there is nothing; None: nothing.
+    Returns:
+        Positions (T, 3) m and rotations (T, 4).
+    """
+    from ...beyond_mocap.motion.retargeting.neutral import neutral_stance  # imports scipy, which is slow
 
     skeleton = motion.skeleton
     head, neutral = identify(skeleton).head_or_neck, neutral_stance(skeleton, motion)
     places, world = forward_kinematics(motion)
     face = quaternion.multiply(world[:, head], quaternion.inverse(neutral.rotations[head]))
-    scale = neutral.leg / 0.88  # an adult's leg of 1.80 m
+    scale = neutral.leg / 0.88  # m, the leg of a body of 1.80 m
     eye = places[:, head] + quaternion.rotate(face, np.array([EYE[0], 0.0, EYE[1]]) * scale)
     ahead = unit_vectors(quaternion.rotate(face, np.array([1.0, 0.0, 0.0])))
     gaze = gaussian_smooth(_towards(ahead, eye, target), STEADY * motion.fps)
@@ -101,7 +125,9 @@ def view_of(motion: Motion, target: np.ndarray | None) -> tuple[np.ndarray, np.n
 
 
 def _towards(ahead: np.ndarray, eye: np.ndarray, target: np.ndarray | None) -> np.ndarray:
-    """Directions (T, 3): `ahead`, turned towards the target as far as eyes turn; a little down where there is none."""
+    """Compute gaze directions (T, 3): `ahead`, rotated towards the target within the range of the eyes; slightly
+    down without a target.
+    """
     down = unit_vectors(ahead - [0.0, 0.0, np.tan(RESTS)])
     if target is None:
         return down
@@ -116,7 +142,7 @@ def _towards(ahead: np.ndarray, eye: np.ndarray, target: np.ndarray | None) -> n
 
 
 def _between(first: np.ndarray, second: np.ndarray, angle: np.ndarray, share: np.ndarray) -> np.ndarray:
-    """Unit vectors a share of the way along the arc between two rows of unit vectors (T, 3) that are `angle` apart."""
+    """Interpolate unit vectors along the arc between two rows of unit vectors (T, 3) that are `angle` apart."""
     sine = np.maximum(np.sin(angle), 1e-6)
     a, b = np.sin((1.0 - share) * angle) / sine, np.sin(share * angle) / sine
     near = angle < 1e-4
@@ -124,14 +150,14 @@ def _between(first: np.ndarray, second: np.ndarray, angle: np.ndarray, share: np
 
 
 def _looking(gaze: np.ndarray) -> np.ndarray:
-    """Rotations (T, 4) of cameras that look along `gaze` (T, 3), upright."""
+    """Build rotations (T, 4) of upright cameras that look along `gaze` (T, 3)."""
     right = unit_vectors(np.cross(gaze, [0.0, 0.0, 1.0]))
     up = np.cross(right, gaze)
     return quaternion.continuous(quaternion.from_matrix(np.stack([right, up, -gaze], axis=-1)))
 
 
 def _ball_places(scene: bpy.types.Scene, ball: bpy.types.Object | None, frames: np.ndarray) -> np.ndarray | None:
-    """(F, 3) m of the ball's keys; None where there is no ball with keys."""
+    """Sample the ball's keys, (F, 3) m; None if there is no ball with keys."""
     found = channels.curves(*channels.playing(ball)) if ball is not None and channels.playing(ball)[0] else {}
     if not all(("location", axis) in found for axis in range(3)):
         return None
@@ -140,6 +166,7 @@ def _ball_places(scene: bpy.types.Scene, ball: bpy.types.Object | None, frames: 
 
 
 def _eyes_camera(scene: bpy.types.Scene) -> bpy.types.Object:
+    """Find the camera in the player's head, or create it."""
     home = ours.part(scene, "cameras")
     found = next((thing for thing in ours.things(scene, "cameras") if thing.get(ours.MARK) == EYES), None)
     if found is None:

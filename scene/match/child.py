@@ -1,7 +1,7 @@
-"""The command line in a process of its own: plain Python on the core, beside Blender.
+"""Run the command line in its own process: plain Python on the core, beside Blender.
 
-Functions of an extension cannot be sent to another process, and Blender's window must stay alive; so a match is made by
-the verb that scripts use, and what it tells of its progress is passed on.
+Functions of an extension cannot be sent to another process, and Blender's window must stay responsive. So a match is
+synthesized by the command that scripts use, and its progress is passed on.
 """
 
 from __future__ import annotations
@@ -19,22 +19,30 @@ from pathlib import Path
 
 from ...beyond_mocap.base.errors import BeyondMocapError, Cancelled
 
-LOOK = 0.1  # seconds between two looks whether somebody wants out
-PATIENCE = 60.0  # seconds that a cancelled process has to come to its end
-SILENCE = 3.0  # seconds after its end for which its last words are waited for: workers may hold its pipe open
+LOOK = 0.1  # s between two checks for a cancellation
+PATIENCE = 60.0  # s that a cancelled process has to stop
+SILENCE = 3.0  # s to wait for last lines after its end: workers may hold its pipe open
 OWN = "beyond-mocap: "
-"""What the command's own lines about trouble begin with."""
+"""Start of the command's own error lines."""
 
 _running: set[subprocess.Popen] = set()
 
 
 def run(arguments: list[str], progress: Callable[[float, str], None], cancelled: Callable[[], bool]) -> list[str]:
-    """Runs `beyond-mocap ARGUMENTS --json` and returns its notes; in any thread.
+    """Run `beyond-mocap ARGUMENTS --json`, in any thread.
 
-    Cancelled: somebody wanted out, and it has ended; what was finished is kept. BeyondMocapError: what the command told
-    when it ended otherwise."""
-    while _running:  # one that was cancelled comes to its end
-        progress(0.0, "waiting for what was cancelled to end")
+    Args:
+        arguments: of the command line.
+        progress: receives the share done and a text.
+        cancelled: called now and then; True cancels the work.
+    Returns:
+        Its notes.
+    Raises:
+        Cancelled: if `cancelled` returned True and the process has ended; finished work is kept.
+        BeyondMocapError: with the command's message, if it ended otherwise.
+    """
+    while _running:  # a cancelled process is still stopping
+        progress(0.0, "waiting for the cancelled run to stop")
         if cancelled():
             raise Cancelled("cancelled")
         time.sleep(LOOK)
@@ -45,30 +53,31 @@ def run(arguments: list[str], progress: Callable[[float, str], None], cancelled:
     try:
         notes, last, asked = _heard(process, progress, cancelled)
     finally:
-        _interrupt(process)  # where something else than its end ended the listening
+        _interrupt(process)  # if reading stopped before the process ended
         _running.discard(process)
     if process.returncode == 0:
         return notes
     if asked or process.returncode == Cancelled.exit_status:
-        raise Cancelled("cancelled; what was finished is kept, and the next run goes on there")
-    ended = f"the process that makes the match ended with status {process.returncode}"
+        raise Cancelled("cancelled; finished work is kept, and the next run resumes there")
+    ended = f"the match process ended with status {process.returncode}"
     trouble = BeyondMocapError(last.removeprefix(OWN) or ended)
     trouble.exit_status = process.returncode if process.returncode > 0 else trouble.exit_status
     raise trouble
 
 
 def end_all() -> None:
-    """Asks all such processes to end; for the moment in which the extension is switched off."""
+    """Ask all such processes to stop, when the extension is disabled."""
     for process in list(_running):
         _interrupt(process)
 
 
 def _heard(process, progress, cancelled) -> tuple[list[str], str, bool]:
-    """Follow a process to its end: its notes, what it said last beside them (its own trouble, where it told some), and
-    whether it was asked to stop."""
+    """Follow a process to its end; return its notes, its last other line (its own error, if any), and whether it was
+    stopped.
+    """
     lines: queue.SimpleQueue = queue.SimpleQueue()
     threading.Thread(target=_listen, args=(process.stderr, lines), daemon=True).start()
-    notes, last, asked, ended = [], "", None, None  # asked, ended: when, by the clock
+    notes, last, asked, ended = [], "", None, None  # stop time and end time, by the clock
     while True:
         line = _next(lines)
         now = time.monotonic()
@@ -91,7 +100,7 @@ def _heard(process, progress, cancelled) -> tuple[list[str], str, bool]:
 
 
 def _next(lines: queue.SimpleQueue) -> str | None:
-    """The next line; empty where none comes for a while, None at their end."""
+    """Read the next line; "" if none arrives in time, None at the end."""
     try:
         return lines.get(timeout=LOOK)
     except queue.Empty:
@@ -99,7 +108,7 @@ def _next(lines: queue.SimpleQueue) -> str | None:
 
 
 def _listen(stream, lines) -> None:
-    """Every line of a stream, then None; it closes the stream, since nobody else may while it reads."""
+    """Read every line of a stream, then None; close the stream here, because nothing else may while it is read."""
     with stream:
         for line in stream:
             lines.put(line)
@@ -107,7 +116,7 @@ def _listen(stream, lines) -> None:
 
 
 def _told(line: str) -> dict | None:
-    """What a line of the command's progress says; None where it is another line."""
+    """Parse a progress line of the command; None for any other line."""
     if not line.startswith("{"):
         return None
     try:
@@ -117,7 +126,7 @@ def _told(line: str) -> dict | None:
 
 
 def _surroundings() -> dict[str, str]:
-    """The environment in which a plain Python finds the core, and what it needs, where Blender found them."""
+    """Build the environment in which a plain Python finds the core and its dependencies where Blender found them."""
     core = Path(__file__).resolve().parents[2]
     paths = [str(core), *(path for path in sys.path if path and os.path.isdir(path))]
     ours = {"PYTHONPATH": os.pathsep.join(dict.fromkeys(paths)), "PYTHONSAFEPATH": "1", "PYTHONDONTWRITEBYTECODE": "1"}
@@ -125,11 +134,11 @@ def _surroundings() -> dict[str, str]:
 
 
 def _own_group() -> dict:
-    """Windows interrupts whole groups of processes: this one is a group of its own."""
+    """Build the options of a separate process group: Windows interrupts whole groups."""
     return {"creationflags": subprocess.CREATE_NEW_PROCESS_GROUP} if os.name == "nt" else {}
 
 
 def _interrupt(process: subprocess.Popen) -> None:
-    """Ask it to stop, as Ctrl-C would."""
+    """Ask a process to stop, as Ctrl-C would."""
     if process.poll() is None:
         process.send_signal(signal.CTRL_BREAK_EVENT if os.name == "nt" else signal.SIGINT)

@@ -1,5 +1,4 @@
-"""What players wear: shirts in their team's colour, keepers and referees in others, numbers that can be
-read on them."""
+"""Kits of players: shirts in the team's colour, other colours for keepers and referees, and readable numbers."""
 
 from __future__ import annotations
 
@@ -15,21 +14,29 @@ from . import ours
 from .load import TEAMS, Person
 
 USUAL = {"home": "#C8102E", "away": "#1D4ED8", "referee": "#15171A"}
-"""Shirts of teams whose feed tells no colour."""
+"""Shirts of teams without a colour in the feed."""
 
 KEEPERS = ("#F2C200", "#1FA34A", "#F07A13", "#8A3FB5")
-"""Shirts to choose a keeper's from: yellow, green, orange, violet."""
+"""Possible shirts of keepers: yellow, green, orange, violet."""
 
 WHITE, DARK = (0.8, 0.8, 0.8), (0.012, 0.016, 0.03)
 OWN = ("shirt", "shorts", "socks", "number")
-"""Parts whose colour is the kit's."""
+"""Parts that have the kit's colours."""
 
-BRIGHT = 0.35  # luminance from which a shirt takes a dark number and dark shorts
+BRIGHT = 0.35  # luminance from which a shirt gets a dark number and dark shorts
 
 
 @dataclass(frozen=True)
 class Kit:
-    """Linear RGB of shirt, shorts, socks, and of the number on the shirt. name: of its materials."""
+    """The colours of a kit, linear RGB.
+
+    Attributes:
+        name: in the names of its materials.
+        shirt: colour.
+        shorts: colour.
+        socks: colour.
+        ink: colour of the number.
+    """
 
     name: str
     shirt: tuple[float, float, float]
@@ -39,7 +46,14 @@ class Kit:
 
 
 def kit_of(person: Person, colours: dict[str, str]) -> Kit:
-    """What a person wears; colours: team -> "#RRGGBB", USUAL where a team has none."""
+    """Choose a person's kit.
+
+    Args:
+        person: the player or referee.
+        colours: "#RRGGBB" by team, the default colour where a team has none.
+    Returns:
+        The kit.
+    """
     shirts = {team: linear(colours.get(team) or USUAL[team]) for team in USUAL}
     if person.team == "referee":
         return Kit("Referee", shirts["referee"], DARK, DARK, WHITE)
@@ -52,7 +66,7 @@ def kit_of(person: Person, colours: dict[str, str]) -> Kit:
 
 
 def _keepers(shirts: dict[str, tuple], team: str) -> tuple[float, float, float]:
-    """The keeper's colour that differs most from all shirts on the pitch; the away keeper's from the other's too."""
+    """Choose the keeper's colour that differs most from all shirts; the away keeper's also from the home keeper's."""
     worn, offered = list(shirts.values()), [linear(text) for text in KEEPERS]
     first = max(offered, key=lambda rgb: _nearest(rgb, worn))
     if team == "home":
@@ -65,25 +79,30 @@ def _nearest(rgb, others) -> float:
 
 
 def linear(text: str) -> tuple[float, float, float]:
-    """"#RRGGBB" (sRGB) as linear RGB."""
+    """Convert "#RRGGBB" (sRGB) to linear RGB."""
     shares = np.array([int(text.lstrip("#")[i : i + 2], 16) for i in (0, 2, 4)]) / 255.0
     return tuple(np.where(shares <= 0.04045, shares / 12.92, ((shares + 0.055) / 1.055) ** 2.4).tolist())
 
 
 def written(rgb) -> str:
-    """Linear RGB as "#RRGGBB"."""
+    """Convert linear RGB to "#RRGGBB"."""
     shares = np.clip(np.array(rgb[:3]), 0.0, 1.0)
     curved = np.where(shares <= 0.0031308, 12.92 * shares, 1.055 * shares ** (1 / 2.4) - 0.055)
     return "#" + "".join(f"{int(round(255.0 * share)):02X}" for share in curved)
 
 
 def luminance(rgb) -> float:
-    """How bright a linear colour is, 0 to 1."""
+    """Compute the luminance of a linear colour, 0 to 1."""
     return float(np.dot(rgb, (0.2126, 0.7152, 0.0722)))
 
 
 def repaint(scene: bpy.types.Scene, colours: dict[str, str]) -> None:
-    """Let whoever is dressed already in the scene's match wear these colours of shirts: team -> "#RRGGBB"."""
+    """Update the shirts of the displayed match.
+
+    Args:
+        scene: the scene.
+        colours: "#RRGGBB" by team.
+    """
     worn = {cloth for team in TEAMS for thing in ours.meshes(scene, team) for cloth in thing.data.materials}
     for team in USUAL:
         for keeper in (False, True):
@@ -94,10 +113,18 @@ def repaint(scene: bpy.types.Scene, colours: dict[str, str]) -> None:
 
 
 def cloth(kit: Kit, part: str) -> bpy.types.Material:
-    """A material for one part of a kit ("shirt", "number", or one of the body's), in the kit's present colour.
+    """Create or reuse a material for a part of a kit ("shirt", "number", or one of the body's), in the kit's present
+    colour.
 
-    What another match or anybody else wears is not taken: each call for a part of the kit's own gives another material
-    as soon as the one before is worn. Skin, hair and boots are everybody's."""
+    A material used by another match or object is not reused: after the previous one is in use, each call for one of the
+    kit's own parts gives another material. Skin, hair and boots are shared by all.
+
+    Args:
+        kit: the kit.
+        part: the part.
+    Returns:
+        The material.
+    """
     own = _own(kit)
     if part not in own:
         return colour(part.capitalize(), LOOKS[part])
@@ -116,14 +143,15 @@ def _name(kit: Kit, part: str) -> str:
 
 
 def _all_of(kit: Kit, part: str) -> list[bpy.types.Material]:
-    """The file's own materials for a part of a kit, of all matches that are shown in it, by name."""
+    """Find the file's own materials for a part of a kit, of all displayed matches, by name."""
     form = re.compile(re.escape(_name(kit, part)) + r"(\.\d{3,})?")
     return [one for one in bpy.data.materials if one.library is None and form.fullmatch(one.name)]
 
 
 def _paint(material: bpy.types.Material, rgb: tuple[float, float, float]) -> None:
+    """Set the colour of a material."""
     nodes = material.node_tree.nodes if material.node_tree is not None else ()
     shader = next((node for node in nodes if node.type == "BSDF_PRINCIPLED"), None)
-    if shader is not None:  # or the user has made another material of it
+    if shader is not None:  # otherwise the user has replaced its shader
         shader.inputs["Base Color"].default_value = (*rgb, 1.0)
     material.diffuse_color = (*(channel**0.6 for channel in rgb), 1.0)

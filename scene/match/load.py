@@ -1,5 +1,4 @@
-"""A folder of a made match as what the scene shows of a stretch of it, as plain values and arrays; in any thread, never
-touching bpy."""
+"""Load a section of a synthesized match for the scene, as plain values and arrays; in any thread, without bpy."""
 
 from __future__ import annotations
 
@@ -17,14 +16,22 @@ from ...beyond_mocap.motion.track.ball_path import BallPath
 if TYPE_CHECKING:
     from ...beyond_mocap.library.library import Library
 
-LIBRARYS_SHARE = 0.1  # of the bar
+LIBRARYS_SHARE = 0.1  # share of the progress bar
 TEAMS = ("home", "away", "referee")
 
 
 @dataclass(frozen=True, eq=False)
 class Person:
-    """A player or referee. id: as the feed has it. number: of the shirt, -1 where there is none. team: one of TEAMS.
-    motions: (s on the match's clock, motion) for every stretch in which he is there, in order."""
+    """A player or referee.
+
+    Attributes:
+        id: as in the feed.
+        name: of the player.
+        number: of the shirt, -1 if there is none.
+        team: one of TEAMS.
+        keeper: True for a goalkeeper.
+        motions: (s on the match's clock, motion) for every stretch on the pitch, in order.
+    """
 
     id: str
     name: str
@@ -36,8 +43,17 @@ class Person:
 
 @dataclass(frozen=True, eq=False)
 class Scenery:
-    """A stretch of a match: start and end, s on its clock; length and width of the pitch, m; colours: team -> "#RRGGBB"
-    of the shirts; who is there; the ball, where it is known."""
+    """A section of a match.
+
+    Attributes:
+        start: s on the match's clock.
+        end: s on the match's clock.
+        length: m of the pitch.
+        width: m of the pitch.
+        colours: "#RRGGBB" of shirts by team.
+        characters: players and referees who are present.
+        ball: where it is known, else None.
+    """
 
     start: float
     end: float
@@ -50,8 +66,18 @@ class Scenery:
 
 @dataclass(frozen=True)
 class Wanted:
-    """What is to be shown: the match's folder, seconds of its clock (end 0: to its end), players by id (empty:
-    everybody), colours of the teams' shirts; the library's folder, its unit, and how it is built."""
+    """What to display.
+
+    Attributes:
+        folder: of the match.
+        start: s on its clock.
+        end: s on its clock, 0 for its end.
+        players: ids, () for all.
+        colours: "#RRGGBB" of shirts by team.
+        library: folder of the library.
+        unit: metres per unit of the library.
+        build: how the library is built.
+    """
 
     folder: str
     start: float
@@ -65,9 +91,19 @@ class Wanted:
 
 def scenery(wanted: Wanted, library: "Library | None", progress: Callable[[float, str], None],
             cancelled: Callable[[], bool]) -> tuple["Library", Scenery, tuple[str, ...]]:
-    """The library (built where it is None), everybody's motion, and lines about whoever cannot be shown.
+    """Load a section of a match.
 
-    InputError where the folder holds no match, nobody of it is there in that time, or the library is another one."""
+    Args:
+        request: what to display.
+        library: the clips; None: build the library.
+        progress: receives the share done and a text.
+        cancelled: called now and then; True cancels the work.
+    Returns:
+        The library, the section, and messages about players who cannot be displayed.
+    Raises:
+        InputError: if the folder holds no match, no player is present in that time, or the library is a different one.
+        Cancelled: if `cancelled` returns True.
+    """
     from ...beyond_mocap.files.tables import read_ball
     from ...beyond_mocap.library.build import build
 
@@ -81,7 +117,7 @@ def scenery(wanted: Wanted, library: "Library | None", progress: Callable[[float
     people, lines = _people(wanted, state, library, ball=ball, span=(start, end), progress=progress,
                             cancelled=cancelled)
     if not people:
-        found = f"nobody is there from {told_time(start)} to {told_time(end)} s"
+        found = f"no player is present from {told_time(start)} to {told_time(end)} s"
         raise InputError(wanted.folder, found, "a time of play", *lines[:1])
     length, width = map(float, state["pitch_m"])
     seen = Scenery(start, end, length, width=width, colours=wanted.colours, people=tuple(people),
@@ -90,7 +126,7 @@ def scenery(wanted: Wanted, library: "Library | None", progress: Callable[[float
 
 
 def _state(folder: str) -> dict:
-    """What match.json says. InputError where something is missing that is needed here."""
+    """Read match.json; InputError if something needed here is missing."""
     from ...beyond_mocap.match.folder import STATE, read_state
 
     state = read_state(folder)
@@ -98,23 +134,24 @@ def _state(folder: str) -> dict:
     numbers = [state.get("from_s"), state.get("to_s"), *size]
     known = len(numbers) == 4 and all(isinstance(number, (int, float)) for number in numbers)
     if not known or not all("file" in player for player in state["players"]):
-        raise InputError(Path(folder) / STATE, "no times, no pitch, or a player without a file", "the state of a match",
-                         "make the match in another folder")
+        raise InputError(Path(folder) / STATE, "times, pitch or a player's file are missing", "the state of a match",
+                         "choose another folder for the match")
     return state
 
 
 def _span(wanted: Wanted, state: dict) -> tuple[float, float]:
+    """Resolve the requested span (start, end) s within the match."""
     first, last = float(state["from_s"]), float(state["to_s"])
     start, end = max(wanted.start, first), min(wanted.end or last, last)
     if end - start < 0.2:
         found = f"{told_time(wanted.start)} to {told_time(wanted.end)} s"
         expected = f"a time within {told_time(first)} to {told_time(last)} s"
-        raise InputError(wanted.folder, found, expected, "press Make Match for another")
+        raise InputError(wanted.folder, found, expected, "press Make Match for another time")
     return start, end
 
 
 def _people(wanted, state, library, ball, span, progress, cancelled) -> tuple[list[Person], list[str]]:
-    """Everybody who is there and was made, and lines about the others."""
+    """Construct all players who are present and finished; return them and messages about the others."""
     from ...beyond_mocap.match.player_edit import read_player
     from ...beyond_mocap.match.shown import shown
 
@@ -123,13 +160,13 @@ def _people(wanted, state, library, ball, span, progress, cancelled) -> tuple[li
     for number, player in enumerate(asked):
         if cancelled():
             raise Cancelled("cancelled")
-        progress(LIBRARYS_SHARE + (1.0 - LIBRARYS_SHARE) * number / len(asked), f"expanding {player['id']}")
+        progress(LIBRARYS_SHARE + (1.0 - LIBRARYS_SHARE) * number / len(asked), f"constructing {player['id']}")
         if player.get("status") != "done":
-            lines.append(f"{player['id']} was not made: {player.get('reason') or player.get('status')}")
+            lines.append(f"{player['id']} is not finished: {player.get('reason') or player.get('status')}")
             continue
         try:
             takes = shown(library, read_player(Path(wanted.folder) / f"{player['file']}.take.npz"), ball, *span)
-        except InputError as error:  # his file alone, or the library: then it is everybody's trouble
+        except InputError as error:  # this player's file, or the library, which then fails for all
             trouble = error
             lines.append(f"{player['id']} cannot be shown: {error}")
             continue
@@ -149,7 +186,7 @@ def _person(player: dict, motions: tuple) -> Person:
 
 
 def _between(ball: "BallPath | None", start: float, end: float) -> "BallPath | None":
-    """Its way from `start` to `end` s, gaps in it drawn straight; None where it is nowhere known."""
+    """Cut the ball to `start` .. `end` s, with gaps interpolated linearly; None if it is not known anywhere."""
     if ball is None:
         return None
     inside = (ball.times >= start - 1e-6) & (ball.times <= end + 1e-6)

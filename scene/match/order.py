@@ -1,4 +1,4 @@
-"""The settings of a match as what its steps need: what is read, the command line that makes it, what is shown of it."""
+"""The settings of a match as requests: what is read, the command line that synthesizes it, and what is displayed."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 def command(scene: bpy.types.Scene) -> list[str]:
-    """The arguments of the verb `match`. InputError where something is missing."""
+    """Build the arguments of the command `match`; InputError if something is missing."""
     settings, match = scene.beyond_mocap, scene.beyond_mocap_match
     out = ["match", *_asked(scene), "--out", folder_to_make(scene)]
     if match.scheduler:
@@ -36,7 +36,7 @@ def command(scene: bpy.types.Scene) -> list[str]:
 
 
 def wanted(scene: bpy.types.Scene, folder: str) -> Wanted:
-    """What is to be shown of a match's folder."""
+    """Build the request to display a match's folder."""
     settings, match = scene.beyond_mocap, scene.beyond_mocap_match
     library = _library(settings)
     ticked = tuple(player.feed_id for player in match.players if player.use)
@@ -48,8 +48,11 @@ def wanted(scene: bpy.types.Scene, folder: str) -> Wanted:
 
 
 def folder_to_make(scene: bpy.types.Scene) -> str:
-    """Where the match is kept: the chosen folder, or one beside the file that is saved, or else beside the tracking,
-    named after the stretch and, by a few digits, all else that is asked for."""
+    """Choose the folder of the match: the one in the settings, or one beside the saved file, else beside the tracking
+    file.
+
+    Its name has the time and, as a few digits, everything else that is requested.
+    """
     match = scene.beyond_mocap_match
     if match.folder:
         return absolute(match.folder)
@@ -62,17 +65,23 @@ def folder_to_make(scene: bpy.types.Scene) -> str:
 
 
 def folder_to_show(scene: bpy.types.Scene) -> str:
-    """The chosen folder; where none is, the one made last."""
+    """Choose the folder to display: the one in the settings, else the last result; InputError if there is none."""
     match = scene.beyond_mocap_match
     found = match.folder or match.made
     if not found:
-        raise InputError("match", "no folder", "the folder of a made match", "press Make Match, or choose one")
+        raise InputError("match", "no folder", "the folder of a match", "press Make Match, or choose one")
     return absolute(found)
 
 
 @dataclass(frozen=True)
 class Read:
-    """What is to be read: absolute paths, "" where there is none; provider "" where it is to be guessed."""
+    """What to read.
+
+    Attributes:
+        tracking: absolute path.
+        metadata: absolute path, "" if there is none.
+        provider: "" to detect it.
+    """
 
     tracking: str
     metadata: str
@@ -80,27 +89,41 @@ class Read:
 
 
 def reading_order(match: BeyondMocapMatch, chosen: str = "") -> Read:
-    """What the settings ask for; chosen: a tracking file that takes the place of theirs. InputError where there is
-    none."""
+    """Build the request to read a match; InputError if there is no tracking file.
+
+    Args:
+        match: the settings.
+        chosen: a tracking file used instead of theirs.
+    Returns:
+        The request.
+    """
     tracking = chosen or absolute(match.tracking_file)
     if not tracking:
         raise InputError("match", "no tracking file", "a provider's tracking of a match", "choose one, or drop it here")
     if tracks.is_plain(tracking):
         raise InputError(tracking, "one player's track", "a provider's tracking of a match",
-                         "import it in step 2, Track & Words")
+                         "import it in step 2")
     metadata = "" if chosen else absolute(match.metadata_file)
     return Read(tracking, metadata, "" if match.provider == AUTO else match.provider)
 
 
 def read_match(order: Read, progress) -> tuple[Read, "Match"]:
-    """Reads it, in any thread."""
+    """Read the match, in any thread; return the request and the data."""
     progress(0.05, "reading the match")
     return order, tracks.match_of(order.tracking, order.metadata, order.provider)
 
 
 def fill_match(match: BeyondMocapMatch, order: Read, read: "Match") -> None:
-    """The list, the colours and the lines about the data. Who was left out before in the same file stays left out; of
-    another file the first minute is chosen, and what was chosen beside the file before is forgotten."""
+    """Update the list, the colours and the messages about the data.
+
+    Players deselected in the same file stay deselected. For another file, its first minute is selected, and files
+    chosen for the previous one are cleared.
+
+    Args:
+        match: the settings.
+        request: what was read.
+        data: the match.
+    """
     same = absolute(match.read_of) == order.tracking
     left_out = {player.feed_id for player in match.players if not player.use} if same else set()
     if not same:
@@ -123,7 +146,7 @@ def fill_match(match: BeyondMocapMatch, order: Read, read: "Match") -> None:
 
 
 def _asked(scene: bpy.types.Scene) -> list[str]:
-    """The arguments that decide what comes out."""
+    """Build the arguments that determine the result."""
     settings, match = scene.beyond_mocap, scene.beyond_mocap_match
     if not match.tracking_file:
         raise InputError("match", "no tracking file", "a provider's tracking of a match", "choose one, or drop it here")
@@ -137,7 +160,7 @@ def _asked(scene: bpy.types.Scene) -> list[str]:
     if 0.0 < match.end <= match.start:
         found = f"To ({typed(match.end)} s) is not after From ({typed(match.start)} s)"
         raise InputError("match", found, "a later time",
-                         "set To, or set it to 0 for the match's end")
+                         "set To, or set it to 0 for the end of the match")
     out += ["--from", typed(match.start)] + (["--to", typed(match.end)] if match.end else [])
     out += _players(match)
     out += [] if match.solve_touches else ["--no-solve-touches"]
@@ -148,12 +171,12 @@ def _asked(scene: bpy.types.Scene) -> list[str]:
 def _players(match: BeyondMocapMatch) -> list[str]:
     ticked = [player.feed_id for player in match.players if player.use]
     if match.players and not ticked:
-        raise InputError("match", "nobody is ticked", "players", "tick some in the list")
+        raise InputError("match", "no players selected", "at least one", "select players in the list")
     if len(ticked) == len(match.players):
         return []
     if absolute(match.read_of) != absolute(match.tracking_file):
-        raise InputError("match", f"the list is that of {Path(match.read_of).name}", "the tracking file's own",
-                         "press Read Match, then tick players")
+        raise InputError("match", f"the list belongs to {Path(match.read_of).name}", "that of the tracking file",
+                         "press Read Match, then select players")
     return ["--players", *ticked]
 
 

@@ -1,5 +1,7 @@
-"""What a shown match has put into the file: a tree of collections, and objects with a mark. Shown again, or taken away,
-only these go; what the user has put beside them stays."""
+"""The collections and objects of a displayed match, each with a mark. When the match is displayed again or removed,
+only
+these are removed; other objects of the user stay.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +12,7 @@ from .load import TEAMS
 
 MARK = "beyond_mocap_match"
 PLAYER = "beyond_mocap_match_player"
-"""Custom property of a player's armature: his id."""
+"""Custom property of a player's armature: the player's id."""
 
 ROOT = "Match"
 PARTS = {"home": "Match Home", "away": "Match Away", "referee": "Match Referees", "ball": "Match Ball",
@@ -18,20 +20,21 @@ PARTS = {"home": "Match Home", "away": "Match Away", "referee": "Match Referees"
 
 
 def mark(thing):
-    """Let an object or action be known as ours; returns it."""
+    """Mark an object or action as part of the match; return it."""
     thing[MARK] = True
     return thing
 
 
 def root(scene: bpy.types.Scene) -> bpy.types.Collection | None:
-    """The collection "Match", wherever the user has put it; None where no match is shown. One that is linked from
-    another file is that file's."""
+    """Find the collection "Match", wherever the user has moved it; None if no match is displayed. Linked ones do not
+    count.
+    """
     found = (one for one in scene.collection.children_recursive if one.get(MARK) == "root" and one.library is None)
     return next(found, None)
 
 
 def part(scene: bpy.types.Scene, name: str) -> bpy.types.Collection:
-    """One of PARTS, made where it is missing, with the tree above it."""
+    """Find one of COLLECTION_NAMES, or create it with its parents."""
     whole = root(scene)
     if whole is None:
         whole = bpy.data.collections.new(ROOT)
@@ -46,8 +49,9 @@ def part(scene: bpy.types.Scene, name: str) -> bpy.types.Collection:
 
 
 def include(layer: bpy.types.ViewLayer) -> None:
-    """Let a view layer have our collections again that somebody has excluded, or one above them: only what is in it can
-    be animated."""
+    """Include the match's collections, and those above them, in a view layer again: objects outside it cannot be
+    animated.
+    """
     _include(layer.layer_collection)
 
 
@@ -60,28 +64,35 @@ def _include(layer: bpy.types.LayerCollection) -> None:
 
 
 def bodies(scene: bpy.types.Scene) -> list[bpy.types.Object]:
-    """The armatures that are shown, team by team."""
+    """Find the armatures of the displayed match, team by team."""
     whole = root(scene)
     teams = [one[MARK] for one in whole.children if one.get(MARK) in TEAMS] if whole is not None else []
     return [thing for team in teams for thing in things(scene, team) if thing.type == "ARMATURE"]
 
 
 def things(scene: bpy.types.Scene, name: str) -> list[bpy.types.Object]:
-    """What is shown of one of PARTS."""
+    """Find the displayed objects of one of COLLECTION_NAMES."""
     whole = root(scene)
     found = [one for one in whole.children if one.get(MARK) == name] if whole is not None else []
     return [thing for one in found for thing in one.objects if thing.get(MARK)]
 
 
 def meshes(scene: bpy.types.Scene, name: str) -> list[bpy.types.Object]:
-    """The meshes of one of PARTS that is shown."""
+    """Find the displayed meshes of one of COLLECTION_NAMES."""
     return [thing for thing in things(scene, name) if thing.type == "MESH"]
 
 
 def clear(scene: bpy.types.Scene) -> None:
-    """Take away all that is ours, with the actions and data that nothing else uses; emptied collections go too.
-    Actions stay that the user has made, or wants to keep (the shield beside their name). What another scene shows too
-    is taken out of this one only. InputError where that cannot be done: both have it in a collection of the user's."""
+    """Clear the displayed match, with actions and data that nothing else uses; emptied collections are removed too.
+
+    The user's own actions and those with a fake user stay. What another scene displays too is only unlinked from this
+    one.
+
+    Args:
+        scene: the scene.
+    Raises:
+        InputError: if that is not possible because both scenes have it in a collection of the user's.
+    """
     whole = root(scene)
     if whole is None or _let_go(scene, whole):
         return
@@ -98,7 +109,7 @@ def clear(scene: bpy.types.Scene) -> None:
     bpy.data.batch_remove([one for one in data if not one.users])
     bpy.data.batch_remove([one for one in actions if one.get(MARK) and not one.users])
     for one in actions_of_users:
-        one.use_fake_user = True  # or it would not be saved
+        one.use_fake_user = True  # otherwise it would not be saved
     for one in [*whole.children, whole]:
         if not one.all_objects and not one.children:
             bpy.data.collections.remove(one)
@@ -109,7 +120,7 @@ def _others(scene: bpy.types.Scene) -> list[bpy.types.Scene]:
 
 
 def _let_go(scene: bpy.types.Scene, whole: bpy.types.Collection) -> bool:
-    """Take out of the scene what of our tree another scene has too; whether that was all of it."""
+    """Unlink from the scene what another scene also has of the match; return whether that was all of it."""
     shared = {one for other in _others(scene) for one in other.collection.children_recursive}
     tree = (scene.collection, *scene.collection.children_recursive)
     held = [whole] if whole in shared else [one for one in whole.children if one.get(MARK) and one in shared]
@@ -117,7 +128,7 @@ def _let_go(scene: bpy.types.Scene, whole: bpy.types.Collection) -> bool:
     stuck = next((above for above, _ in ends if above in shared), None)
     if stuck is not None:
         found = f"holds the match {whole.name!r} in two scenes"
-        raise InputError(f"collection {stuck.name!r}", found, "one for each scene", "move the match out of it")
+        raise InputError(f"collection {stuck.name!r}", found, "a collection per scene", "move the match out of it")
     for above, one in ends:
         above.children.unlink(one)
     return whole in shared

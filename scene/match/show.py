@@ -1,6 +1,7 @@
-"""A stretch of a match in the scene: pitch, everybody in kit, ball and cameras. Shown again, it takes its own place.
+"""Show a section of a match in the scene: pitch, players in kits, ball and cameras. Showing it again replaces it.
 
-Bodies have poses on every frame of their stretches, and are hidden outside them."""
+Characters have poses on every frame of their stretches, and are hidden outside them.
+"""
 
 from __future__ import annotations
 
@@ -24,9 +25,15 @@ SHOWN = "Shown"  # group of curves
 
 
 def show(context: bpy.types.Context, scenery: Scenery, first: int) -> dict[str, float]:
-    """Put a stretch of a match into the scene, its start on scene frame `first`; what was shown before goes.
+    """Show a section of a match; what was displayed before is removed.
 
-    Returns how many seconds pitch, bodies, keys and cameras took."""
+    Args:
+        context: Blender's context.
+        section: what to show.
+        first: scene frame of its start.
+    Returns:
+        Seconds that pitch, bodies, keys and cameras took.
+    """
     scene, took = context.scene, {}
     ours.clear(scene)
     ours.include(context.view_layer)
@@ -43,31 +50,39 @@ def show(context: bpy.types.Context, scenery: Scenery, first: int) -> dict[str, 
     with _clock(took, "cameras"):
         frames, size = np.arange(first, last + 1), (scenery.length, scenery.width)
         camera = cameras.broadcast(scene, size, frames, _followed(scene, scenery, frames, first))
-    if scene.camera is None:  # nobody's, or one of those that have just gone
+    if scene.camera is None:  # none, or one that has just been removed
         scene.camera = camera
     bake.lengthen(scene, last)
     return took
 
 
 def ball_shown(scene: bpy.types.Scene) -> bpy.types.Object | None:
-    """The ball of the match that is shown; None where there is none."""
+    """Find the ball of the displayed match; None if there is none."""
     return next(iter(ours.meshes(scene, "ball")), None)
 
 
 def frame_of(scene: bpy.types.Scene, start: float, first: int, seconds: float) -> float:
-    """The scene frame (fractional) of a second on the match's clock, where `start` s is frame `first`."""
+    """Compute the scene frame (fractional) of a second on the match's clock, where `start` s is frame `first`."""
     return first + (seconds - start) * frames_per_second(scene)
 
 
 def bake_person(scene: bpy.types.Scene, person: Person, worn: list[bpy.types.Object], start: float, first: int,
                 last: int) -> None:
-    """Let a person's armature (the first of `worn`) move as he does, and everything he wears be hidden outside his
-    stretches; `start` s is scene frame `first`, and `last` the last frame that is shown."""
+    """Bake a character's motion to its armature, and hide its objects outside its stretches.
+
+    Args:
+        scene: the scene.
+        character: who.
+        objects: the armature, then its meshes.
+        start: s on the match's clock.
+        first: scene frame of that time.
+        last: last displayed frame.
+    """
     who = worn[0]
     parts = [action.keyed(who, motion, scene, frame_of(scene, start, first, begins)) for begins,
              motion in person.motions]
     frames = np.concatenate([frames for frames, _ in parts])
-    kept = np.concatenate([[True], np.diff(frames) > 0])  # stretches may share a frame
+    kept = np.concatenate([[True], np.diff(frames) > 0])  # consecutive stretches may share a frame
     curves = {path: (group, np.concatenate([curves[path][1] for _, curves in parts])[kept]) for path,
               (group, _) in parts[0][1].items()}
     done = channels.animate(who, f"{who.name} match", frames[kept], curves)
@@ -80,17 +95,27 @@ def bake_person(scene: bpy.types.Scene, person: Person, worn: list[bpy.types.Obj
 
 
 def hide_outside(worn: list[bpy.types.Object], there: np.ndarray, first: int) -> None:
-    """Hide objects, in views and renders, on the frames from `first` on where `there` (F,) is false."""
+    """Hide objects, in views and renders, on the frames from `first` where `is_present` (F,) is False."""
     turns = np.flatnonzero(np.diff(there.astype(int)))
     at = np.unique(np.concatenate([[0], turns, turns + 1]))
     hidden = np.where(there[at], 0.0, 1.0)[:, None]
     curves = {name: (SHOWN, hidden) for name in ("hide_viewport", "hide_render")}
-    for thing in worn[1:]:  # an armature has keys of its own, and no surface
+    for thing in worn[1:]:  # an armature has its own keys, and no surface
         ours.mark(channels.animate(thing, f"{thing.name} shown", first + at, curves))
 
 
 def bake_ball(context: bpy.types.Context, path: BallPath, start: float, first: int, last: int) -> bpy.types.Object:
-    """The ball with its way and roll, hidden where the path does not reach, and its course as a curve."""
+    """Bake the ball with its roll, hidden where its trajectory is unknown, and its trajectory as a curve.
+
+    Args:
+        context: Blender's context.
+        path: the ball path.
+        start: s on the match's clock.
+        first: scene frame of that time.
+        last: last displayed frame.
+    Returns:
+        The ball.
+    """
     scene, home = context.scene, ours.part(context.scene, "ball")
     thing = ours.mark(ball.create(context, "Match ball", home))
     ours.mark(ball.write(thing, path, scene, frame_of(scene, start, first, float(path.times[0]))))
@@ -100,14 +125,14 @@ def bake_ball(context: bpy.types.Context, path: BallPath, start: float, first: i
 
 @contextmanager
 def _clock(took: dict[str, float], name: str):
-    """Write down how many seconds a step takes."""
+    """Measure the seconds of a step."""
     began = perf_counter()
     yield
     took[name] = perf_counter() - began
 
 
 def _pitch(scene: bpy.types.Scene, scenery: Scenery) -> None:
-    """Grass, lines, goals and daylight; the "Stage" of single players stands aside while a match is shown."""
+    """Create grass, lines, goals and daylight; the "Stage" of single players is removed while a match is displayed."""
     stage.remove(scene)
     home, units, size = ours.part(scene, "pitch"), units_per_metre(scene), (scenery.length, scenery.width)
     surface = stage.lay_grass(home, units, size), stage.lay_lines(home, units, size)
@@ -118,13 +143,13 @@ def _pitch(scene: bpy.types.Scene, scenery: Scenery) -> None:
 
 
 def _dressed(context: bpy.types.Context, scenery: Scenery):
-    """Everybody with what he wears."""
+    """Create all characters with their objects."""
     wardrobe = Wardrobe(context, scenery.colours)
     return [(person, wardrobe.dress(person, ours.part(context.scene, person.team))) for person in scenery.people]
 
 
 def _followed(scene: bpy.types.Scene, scenery: Scenery, frames: np.ndarray, first: int) -> np.ndarray:
-    """(F, 2) m of what the stand's camera follows: the ball, or else the middle of everybody."""
+    """Compute what the stand's camera follows, (F, 2) m: the ball, or the mean position of all players."""
     seconds = scenery.start + (frames - first) / frames_per_second(scene)
     if scenery.ball is not None:
         path = scenery.ball
@@ -141,7 +166,7 @@ def _followed(scene: bpy.types.Scene, scenery: Scenery, frames: np.ndarray, firs
 
 
 def _course(scene: bpy.types.Scene, path: BallPath) -> bpy.types.Object:
-    """The ball's way as a thin line for the views, hidden at first: a minute of it is a tangle."""
+    """Create the ball's trajectory as a thin curve for the views, hidden at first: a minute of it is hard to read."""
     data = bpy.data.curves.new("Match ball course", "CURVE")
     data.dimensions = "3D"
     line = data.splines.new("POLY")

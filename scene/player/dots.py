@@ -1,6 +1,6 @@
-"""The dots: an Empty for each player that runs along the track in the scene's frames, and one for the ball.
+"""The dots: an Empty for each player that follows the track in the scene's frames, and one for the ball.
 
-A player's dot carries the strips of its timeline, and what is needed to make it a player again in another file.
+A player's dot carries the strips of its timeline, and the data to add its player to the list in another file.
 """
 
 from __future__ import annotations
@@ -16,32 +16,31 @@ from ..result import bake
 from .tracks import read_track
 
 BALL = "Ball dot"
-MARK = "beyond_mocap_dot"  # on actions that move a dot and may be made anew
+MARK = "beyond_mocap_dot"  # on actions that move a dot and may be regenerated
 SIZE, BALL_SIZE = 0.4, 0.11  # metres
 BALL_RGB = (0.9, 0.9, 0.9)
-FILES = ("tracking_file", "metadata_file")  # kept whole: a dot may be appended to a file in another folder
+FILES = ("tracking_file", "metadata_file")  # absolute: a dot may be appended to a file in another folder
 ORIGIN = (*FILES, "feed_id", "provider", "shirt")
 
 
 class BeyondMocapDot(bpy.types.PropertyGroup):
-    """Which player's dot this is: what a file that it is appended to needs to go on with him."""
+    """The player of this dot: what another file needs to continue with this player"""
 
     attached_to = ("Object.beyond_mocap_dot",)
     player: bpy.props.StringProperty(name="Player", description="The player's name")
     tracking_file: bpy.props.StringProperty(name="Tracking", description="The file with the player's positions")
     metadata_file: bpy.props.StringProperty(name="Metadata", description="The provider's second file")
-    feed_id: bpy.props.StringProperty(name="ID in the feed", description="Which player of the tracking file this is")
-    provider: bpy.props.StringProperty(name="Provider", description="Whose form the tracking file has")
+    feed_id: bpy.props.StringProperty(name="ID in the Feed", description="Which player of the tracking file this is")
+    provider: bpy.props.StringProperty(name="Provider", description="Provider whose format the tracking file has")
     clock: bpy.props.StringProperty(name="Clock", description="Start frame, seconds there and rate of its keys")
     shirt: bpy.props.FloatVectorProperty(name="Shirt", subtype="COLOR", description="Colour of the player's shirt")
 
 
 def ensure(context: bpy.types.Context, player: BeyondMocapPlayer) -> bpy.types.Object:
-    """The player's dot, made and animated where there is none; InputError where the track cannot be
-    read."""
+    """Return the player's dot; create and animate it where there is none. InputError where the track cannot be read."""
     room = bake.collection(context.scene)
     if player.dot is not None:
-        if player.dot.name not in context.scene.objects:  # deleted in the view; the player still knows it
+        if player.dot.name not in context.scene.objects:  # deleted in the view; the player still refers to it
             room.objects.link(player.dot)
         return player.dot
     track = read_track(context.scene.beyond_mocap, player)
@@ -57,7 +56,7 @@ def ensure(context: bpy.types.Context, player: BeyondMocapPlayer) -> bpy.types.O
 
 
 def renew(context: bpy.types.Context, player: BeyondMocapPlayer) -> None:
-    """Let the dot run along the player's track as that is now, unless somebody has given it other keys."""
+    """Update the dot's keys to the player's current track, unless the user has given it other keys."""
     dot = player.dot
     action = channels.playing(dot)[0] if dot is not None else None
     if action is None or not action.get(MARK):
@@ -69,7 +68,7 @@ def renew(context: bpy.types.Context, player: BeyondMocapPlayer) -> None:
 
 
 def show(player: BeyondMocapPlayer) -> None:
-    """Let the dot have its player's name and colour, and remember where he comes from."""
+    """Update the dot's name, colour and data from its player."""
     dot = player.dot
     if dot is None:
         return
@@ -81,7 +80,7 @@ def show(player: BeyondMocapPlayer) -> None:
 
 
 def remove(scene: bpy.types.Scene, player: BeyondMocapPlayer) -> None:
-    """Take the player's dot with its strips out of the file; with the last one the ball's too."""
+    """Remove the player's dot with its strips from the file; with the last one the ball's too."""
     dot, player.dot = player.dot, None
     if dot is not None:
         _delete(dot)
@@ -92,13 +91,13 @@ def remove(scene: bpy.types.Scene, player: BeyondMocapPlayer) -> None:
 
 
 def orphans(context: bpy.types.Context) -> list[bpy.types.Object]:
-    """The selected dots of players that are in no list of this scene."""
+    """List the selected dots of players that are in no list of this scene."""
     owned = {player.dot for player in context.scene.beyond_mocap.players}
     return [dot for dot in context.selected_objects if dot.beyond_mocap_dot.player and dot not in owned]
 
 
 def adopt(settings: BeyondMocapSettings, dot: bpy.types.Object, name: str) -> BeyondMocapPlayer:
-    """A new player of this scene, to whom the dot belongs."""
+    """Add a player to this scene who owns the dot."""
     origin = {key: getattr(dot.beyond_mocap_dot, key) for key in ORIGIN}
     player = settings.players.add()
     for key, value in origin.items():
@@ -110,13 +109,13 @@ def adopt(settings: BeyondMocapSettings, dot: bpy.types.Object, name: str) -> Be
 
 
 def first_second(dot: bpy.types.Object) -> float:
-    """What the track's clock shows at the dot's first key."""
+    """Return the track's time in seconds at the dot's first key."""
     clock, frames = Clock.read(dot.beyond_mocap_dot.clock), keyed_frames(dot)
     return clock.seconds(frames[0]) if clock and frames else 0.0
 
 
 def relay(dot: bpy.types.Object, new: Clock) -> bool:
-    """Move a dot's keys to the frames of another clock; whether there was anything to do."""
+    """Move a dot's keys to the frames of another clock; returns whether anything changed."""
     old = Clock.read(dot.beyond_mocap_dot.clock)
     action, slot = channels.playing(dot)
     if old is None or old == new or action is None or not action.get(MARK):
@@ -133,7 +132,7 @@ def relay(dot: bpy.types.Object, new: Clock) -> bool:
 
 
 def keyed_frames(dot: bpy.types.Object) -> tuple[float, float] | None:
-    """First and last frame on which the dot has a key; None where it has none."""
+    """Return the first and last frame on which the dot has a key; None where it has none."""
     action, slot = channels.playing(dot)
     ends = [curve.range() for curve in channels.curves(action, slot).values()] if action else []
     return (min(low for low, _ in ends), max(high for _, high in ends)) if ends else None
@@ -157,14 +156,14 @@ def _empty(scene: bpy.types.Scene, name: str, size: float, room: bpy.types.Colle
 
 
 def _measured(times: np.ndarray, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The samples that have a time and a place, each time once, in order."""
+    """Select the samples with a time and a position, each time once, in order."""
     known = np.isfinite(times) & np.isfinite(places).all(axis=1)
     seconds, first = np.unique(times[known], return_index=True)
     return seconds, places[known][first]
 
 
 def _animate(scene: bpy.types.Scene, dot: bpy.types.Object, seconds: np.ndarray, places: np.ndarray, clock: Clock):
-    """A key for each sample: seconds (N,), places (N, 3) metres."""
+    """Add a key for each sample: seconds (N,), places (N, 3) metres."""
     frames = clock.start_frame + (seconds - clock.start_time) * clock.fps
     curves = {"location": ("Object Transforms", places * units_per_metre(scene))}
     channels.animate(dot, f"{dot.name} track", frames, curves)[MARK] = True

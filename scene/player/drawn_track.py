@@ -1,8 +1,7 @@
 """Tracks that are drawn or animated in Blender: a curve with a speed at each point, or any object that moves.
 
-The speed of a control point, in metres per second, is its Radius (Item tab, Alt-S), and the seconds that are waited at
-a point of speed 0 its Weight: both are kept with the point when the curve is subdivided or cut, and saved by Blender
-itself.
+The speed of a control point, in metres per second, is its Radius (Item tab, Alt-S), and the wait in seconds at a point
+of speed 0 its Weight: both stay with the point when the curve is subdivided or cut, and Blender itself saves them.
 """
 
 from __future__ import annotations
@@ -25,15 +24,21 @@ from ..core.settings import active_player
 from ..rigs import armature
 from . import drawn_track
 
-FINE = 48  # straight pieces that a Bezier segment is cut into
+FINE = 48  # straight pieces of a Bezier segment
 
 LABEL_SIZE, RGBA, PIN_RGBA = 12, (1.0, 0.85, 0.2, 1.0), (0.4, 0.9, 1.0, 1.0)
 
 
 @dataclass(frozen=True, eq=False)
 class Line:
-    """A curve on the ground. line (N, 3) m in the world; at (P,) index into it of each control point; speeds (P,) m/s;
-    waits (P,) s."""
+    """A curve on the ground.
+
+    Attributes:
+        line: (N, 3) metres, world.
+        point_indices: (P,) index into it of each control point.
+        speeds: (P,) m/s.
+        waits: (P,) seconds.
+    """
 
     line: np.ndarray
     at: np.ndarray
@@ -47,11 +52,22 @@ _played: dict[tuple[int, int], tuple] = {}  # (scene, object) by session_uid: st
 
 
 def read(scene: bpy.types.Scene, drawn: bpy.types.Object, start: float = 0.0, still: bool = False) -> Track:
-    """The track that a curve or a moving object is; start: seconds on the track's clock at which a curve begins.
-    InputError where it is none.
+    """Read the track of a curve or a moving object.
 
-    still: leave the scene on its frame. What moves by more than its own keys has to be played frame by frame, which
-    takes time and undoes a pose that has no key yet; then what was read last counts, InputError where there is none."""
+    Args:
+        scene: of the object.
+        drawn: a curve, or an object that moves.
+        start: seconds on the track's clock at which a curve begins.
+        still: do not change the scene's frame. An object moved by more than its own keys has to be played frame by
+            frame,
+            which takes time and discards a pose without a key; with `still` the last such result is used, InputError
+            where
+            there is none.
+    Returns:
+        The track.
+    Raises:
+        InputError: if the object is no track.
+    """
     if drawn.type == "CURVE":
         found = line_of(scene, drawn)
         level = found.line[:, :2]
@@ -66,13 +82,14 @@ def read(scene: bpy.types.Scene, drawn: bpy.types.Object, start: float = 0.0, st
 
 
 def line_of(scene: bpy.types.Scene, drawn: bpy.types.Object) -> Line:
-    """The first spline of a curve object, as it is drawn now, also in edit mode; InputError where it is no open
-    line."""
+    """Build the line of a curve object's first spline, as it is now, also in edit mode; InputError for a closed or
+    empty one.
+    """
     spline = next((spline for spline in drawn.data.splines if len(points_of(spline)) > 1), None)
     if spline is None:
-        raise InputError(f"curve {drawn.name}", "no line", "two points or more", "add points in edit mode")
+        raise InputError(f"curve {drawn.name}", "fewer than two points", "a line", "add points in edit mode")
     if spline.use_cyclic_u:
-        raise InputError(f"curve {drawn.name}", "a closed curve", "a beginning and an end", "switch Cyclic off (Alt-C)")
+        raise InputError(f"curve {drawn.name}", "a closed curve", "a curve with two ends", "switch Cyclic off (Alt-C)")
     points = points_of(spline)
     if spline.type == "BEZIER":
         local, at = _bezier(points)
@@ -87,18 +104,18 @@ def line_of(scene: bpy.types.Scene, drawn: bpy.types.Object) -> Line:
 
 
 def points_of(spline: bpy.types.Spline):
-    """A spline's control points, of whichever kind it is."""
+    """List a spline's control points, of either kind."""
     return spline.bezier_points if spline.type == "BEZIER" else spline.points
 
 
 def set_speed(points, speed: float, wait: float) -> None:
-    """Give control points a speed in m/s and, for those that are stops, a wait in seconds."""
+    """Set the speed of control points in m/s and, for stops, a wait in seconds."""
     for point in points:
         point.radius, point.weight_softbody = speed, max(wait, 0.01)
 
 
 def create(context: bpy.types.Context, name: str, collection) -> bpy.types.Object:
-    """A Bezier curve to begin with, from the 3D cursor on along X: a start from a stand, a bow, a stop."""
+    """Create a Bezier curve as a start, from the 3D cursor along X: starting from rest, a bend, a stop."""
     units = units_per_metre(context.scene)
     origin = np.array(context.scene.cursor.location) * [1.0, 1.0, 0.0]
     data = bpy.data.curves.new(name, "CURVE")
@@ -111,7 +128,7 @@ def create(context: bpy.types.Context, name: str, collection) -> bpy.types.Objec
         point.handle_left_type = point.handle_right_type = "AUTO"
     drawn = bpy.data.objects.new(name, data)
     collection.objects.link(drawn)
-    context.view_layer.update()  # handles
+    context.view_layer.update()  # computes the handles
     return drawn
 
 
@@ -122,7 +139,7 @@ def _values(points, name: str, size: int) -> np.ndarray:
 
 
 def _bezier(points) -> tuple[np.ndarray, np.ndarray]:
-    """The line (N, 3) through Bezier points, and where on it they are."""
+    """Sample the line (N, 3) through Bezier points, and the index of each point on it."""
     co, left, right = (_values(points, name, 3) for name in ("co", "handle_left", "handle_right"))
     t = np.linspace(0.0, 1.0, FINE + 1)[:-1, None, None]
     a, b, c, d = co[:-1], right[:-1], left[1:], co[1:]
@@ -132,8 +149,9 @@ def _bezier(points) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _animated(scene: bpy.types.Scene, moving: bpy.types.Object, still: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Frames (F,) and places (F, 3), in Blender's units, of a moving object: of an armature its hips, or else its first
-    bone."""
+    """Read frames (F,) and positions (F, 3), in Blender's units, of a moving object; of an armature its hips, or first
+    bone.
+    """
     own = _own_keys(moving)
     if own is not None:
         return own
@@ -141,7 +159,7 @@ def _animated(scene: bpy.types.Scene, moving: bpy.types.Object, still: bool) -> 
     if still:
         if key not in _played or _played[key][0] != stamp:
             raise InputError(f"object {moving.name}", "not played since it was opened or changed", "its motion",
-                             "press Update, which plays it")
+                             "press Update to play it")
         return _played[key][1:]
     frames, places = _play(scene, moving)
     _played.pop(key, None)
@@ -152,7 +170,7 @@ def _animated(scene: bpy.types.Scene, moving: bpy.types.Object, still: bool) -> 
 
 
 def _stamp(scene: bpy.types.Scene, moving: bpy.types.Object) -> tuple:
-    """What is another where an object's own keys or the frames in which it moves have changed."""
+    """Compute a value that changes when an object's own keys or the frames in which it moves change."""
     action, slot = channels.playing(moving)
     keys = (
         [channels.keys_of(curve)["co"].tobytes() for curve in channels.curves(action, slot).values()] if action else []
@@ -161,7 +179,7 @@ def _stamp(scene: bpy.types.Scene, moving: bpy.types.Object) -> tuple:
 
 
 def _play(scene: bpy.types.Scene, moving: bpy.types.Object) -> tuple[np.ndarray, np.ndarray]:
-    """The same, read by playing the scene."""
+    """Read frames and positions by playing the scene."""
     first, last = _range(scene, moving)
     frames = np.arange(first, last + 1, dtype=float)
     bone = _hips(scene, moving) if moving.type == "ARMATURE" else None
@@ -180,7 +198,7 @@ def _play(scene: bpy.types.Scene, moving: bpy.types.Object) -> tuple[np.ndarray,
 
 
 def _own_keys(moving: bpy.types.Object) -> tuple[np.ndarray, np.ndarray] | None:
-    """The same read off its own curves, which is quick, where nothing else moves it; None where something does."""
+    """Sample frames and positions from the object's own curves, which is quick; None where something else moves it."""
     action, slot = channels.playing(moving)
     data = moving.animation_data
     if action is None or moving.type == "ARMATURE" or moving.parent or moving.constraints or data.drivers:
@@ -199,14 +217,14 @@ def _own_keys(moving: bpy.types.Object) -> tuple[np.ndarray, np.ndarray] | None:
 
 
 def _range(scene: bpy.types.Scene, moving: bpy.types.Object) -> tuple[int, int]:
-    """The frames in which it moves: those of its own keys, else the scene's."""
+    """Find the frames in which it moves: those of its own keys, else the scene's."""
     action, slot = channels.playing(moving)
     ends = channels.keyed_range(channels.curves(action, slot)) if action else None
     return ends or (scene.frame_start, scene.frame_end)
 
 
 def _hips(scene: bpy.types.Scene, moving: bpy.types.Object) -> str:
-    """The bone that is the pelvis, or the first without a parent."""
+    """Find the pelvis bone, or the first without a parent."""
     try:
         skeleton = armature.skeleton_of(moving, scene)
         return skeleton.names[identify(skeleton).hips]
@@ -217,7 +235,7 @@ def _hips(scene: bpy.types.Scene, moving: bpy.types.Object) -> str:
 
 
 def speed_labels(scene: bpy.types.Scene) -> list[tuple[tuple[float, float, float], str, tuple]]:
-    """What is written where: (place in Blender's units, text, colour)."""
+    """Build the labels in the view: (position in Blender's units, text, colour)."""
     player, units = active_player(scene.beyond_mocap), units_per_metre(scene)
     if player is None:
         return []
@@ -226,7 +244,7 @@ def speed_labels(scene: bpy.types.Scene) -> list[tuple[tuple[float, float, float
     if drawn is not None and drawn.type == "CURVE" and drawn.visible_get():
         try:
             line = drawn_track.line_of(scene, drawn)
-        except InputError:  # told when it is used
+        except InputError:  # reported when the track is used
             line = drawn_track.NO_LINE
         for at, speed, wait in zip(line.at, line.speeds, line.waits):
             text = f"{speed:.1f} m/s" if speed > 0.0 else f"stop {wait:.1f} s"

@@ -13,29 +13,29 @@ from ..core import window
 from ..core.measure import scene_clock, units_per_metre
 from ..rigs import armature
 
-PARTS = (("left_hand", "Left Hand", "The wrist of the left hand is there", "VIEW_PAN", 0),
-         ("right_hand", "Right Hand", "The wrist of the right hand is there", "VIEW_PAN", 1),
-         ("left_foot", "Left Foot", "The ankle of the left foot is there", "MOD_DYNAMICPAINT", 2),
-         ("right_foot", "Right Foot", "The ankle of the right foot is there", "MOD_DYNAMICPAINT", 3),
-         ("gaze", "Gaze", "The player looks there", "HIDE_OFF", 4))
+PARTS = (("left_hand", "Left Hand", "Pin the wrist of the left hand", "VIEW_PAN", 0),
+         ("right_hand", "Right Hand", "Pin the wrist of the right hand", "VIEW_PAN", 1),
+         ("left_foot", "Left Foot", "Pin the ankle of the left foot", "MOD_DYNAMICPAINT", 2),
+         ("right_foot", "Right Foot", "Pin the ankle of the right foot", "MOD_DYNAMICPAINT", 3),
+         ("gaze", "Gaze", "Pin the point that the player looks at", "HIDE_OFF", 4))
 SIZE = 0.12  # metres
-AHEAD = 3.0  # metres at which a gaze begins that is made where the head looks
+AHEAD = 3.0  # metres in front of the head at which a new gaze pin is placed
 
 
 class BeyondMocapPin(bpy.types.PropertyGroup):
-    """One pin of a player; its name is the part's."""
+    """One pin of a player; its name is the part's"""
 
     target: PointerProperty(name="Place", type=bpy.types.Object,
-                            description="The Empty that says where; move it with G")
-    part: EnumProperty(name="Part", items=PARTS, description="What is held there")
+                            description="The Empty that marks the position; move it with G")
+    part: EnumProperty(name="Part", items=PARTS, description="Part of the body that is pinned")
     time: FloatProperty(name="Time", unit="TIME_ABSOLUTE", precision=2,
-                        description="Second on the track's clock at which it is there")
+                        description="Time on the track's clock at which the part is there")
     hold: FloatProperty(name="Hold", min=0.0, soft_max=5.0, unit="TIME_ABSOLUTE", precision=2,
-                        description="Seconds for which it stays there; 0: a moment")
+                        description="Duration for which the part stays there; 0 for a moment")
 
 
 def read(scene: bpy.types.Scene, player) -> tuple[Pin, ...]:
-    """A player's pins whose Empties are in the scene."""
+    """Read a player's pins whose Empties are in the scene."""
     metres = 1.0 / units_per_metre(scene)
     found = []
     for pin in player.pins:
@@ -46,7 +46,7 @@ def read(scene: bpy.types.Scene, player) -> tuple[Pin, ...]:
 
 
 def add(context: bpy.types.Context, player, part: str, seconds: float, hold: float, place, room) -> bpy.types.Object:
-    """A new pin at `place` (3,) metres; returns its Empty, which is chosen and active."""
+    """Add a pin at `place` (3,) metres, world; returns its Empty, which is selected and active."""
     units = units_per_metre(context.scene)
     target = bpy.data.objects.new(f"{player.name} {part.replace('_', ' ')}", None)
     target.empty_display_type = "SINGLE_ARROW" if part == "gaze" else "SPHERE"
@@ -58,13 +58,13 @@ def add(context: bpy.types.Context, player, part: str, seconds: float, hold: flo
     pin.name, pin.target, pin.part, pin.time, pin.hold = target.name, target, part, seconds, hold
     player.active_pin = len(player.pins) - 1
     context.view_layer.update()
-    if target.name in context.view_layer.objects:  # else its collection is excluded
+    if target.name in context.view_layer.objects:  # otherwise its collection is excluded
         window.select_only(context, target)
     return target
 
 
 def remove(player, number: int) -> None:
-    """Take a pin and its Empty out of the file."""
+    """Remove a pin and its Empty from the file."""
     target = player.pins[number].target
     player.pins.remove(number)
     player.active_pin = max(0, min(player.active_pin, len(player.pins) - 1))
@@ -73,13 +73,15 @@ def remove(player, number: int) -> None:
 
 
 def remove_all(player) -> None:
-    """Take all of a player's pins out of the file."""
+    """Remove all of a player's pins from the file."""
     for number in reversed(range(len(player.pins))):
         remove(player, number)
 
 
 def body_place(context: bpy.types.Context, player, part: str) -> np.ndarray:
-    """Where the player's part is on the present frame, or AHEAD metres before his face: (3,) metres in the world."""
+    """Find the world position (3,) in metres of the player's part on the current frame, or GAZE_DISTANCE in front of
+    the face.
+    """
     if player.body is None:
         raise InputError(f"player {player.name}", "no body", "a body to pin",
                          "Synthesize first, or pin at the 3D cursor")
@@ -104,5 +106,5 @@ def body_place(context: bpy.types.Context, player, part: str) -> np.ndarray:
 
 
 def second_now(scene: bpy.types.Scene) -> float:
-    """What the track's clock shows on the scene's present frame."""
+    """Return the track's time in seconds on the scene's current frame."""
     return scene_clock(scene).seconds(scene.frame_current_final)

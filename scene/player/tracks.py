@@ -1,4 +1,4 @@
-"""Tracking files as players: which players a file has, and the samples of one of them, or of what is drawn instead."""
+"""Tracking files as players: the players of a file, and the samples of one of them, or of the drawn track instead."""
 
 from __future__ import annotations
 
@@ -17,7 +17,14 @@ if TYPE_CHECKING:
 
 
 class Found(NamedTuple):
-    """One player in a file. feed_id: empty in a file about one player. start, end: seconds on the file's clock."""
+    """One player in a file.
+
+    Attributes:
+        name: for the list.
+        feed_id: empty in a file about one player.
+        team: "home", "away" or "referee".
+        start, end: seconds on the file's clock.
+    """
 
     name: str
     feed_id: str
@@ -27,7 +34,7 @@ class Found(NamedTuple):
 
 
 def players_in(path: str, metadata: str = "", provider: str = "") -> tuple[list[Found], tuple[str, ...]]:
-    """The players of a tracking file, and notes on what was guessed; InputError where it cannot be read."""
+    """List the players of a tracking file, and notes on assumptions; InputError where it cannot be read."""
     if is_plain(path):
         track = _plain(path)
         return [Found(Path(path).stem, "", "home", float(track.times.min()), float(track.times.max()))], ()
@@ -38,13 +45,12 @@ def players_in(path: str, metadata: str = "", provider: str = "") -> tuple[list[
 
 
 def read_track(settings: BeyondMocapSettings, player: BeyondMocapPlayer, still: bool = False) -> "Track":
-    """The samples of one player, within the section that the settings name where the file is a whole match; still: see
-    `drawn_track.read`."""
+    """Read the samples of one player, within the settings' section for a whole match; still: see `read_drawn_track`."""
     if player.drawn_track is not None:
         return drawn_track.read(player.id_data, player.drawn_track, player.drawn_start, still)
     path = absolute(player.tracking_file)
     if not path:
-        step = "choose one in step 2, or draw a track"
+        step = "choose one in step 2 or draw a track"
         raise InputError(f"player {player.name}", "no tracking file", "a file with positions", step)
     if not player.feed_id:
         return _plain(path)
@@ -72,12 +78,12 @@ def _read_plain(path: str, _changed: tuple[int, int]) -> "Track":
 
 
 def match_of(path: str, metadata: str = "", provider: str = "") -> tracking.Match:
-    """A whole match as its feed has it, read once; InputError where it cannot be read."""
+    """Read a whole match as its feed has it, once; InputError where it cannot be read."""
     return _read_match(path, metadata or None, provider or None, _stamp(path))
 
 
 def _stamp(path: str) -> tuple[int, int]:
-    """What changes when a file is written anew."""
+    """Return a value that changes when a file is written again."""
     found = os.stat(path) if os.path.exists(path) else None
     return (found.st_mtime_ns, found.st_size) if found else (0, 0)
 

@@ -1,7 +1,7 @@
-"""Skeletons as armatures, and armatures as skeletons; an armature copied with all that hangs on it.
+"""Skeletons as armatures, and armatures as skeletons; an armature copied with its children.
 
 A joint becomes a bone of the same name whose head is the joint. The core's joints have no rotation at rest, Blender's
-bones point somewhere: `rest_rotations` is the difference, and the only thing `action` needs to translate poses.
+bones have a direction: `compute_rest_rotations` is the difference, and all that `action` needs to convert poses.
 """
 
 from __future__ import annotations
@@ -21,32 +21,45 @@ from ...beyond_mocap.motion.skeleton import Skeleton
 from ..core.measure import units_per_metre
 
 PROPERTY = "beyond_mocap_skeleton"
-STUB = 0.04  # metres: length of a bone that leads nowhere
+STUB = 0.04  # metres: length of a bone without children
 
 
 @dataclass(frozen=True, eq=False)
 class Placement:
-    """How an armature's own space lies in the scene's metres.
+    """The placement of an armature's own space in the scene's metres.
 
-    rotation: (4,) unit quaternion. origin: (3,) metres. scale: metres per unit of the armature's space."""
+    Attributes:
+        rotation: (4,) unit quaternion.
+        origin: (3,) metres.
+        scale: metres per unit of the armature's space.
+    """
 
     rotation: np.ndarray
     origin: np.ndarray
     scale: float
 
     def to_world(self, points: np.ndarray) -> np.ndarray:
-        """Points (..., 3) of the armature's space -> metres in the scene's world."""
+        """Convert points (..., 3) of the armature's space to metres in the scene's world."""
         return quaternion.rotate(self.rotation, np.asarray(points) * self.scale) + self.origin
 
     def to_armature(self, points: np.ndarray) -> np.ndarray:
-        """Metres in the scene's world (..., 3) -> points of the armature's space."""
+        """Convert metres in the scene's world (..., 3) to points of the armature's space."""
         return quaternion.rotate(quaternion.inverse(self.rotation), np.asarray(points) - self.origin) / self.scale
 
 
 def create(context: bpy.types.Context, skeleton: Skeleton, name: str, collection=None) -> bpy.types.Object:
-    """A new armature object with one bone per joint, its lowest joint on the floor, in `collection` or the scene's own.
+    """Create an armature object with one bone per joint, its lowest joint on the floor.
 
-    The exact offsets in metres, the order of the joints and the tips go along as a custom property of the armature."""
+    The exact offsets in metres, the order of the joints and the tips are stored as a custom property of the armature.
+
+    Args:
+        context: of Blender.
+        skeleton: J joints.
+        name: of the object.
+        collection: to link it to; None for the scene's own.
+    Returns:
+        The object.
+    """
     scene = context.scene
     units = units_per_metre(scene)
     data = bpy.data.armatures.new(name)
@@ -77,10 +90,14 @@ def create(context: bpy.types.Context, skeleton: Skeleton, name: str, collection
 
 
 def skeleton_of(body: bpy.types.Object, scene: bpy.types.Scene) -> Skeleton:
-    """The skeleton of an armature object, in metres, as it rests in the armature's own space.
+    """Build the skeleton of an armature object, in metres, at rest in the armature's own space.
 
-    An armature made by `create` gives back exactly the skeleton that went in, as long as nobody has edited its bones.
-    Any other is read off its rest pose: one joint per bone of the largest tree, a tip on every bone without children.
+    An armature from `create_armature` returns exactly its original skeleton while its bones are unedited. Any other is
+    read
+    from its rest pose: one joint per bone of the largest tree, a tip on every bone without children.
+
+    Raises:
+        InputError: if the object is no armature with bones.
     """
     if body is None or body.type != "ARMATURE" or not len(body.data.bones):
         raise InputError("armature", "no bones", "an armature object", "select one in the 3D view")
@@ -99,13 +116,13 @@ def skeleton_of(body: bpy.types.Object, scene: bpy.types.Scene) -> Skeleton:
 
 
 def placement(body: bpy.types.Object, scene: bpy.types.Scene) -> Placement:
-    """How the armature's space lies in the scene; InputError where its scale is uneven, which turns bones askew."""
-    bpy.context.view_layer.update()  # a script may have moved it a line ago
+    """Find the placement of the armature's space in the scene; InputError for an uneven scale, which skews bones."""
+    bpy.context.view_layer.update()  # a script may have moved it just before
     return placement_now(body, scene)
 
 
 def placement_now(body: bpy.types.Object, scene: bpy.types.Scene) -> Placement:
-    """The same as Blender has worked it out last, which is quick."""
+    """Find the placement as Blender computed it last, which is quick."""
     origin, rotation, scale = body.matrix_world.decompose()
     if min(scale) <= 0.0 or max(scale) > 1.001 * min(scale):
         raise InputError(f"object {body.name}", f"scale {tuple(round(s, 4) for s in scale)}", "one positive scale",
@@ -115,13 +132,13 @@ def placement_now(body: bpy.types.Object, scene: bpy.types.Scene) -> Placement:
 
 
 def rest_rotations(body: bpy.types.Object, names: tuple[str, ...]) -> np.ndarray:
-    """Rotations (J, 4) of the named bones at rest, in the armature's space."""
+    """Compute the rotations (J, 4) of the named bones at rest, in the armature's space."""
     return quaternion.from_matrix(np.array([body.data.bones[name].matrix_local.to_3x3() for name in names]))
 
 
 @contextmanager
 def _editing(context: bpy.types.Context, body: bpy.types.Object):
-    """Edit mode on one armature for the length of a `with`; the active object and its mode come back afterwards."""
+    """Edit one armature in a `with`; the active object and its mode are restored afterwards."""
     before = context.view_layer.objects.active
     mode = before.mode if before is not None else "OBJECT"
     if mode != "OBJECT":
@@ -138,7 +155,9 @@ def _editing(context: bpy.types.Context, body: bpy.types.Object):
 
 
 def _tails(skeleton: Skeleton) -> np.ndarray:
-    """From each joint to its bone's tail, metres (J, 3): toward the joints or tips that carry the limb on."""
+    """Compute the vectors (J, 3) m from each joint to its bone's tail: toward the joints or tips that continue the
+    limb.
+    """
     tails = np.zeros((len(skeleton), 3))
     for joint in range(len(skeleton)):
         onward = _onward(skeleton, joint)
@@ -150,7 +169,9 @@ def _tails(skeleton: Skeleton) -> np.ndarray:
 
 
 def _onward(skeleton: Skeleton, joint: int) -> np.ndarray:
-    """Offsets (n, 3) of the children on the joint's own side (the neck, not the shoulders), else of all, else tips."""
+    """Collect the offsets (n, 3) of the children on the joint's side (the neck, not the shoulders), else of all, else
+    tips.
+    """
     children = skeleton.children(joint)
     side = side_and_part(skeleton.names[joint])[0]
     along = [c for c in children if side_and_part(skeleton.names[c])[0] == side] or children
@@ -160,7 +181,7 @@ def _onward(skeleton: Skeleton, joint: int) -> np.ndarray:
 
 
 def _incoming(skeleton: Skeleton, joint: int) -> np.ndarray:
-    """Unit direction (3,) in which the limb comes to this joint; up where there is none."""
+    """Find the unit direction (3,) of the limb at this joint; up where there is none."""
     while joint > 0:
         length = np.linalg.norm(skeleton.offsets[joint])
         if length > 1e-4:
@@ -170,13 +191,14 @@ def _incoming(skeleton: Skeleton, joint: int) -> np.ndarray:
 
 
 def _roll_target(tail: np.ndarray) -> Vector:
-    """Where a bone's Z axis looks: forward along X, or up for bones that themselves point forward, as feet do."""
+    """Choose the direction of a bone's Z axis: forward along X, or up for bones that point forward, as feet do."""
     forward = abs(tail[0]) > 0.7 * np.linalg.norm(tail)
     return Vector((0.0, 0.0, 1.0)) if forward else Vector((1.0, 0.0, 0.0))
 
 
 def _kept(body: bpy.types.Object, scene: bpy.types.Scene) -> Skeleton | None:
-    """The skeleton stored by `create`, as large as the object is now; None where there is none or it is damaged."""
+    """Read the skeleton stored by `create_armature`, at the object's current size; None where it is missing or damaged.
+    """
     try:
         table = json.loads(body.data[PROPERTY])
         grown = placement(body, scene).scale * table.pop("units_per_metre")
@@ -189,10 +211,11 @@ def _kept(body: bpy.types.Object, scene: bpy.types.Scene) -> Skeleton | None:
 
 
 def _from_bones(body: bpy.types.Object, scene: bpy.types.Scene) -> Skeleton:
+    """Build the skeleton from the bones' rest pose."""
     roots = [bone for bone in body.data.bones if bone.parent is None]
     root = max(roots, key=lambda bone: len(bone.children_recursive))
     bones = [root]
-    for bone in bones:  # grows while it is walked: breadth first, so parents stand before children
+    for bone in bones:  # grows during the loop: breadth first, so parents come before children
         bones.extend(bone.children)
     names = [bone.name for bone in bones]
     parents = [-1] + [names.index(bone.parent.name) for bone in bones[1:]]
@@ -205,9 +228,11 @@ def _from_bones(body: bpy.types.Object, scene: bpy.types.Scene) -> Skeleton:
 
 
 def copy_rig(rig: bpy.types.Object, name: str) -> bpy.types.Object:
-    """A copy of an armature object and of its children, which share their data with the original; beside it in its
-    collections, or in the scene's own where these are another file's. What pointed to the original within them points
-    to the copy; the copy plays nothing."""
+    """Copy an armature object with its children, which share their data with the original.
+
+    The copy is in the original's collections, or in the scene's own where these are linked. Pointers within the family
+    point to the copies; the copy plays nothing.
+    """
     family = [rig, *rig.children_recursive]
     twins = {one: one.copy() for one in family}
     for one, twin in twins.items():
@@ -227,12 +252,13 @@ def copy_rig(rig: bpy.types.Object, name: str) -> bpy.types.Object:
 
 
 def _open_to(thing: bpy.types.Object) -> list[bpy.types.Collection]:
-    """The collections of an object that take another one: not linked ones, nor those of a library override."""
+    """List the editable collections of an object: not linked ones, nor those of a library override."""
     found = [one for one in thing.users_collection if one.library is None and one.override_library is None]
     return found or [bpy.context.scene.collection]
 
 
 def _repoint(thing: bpy.types.Object, twins: dict) -> None:
+    """Update the pointers of constraints, modifiers and drivers to the copies."""
     holders = [*thing.constraints, *thing.modifiers]
     if thing.pose is not None:
         holders += [constraint for bone in thing.pose.bones for constraint in bone.constraints]

@@ -1,7 +1,7 @@
-"""Where a rig's driven bones, or an exported root, have to be at each frame; the curves of the bones' channels.
+"""The poses of a rig's driven bones, or of an exported root, at each frame; the curves of the bones' channels.
 
-With S the turn and size from the armature's space to the core's skeleton, O the object's turn in the scene, W_j the
-core's world rotation of a joint and R_j its bone's rotation at rest, the bone has to be at O^-1 W_j S R_j.
+With S the rotation and size from the armature's space to the core's skeleton, O the object's rotation in the scene, W_j
+the core's world rotation of a joint and R_j its bone's rotation at rest, the bone's pose is O^-1 W_j S R_j.
 """
 
 from __future__ import annotations
@@ -17,23 +17,32 @@ from ..path_editing.rig_look import channel_of
 from . import armature, bone_maps
 from .driven import Driven, upright_axes
 
-ROOT_BONE = "root"  # of a copy whose rig has none
+ROOT_BONE = "root"  # name in a copy whose rig has none
 
 
 def wanted(driven: Driven, motion: Motion, frames: np.ndarray, root: str):
-    """Rotations (F, 3, 3) and heads (F, 3) in the armature's space that driven bones are to have, and lines told."""
+    """Compute the poses of the driven bones.
+
+    Args:
+        driven: the rig.
+        motion: on its skeleton.
+        frames: (F,) scene frames.
+        root: one of `rig.ROOTS`.
+    Returns:
+        Rotations (F, 3, 3) and heads (F, 3) in the armature's space, by bone, and messages.
+    """
     heads, world = forward_kinematics(motion)
     hips = heads[:, driven.parts.index("hips")]
     told = []
     if root != "KEEP":
         root_turn, root_place = _root_line(driven, motion, heads, "straight" if root == "STRAIGHT" else "smooth")
-    if root == "IN_PLACE":  # what the line does is taken off everything: what is left begins where it began
+    if root == "IN_PLACE":  # the root's path is removed from everything: the body stays where it started
         back = quaternion.multiply(root_turn[:1], quaternion.inverse(root_turn))
         world = quaternion.multiply(back[:, None], world)
         hips = quaternion.rotate(back, hips - root_place) + root_place[:1]
         root_turn, root_place = (np.repeat(values[:1], len(hips), axis=0) for values in (root_turn, root_place))
     if root in ("SMOOTH", "STRAIGHT") and "root" not in driven.table:
-        told.append("no root bone: the hips carry all of the motion; Export Motion can add one to a copy")
+        told.append("no root bone: the hips carry the whole motion; Export Motion can add one to a copy")
     lie_turn, lie_origin = placements(driven.rig, driven.scene, frames)
     scale = driven.placement.scale
 
@@ -59,7 +68,7 @@ def wanted(driven: Driven, motion: Motion, frames: np.ndarray, root: str):
 
 
 def _root_line(driven: Driven, motion: Motion, heads: np.ndarray, way: str):
-    """The root's turn (F, 4) and place (F, 3) in the world: on the ground under the pelvis, as it rests below it."""
+    """Compute the root's rotation (F, 4) and position (F, 3), world: on the ground under the pelvis, as at rest."""
     from ...beyond_mocap.motion.humanoid import heading_from_positions
     from ...beyond_mocap.motion.path.smooth_spline import ground_path
 
@@ -74,7 +83,7 @@ def _root_line(driven: Driven, motion: Motion, heads: np.ndarray, way: str):
 
 
 def _follow(driven: Driven, turns: dict, places: dict, hips, world, motion: Motion, placed) -> None:
-    """IK targets go rigidly with the bone that they belong to."""
+    """Compute the poses of IK targets, which follow their bones rigidly."""
     if not driven.followers:
         return
     heads = _shifted_heads(motion, world, hips)
@@ -87,7 +96,7 @@ def _follow(driven: Driven, turns: dict, places: dict, hips, world, motion: Moti
 
 
 def _shifted_heads(motion: Motion, world: np.ndarray, hips: np.ndarray) -> np.ndarray:
-    """All joints' places (F, J, 3) from world rotations and the hips' places."""
+    """Compute all joints' positions (F, J, 3) from world rotations and the hips' positions."""
     skeleton, heads = motion.skeleton, np.zeros((*world.shape[:2], 3))
     for joint, parent in enumerate(skeleton.parents):
         heads[:, joint] = hips if parent < 0 else heads[:, parent] + quaternion.rotate(
@@ -96,7 +105,7 @@ def _shifted_heads(motion: Motion, world: np.ndarray, hips: np.ndarray) -> np.nd
 
 
 def placements(rig: bpy.types.Object, scene: bpy.types.Scene, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """How the armature object lies in the scene at each frame: turns (F, 4) and origins (F, 3) metres."""
+    """Sample the armature object's placement at each frame: rotations (F, 4) and origins (F, 3) metres."""
     still = armature.placement(rig, scene)
     if not is_carried(rig):
         return np.repeat(still.rotation[None], len(frames), axis=0), np.repeat(still.origin[None], len(frames), axis=0)
@@ -111,7 +120,7 @@ def placements(rig: bpy.types.Object, scene: bpy.types.Scene, frames: np.ndarray
 
 
 def is_carried(rig: bpy.types.Object) -> bool:
-    """Whether something moves the object: its own constraints, or anything about one of its parents."""
+    """Whether something moves the object: its own constraints, or an animated or constrained parent."""
     if len(rig.constraints):
         return True
     parent = rig.parent
@@ -123,7 +132,7 @@ def is_carried(rig: bpy.types.Object) -> bool:
 
 
 def bone_curves(rig: bpy.types.Object, basis: dict) -> dict[str, tuple[str, np.ndarray]]:
-    """Curves for the driven bones' channels, each bone in its own rotation mode."""
+    """Build curves for the driven bones' channels, each bone in its own rotation mode."""
     found = {}
     for name, (rotation, location) in basis.items():
         path = f'pose.bones["{bpy.utils.escape_identifier(name)}"]'
@@ -139,8 +148,10 @@ def bone_curves(rig: bpy.types.Object, basis: dict) -> dict[str, tuple[str, np.n
 
 
 def _euler_curves(rotation: np.ndarray, mode: str) -> np.ndarray:
-    """Blender's Euler angles (F, 3), X Y Z, of rotations (F, 4), without jumps: of the two ways to write a rotation the
-    one nearer to the frame before, full turns added."""
+    """Compute Blender's Euler angles (F, 3), X Y Z, of rotations (F, 4), without jumps.
+
+    Of the two forms of a rotation the one nearer to the previous frame is used, full turns added.
+    """
     order = mode[::-1]  # Blender names the axes in the order in which they are applied to a point
     angles = quaternion.to_euler(rotation, order)
     out = np.empty_like(angles)
@@ -154,7 +165,7 @@ def _euler_curves(rotation: np.ndarray, mode: str) -> np.ndarray:
 
 
 def setting_curves(driven: Driven, bakes_ik: bool) -> dict[str, tuple[str, np.ndarray]]:
-    """Curves of one key each: IK/FK switches, and constraints that are switched off."""
+    """Build curves of one key each: IK/FK switches, and constraints that are switched off."""
     found = {}
     for switch in driven.controls.switches:
         path = f'pose.bones["{bpy.utils.escape_identifier(switch.bone)}"]["{bpy.utils.escape_identifier(switch.name)}"]'
@@ -168,8 +179,17 @@ def setting_curves(driven: Driven, bakes_ik: bool) -> dict[str, tuple[str, np.nd
 
 
 def root_motion(rig: bpy.types.Object, shown, wanted, told: list[str]):
-    """Hips, root bone (None: it has none), the root's way (F, 4, 4) and what brings everything back to where it began
-    (F, 4, 4); both None where they are not asked for. shown, wanted: of `export`."""
+    """Compute the root motion for an export.
+
+    Args:
+        rig: the armature.
+        sampled: its sampled poses (`export`).
+        options: the export's options.
+        messages: gets messages.
+    Returns:
+        Hips, root bone (None: it has none), the root's path (F, 4, 4) and the matrices (F, 4, 4) that keep the body in
+        place; the last two are None where they are not requested.
+    """
     if wanted.root == "KEEP":
         return None, None, None, None
     from ...beyond_mocap.motion.path.smooth_spline import ground_path
@@ -193,12 +213,12 @@ def root_motion(rig: bpy.types.Object, shown, wanted, told: list[str]):
     if own is not None:
         rest = np.array(rig.data.bones[own].matrix_local)
         return table["hips"], own, inward @ way @ _standing(rig, table) @ rest, None
-    told.append(f"{rig.name} has no root bone: one named {ROOT_BONE!r} was added to the copy in the file")
+    told.append(f"{rig.name} has no root bone: the file contains an added one named {ROOT_BONE!r}")
     return table["hips"], None, inward @ way @ _standing(rig, table), None
 
 
 def _standing(rig: bpy.types.Object, table: dict[str, str]) -> np.ndarray:
-    """The armature's space at rest -> standing over the origin, facing +X (4, 4): what the root's way is a way of."""
+    """Compute the matrix (4, 4) from the armature's space at rest to a body over the origin, facing +X."""
     heads = {part: np.array(rig.data.bones[table[part]].head_local) for part in bone_maps.LEGS}
     axes, out = upright_axes(heads), np.eye(4)
     hips, up = 0.5 * (heads["left upper_leg"] + heads["right upper_leg"]), axes[2]

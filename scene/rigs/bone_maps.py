@@ -1,6 +1,6 @@
-"""Which bone of a rig moves which part of the body: found by names and structure, kept by skeleton, as JSON files.
+"""Which bone of a rig moves which part of the body: found by names and structure, stored by skeleton, as JSON files.
 
-A map is a dict part -> bone name, the parts as PARTS has them. Control rigs (Rigify's and others that name their bones
+A map is a dict part -> bone name, with the parts of PARTS. Control rigs (Rigify's and others that name their bones
 "..._fk") are driven by their controls; rigs without controls by their own bones.
 """
 
@@ -26,7 +26,7 @@ _LIMB = {"shoulder": "Shoulder", "upper_arm": "Arm", "lower_arm": "ForeArm", "ha
 JOINTS = {"hips": "Hips", **{f"spine {i}": f"Spine{i}" for i in range(1, SPINES + 1)}, "neck": "Neck",
           **{f"neck {i}": f"NeckTop{i}" for i in range(2, NECKS + 1)}, "head": "Head",
           **{f"{side} {part}": side.capitalize() + name for side in ("left", "right") for part, name in _LIMB.items()}}
-"""Part -> the name of its joint, which the core knows the meaning of."""
+"""Part -> the name of its joint, whose meaning the core knows."""
 PARTS = ("root", *JOINTS)
 LEGS = tuple(f"{side} {part}" for side in ("left", "right") for part in ("upper_leg", "lower_leg", "foot"))
 NEEDED = ("hips", *LEGS)
@@ -41,7 +41,7 @@ _ROOT = re.compile(r"(?i)^(.*:)?(root|master|root_?bone|ctrl_?root|c_pos)$")
 
 
 def suggest(rig: bpy.types.Object) -> dict[str, str]:
-    """The parts of an armature object and their bones; InputError where no legs can be found."""
+    """Find the bones of an armature's parts by names and structure; InputError where no legs can be found."""
     skeleton, bones = _named_tree(rig)
     try:
         body = identify(skeleton)
@@ -51,8 +51,8 @@ def suggest(rig: bpy.types.Object) -> dict[str, str]:
                          "choose its bones in the bone map") from None
     parts = _parts(skeleton, body)
     armed = [bones[parts[leg]] for leg in LEGS if _ARM.search(side_and_part(skeleton.names[parts[leg]])[1])]
-    if armed:  # structure took arms for legs, since there are no others
-        raise InputError(f"armature {rig.name}", f"no legs (only {armed[0]} and such)", "a humanoid with two legs",
+    if armed:  # structure found arms instead of legs
+        raise InputError(f"armature {rig.name}", f"no legs (only bones such as {armed[0]})", "a humanoid with two legs",
                          "choose its bones in the bone map")
     found = {part: bones[joint] for part, joint in parts.items()}
     root = _root_above(rig, found["hips"])
@@ -73,7 +73,7 @@ def _parts(skeleton: Skeleton, body: Humanoid) -> dict[str, int]:
 
 
 def _thinned(joints, most: int) -> list[int]:
-    """At most so many of them, first and last kept."""
+    """Thin joints to at most `max_count`, with the first and last."""
     joints = list(joints)
     if len(joints) <= most:
         return joints
@@ -81,7 +81,7 @@ def _thinned(joints, most: int) -> list[int]:
 
 
 def _named_tree(rig: bpy.types.Object) -> tuple[Skeleton, list[str]]:
-    """The bones that may be parts as a skeleton under plain names, and their own names, one per joint."""
+    """Build a skeleton of the bones that may be parts, under plain names; and their own names, one per joint."""
     bones = list(rig.data.bones)
     has_controls = sum(bool(_FK.search(bone.name)) for bone in bones) >= 6
     barred = _NO_CONTROL if has_controls else _NO_JOINT
@@ -98,7 +98,7 @@ def _named_tree(rig: bpy.types.Object) -> tuple[Skeleton, list[str]]:
         if parent is not None:
             below[parent].append(name)
     order = [max(roots, key=lambda name: _count(below, name))]
-    for name in order:  # grows while it is walked
+    for name in order:  # grows during the loop
         order.extend(below[name])
     parents = [-1] + [order.index(above[name]) for name in order[1:]]
     heads = np.array([rig.data.bones[name].head_local for name in order])
@@ -110,7 +110,7 @@ def _named_tree(rig: bpy.types.Object) -> tuple[Skeleton, list[str]]:
 
 
 def _plain(bone: bpy.types.Bone, rig: bpy.types.Object) -> str:
-    """A bone's name as the core reads names; Rigify's hips are its torso, which carries its control named hips."""
+    """Build the core's name of a bone; Rigify's hips are its torso, which carries a control named hips."""
     if "torso" in rig.data.bones:
         if bone.name == "torso":
             return "hips"
@@ -140,7 +140,7 @@ def _unique(names: list[str]) -> tuple[str, ...]:
 
 
 def _root_above(rig: bpy.types.Object, hips: str) -> str | None:
-    """The bone that carries the whole rig; None where the hips do so themselves."""
+    """Find the bone that carries the whole rig; None where the hips do."""
     named = [bone.name for bone in rig.data.bones if bone.parent is None and _ROOT.match(bone.name)]
     if named and named[0] != hips:
         return named[0]
@@ -149,7 +149,7 @@ def _root_above(rig: bpy.types.Object, hips: str) -> str | None:
 
 
 def check(rig: bpy.types.Object, table: dict[str, str]) -> None:
-    """InputError where a map cannot be used on this armature."""
+    """Check that a map can be used on this armature (InputError)."""
     where = f"bone map of {rig.name}"
     missing = [part for part in NEEDED if part not in table]
     if missing:
@@ -167,21 +167,21 @@ def check(rig: bpy.types.Object, table: dict[str, str]) -> None:
 
 
 def fingerprint(rig: bpy.types.Object) -> str:
-    """A short hash of all bones' names and parents: the same for every copy of a skeleton."""
+    """Compute a short hash of all bones' names and parents: the same for every copy of a skeleton."""
     lines = sorted(f"{bone.name}<{bone.parent.name if bone.parent else ''}" for bone in rig.data.bones)
     return hex_digest("\n".join(lines))
 
 
 def kept_folder(create: bool = False) -> Path | None:
-    """Where maps are kept by skeleton, in the user's folder of this extension; None where Blender offers none."""
+    """Find the folder of stored maps in the user's folder of this extension; None where Blender has none."""
     try:
         return Path(bpy.utils.extension_path_user(EXTENSION, path="bone_maps", create=create))
-    except (ValueError, OSError):  # run beside Blender, not as an extension
+    except (ValueError, OSError):  # not installed as an extension
         return None
 
 
 def keep(rig: bpy.types.Object, table: dict[str, str]) -> Path | None:
-    """Keep a map for all armatures with these bones; returns the file, None where there is no place for it."""
+    """Store a map for all armatures with these bones; returns the file, None where there is no folder for it."""
     folder = kept_folder(create=True)
     if folder is None:
         return None
@@ -191,7 +191,7 @@ def keep(rig: bpy.types.Object, table: dict[str, str]) -> Path | None:
 
 
 def kept(rig: bpy.types.Object) -> dict[str, str] | None:
-    """The map that was kept for these bones; None where there is none, or none that can be read."""
+    """Load the map stored for these bones; None where there is none, or an unreadable one."""
     folder = kept_folder()
     path = folder / f"{fingerprint(rig)}.json" if folder else None
     if path is None or not path.is_file():
@@ -203,24 +203,24 @@ def kept(rig: bpy.types.Object) -> dict[str, str] | None:
 
 
 def save(path: Path, rig: bpy.types.Object, table: dict[str, str]) -> None:
-    """Write a map as a JSON file, whole or not at all; InputError where that cannot be done."""
+    """Write a map as a JSON file, completely or not at all; InputError where that fails."""
     text = json.dumps({"skeleton": fingerprint(rig), "rig": rig.name, "bones": table}, indent=1, ensure_ascii=False)
     atomic_write(path, text + "\n")
 
 
 def load(path: Path) -> dict[str, str]:
-    """A map from a JSON file; InputError where it is missing or is none."""
+    """Read a map from a JSON file; InputError where it is missing or invalid."""
     form = '{"bones": {"hips": "bone name", ...}}'
     try:
         found = json.loads(Path(path).read_text(encoding="utf-8"))
     except OSError as error:
         raise InputError(path, f"cannot be read ({error.strerror})", "a bone map (.json)", "check the path") from None
     except (ValueError, RecursionError) as error:
-        raise InputError(path, f"not JSON ({error})", form, "mend the file") from None
+        raise InputError(path, f"not JSON ({error})", form, "correct the file") from None
     table = found.get("bones") if isinstance(found, dict) else None
     if not isinstance(table, dict) or not all(isinstance(bone, str) for bone in table.values()):
-        raise InputError(path, "no object of bone names", form, "mend the file")
+        raise InputError(path, "no object of bone names", form, "correct the file")
     strange = [part for part in table if part not in PARTS]
     if strange:
-        raise InputError(path, f"no part {strange[0]!r}", f"one of {', '.join(PARTS)}", "mend the name")
+        raise InputError(path, f"unknown part {strange[0]!r}", f"one of {', '.join(PARTS)}", "correct the name")
     return {part: table[part] for part in PARTS if table.get(part)}

@@ -1,9 +1,9 @@
-"""A rig posed by hand for a while, and on what each of its controls rides, found by turning the controls by chance.
+"""A rig posed temporarily, and the carrier of each of its controls, found by random rotations.
 
-Between a control and the bones that carry it a rig may put anything: helper bones, constraints, drivers. Instead of
-following these, all controls are turned by chance a few times, and for each one the bone is sought on which it rides:
-with B the frame that a control has while its own channels are at rest and M_d the pose of bone d, M_d^-1 B is the same
-in all trials for the one that carries it. Turn and place may ride on different bones.
+Between a control and the bones that carry it a rig may have helper bones, constraints and drivers. Instead of following
+these, all controls are rotated randomly a few times, and for each one its carrier is searched: with B the frame of a
+control while its own channels are at rest and M_d the pose of bone d, M_d^-1 B is the same in all trials for the bone
+that carries it. Rotation and position may have different carriers.
 """
 
 from __future__ import annotations
@@ -18,24 +18,26 @@ from ...beyond_mocap.motion import quaternion
 
 TRIALS = 4
 RIDES = 2e-4
-"""By how much the frame that a control rides on may turn and go within its carrier: of a turn's matrix, and of the
-rig's size."""
+"""Tolerance of a control's frame within its carrier: of a rotation matrix's entries, and as share of the rig's size."""
 
 STATIC = -1
-_TURN, _WAY = 0.5, 0.05  # radians, and of the rig's size
-_SURELY = 0.3  # of another carrier's spread: a bone that is this much steadier carries instead
+_TURN, _WAY = 0.5, 0.05  # random rotation in radians, random shift as a share of the rig's size
+_SURELY = 0.3  # share of another carrier's spread below which a bone is the carrier instead
 
 CHANNELS = ("location", "rotation_quaternion", "rotation_euler", "rotation_axis_angle", "scale")
 
 
 class PosedRig:
-    """Some controls of a rig, posed by hand.
+    """Some controls of a rig, posed temporarily.
 
         with PosedRig(rig, layer, controls) as posed:
-            matrices = posed.pose(turns, bones)
+            matrices = posed.apply_pose(rotations, bones)
 
-    controls: the bones that are posed. layer: the view layer whose depsgraph poses the rig. silent: constraints that
-    are muted meanwhile."""
+    Attributes:
+        controls: the bones that are posed.
+        layer: the view layer whose depsgraph poses the rig.
+        silent: constraints that are muted meanwhile.
+    """
 
     def __init__(
         self, rig: bpy.types.Object, layer: bpy.types.ViewLayer, controls: Sequence[str],
@@ -47,8 +49,13 @@ class PosedRig:
     def pose(self, turns: np.ndarray, bones: Sequence[str], places: np.ndarray | None = None) -> np.ndarray:
         """Pose the controls, and read bones as Blender then poses them.
 
-        turns: (n, 4), the controls' own rotations. places: (n, 3), their locations, at rest where None.
-        Returns (W, 4, 4), the bones' poses in the armature's space."""
+        Args:
+            rotations: (n, 4) the controls' own rotations.
+            bones: W names to read.
+            places: (n, 3) the controls' locations; None for rest.
+        Returns:
+            (W, 4, 4) the bones' poses in the armature's space.
+        """
         for number, (name, turn) in enumerate(zip(self.controls, turns)):
             bone = self.rig.pose.bones[name]
             bone.rotation_quaternion = turn
@@ -113,9 +120,16 @@ def _update(rig: bpy.types.Object, layer: bpy.types.ViewLayer) -> None:
 
 @dataclass(frozen=True, eq=False)
 class Rides:
-    """Of n controls: turn_of, place_of (n,): the number of the bone among `carriers` on which turn and place ride,
-    STATIC where nothing carries them; firm (n,): whether their channels move them at all and one bone carries them;
-    parent_of (n,): the same as turn_of of the bone above."""
+    """The carriers of n controls.
+
+    Attributes:
+        controls: their names.
+        carriers: names of possible carriers.
+        rotation_carrier, position_carrier: (n,) index into `carriers` of the bone that carries rotation and position,
+            STATIC for none.
+        parent_carrier: (n,) the rotation's carrier of the bone above.
+        is_reliable: (n,) bool, the control's channels move it and one bone carries it.
+    """
 
     controls: list[str]
     carriers: list[str]
@@ -126,16 +140,20 @@ class Rides:
 
 
 def split_poses(poses: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Turns (..., 3, 3) without scale, and places (..., 3), of poses (..., 4, 4)."""
+    """Split poses (..., 4, 4) into rotations (..., 3, 3) without scale and positions (..., 3)."""
     turn = poses[..., :3, :3]
     return turn / np.maximum(np.linalg.norm(turn, axis=-2, keepdims=True), 1e-12), poses[..., :3, 3]
 
 
 def turn_spread(carried: np.ndarray, frames: np.ndarray) -> np.ndarray:
-    """By how much n frames turn within each of C bones, and within nothing.
+    """Compute how much n frames rotate within each of C bones, and within nothing.
 
-    carried: (K, C, 3, 3), the bones' turns in K trials. frames: (K, n, 3, 3).
-    Returns (C + 1, n), the last row for nothing."""
+    Args:
+        carried: (K, C, 3, 3) the bones' rotations in K trials.
+        frames: (K, n, 3, 3).
+    Returns:
+        (C + 1, n), the last row for nothing.
+    """
     spread = np.empty((carried.shape[1] + 1, frames.shape[1]))
     spread[-1] = np.ptp(frames, axis=0).max(axis=(-1, -2))
     for number in range(carried.shape[1]):
@@ -145,9 +163,15 @@ def turn_spread(carried: np.ndarray, frames: np.ndarray) -> np.ndarray:
 
 
 def place_spread(carried: np.ndarray, origin: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """By how much n places go within each of C bones, and within nothing: (C + 1, n), as `turn_spread`.
+    """Compute how much n positions move within each of C bones, and within nothing: (C + 1, n).
 
-    carried: (K, C, 3, 3) and origin: (K, C, 3), the bones' turns and places. places: (K, n, 3)."""
+    Args:
+        carried: (K, C, 3, 3) the bones' rotations.
+        origin: (K, C, 3) the bones' positions.
+        places: (K, n, 3).
+    Returns:
+        (C + 1, n), the last row for nothing.
+    """
     spread = np.empty((carried.shape[1] + 1, places.shape[1]))
     spread[-1] = np.ptp(places, axis=0).max(axis=-1)
     for number in range(carried.shape[1]):
@@ -158,9 +182,14 @@ def place_spread(carried: np.ndarray, origin: np.ndarray, places: np.ndarray) ->
 
 
 def nearest_carrier(spread: np.ndarray, number: int) -> tuple[int, float]:
-    """The carrier of a bone among those before it, and its spread: the last of them, unless another is surely steadier.
+    """Find the carrier of a bone among those before it: the last of them, unless another is clearly steadier.
 
-    spread: (C + 1,), of the bone with that `number`, as `turn_spread` has it."""
+    Args:
+        spread: (C + 1,) of that bone, as from `compute_rotation_spread`.
+        number: of the bone.
+    Returns:
+        The carrier and its spread.
+    """
     best, least = STATIC, np.inf
     for d in [*range(number - 1, -1, -1), STATIC]:
         if spread[d] < _SURELY * least:
@@ -169,22 +198,28 @@ def nearest_carrier(spread: np.ndarray, number: int) -> tuple[int, float]:
 
 
 def steadiest_carrier(spread: np.ndarray, own: int) -> tuple[np.ndarray, np.ndarray]:
-    """For each of n frames the steadiest bone, STATIC before all, and its spread; spread: as `turn_spread` has it.
+    """Find the steadiest carrier of each of n frames, preferring STATIC, and its spread.
 
-    own: so many frames are of the first bones themselves, which do not carry themselves."""
+    Args:
+        spread: (C + 1, n) as from `compute_rotation_spread`.
+        own: number of frames that belong to the first bones themselves, which cannot carry themselves.
+    Returns:
+        (n,) carriers and (n,) spreads.
+    """
     spread, itself = spread.copy(), np.arange(own)
     spread[itself, itself] = np.inf
-    spread[-1] *= _SURELY  # what does not move at all rides on nothing
+    spread[-1] *= _SURELY  # a frame that does not move has no carrier
     best = np.argmin(spread, axis=0)
     least = spread[best, np.arange(spread.shape[1])]
     return np.where(best == len(spread) - 1, STATIC, best), least
 
 
 def study_rides(rig: bpy.types.Object, side: bpy.types.Scene, controls: list[str], shown: list[str]) -> Rides:
-    """On which of the controls and `shown` bones each of the controls rides, as the rig stands at the side scene's
-    frame, with its inverse kinematics and switches as they are.
+    """Find the carrier of each control among the controls and `shown` bones, at the side scene's frame.
 
-    The rig is as it was when this returns. side: the scene in which it is alone."""
+    Inverse kinematics and switches stay as they are, and the rig is restored at the end. side: the scene in which it is
+    alone.
+    """
     carriers = [*controls, *(bone for bone in shown if bone not in controls)]
     above = [_above(rig, name) for name in controls]
     watched = list(dict.fromkeys([*carriers, *(name for name in above if name)]))
@@ -197,7 +232,7 @@ def study_rides(rig: bpy.types.Object, side: bpy.types.Scene, controls: list[str
     ups = [poses[:, watched.index(name)] if name else None for name in above]
     rests = np.stack([_rests(rig, name, up) for name, up in zip(controls, ups)], axis=1)
     for number, name in enumerate(controls):
-        if len(rig.pose.bones[name].constraints):  # such as Child Of, which come before the bone's own channels
+        if len(rig.pose.bones[name].constraints):  # such as Child Of, which act before the bone's own channels
             rests[:, number] = place[:, number] - (base[:, number] @ went[:, number, :, None])[..., 0]
             parents[:, number] = base[:, number]
     carried, origin = turn[:, : len(carriers)], place[:, : len(carriers)]
@@ -209,7 +244,7 @@ def study_rides(rig: bpy.types.Object, side: bpy.types.Scene, controls: list[str
 
 
 def list_moving(rig: bpy.types.Object, side: bpy.types.Scene, controls: list[str], shown: list[str]) -> list[bool]:
-    """Whether each of the controls moves anything of the bones shown, as the rig stands."""
+    """List for each control whether it moves any of the bones shown, in the rig's current state."""
     found, none = [], quaternion.identity(len(controls))
     with _posed(rig, side, controls) as posed:
         start = posed.pose(none, shown)
@@ -222,14 +257,16 @@ def list_moving(rig: bpy.types.Object, side: bpy.types.Scene, controls: list[str
 
 
 def _posed(rig: bpy.types.Object, side: bpy.types.Scene, controls: list[str]) -> PosedRig:
-    """The rig without its animation but otherwise as it stands, limits off."""
+    """Create the context of the rig without its animation and limits, otherwise unchanged."""
     limits = [c for name in controls for c in rig.pose.bones[name].constraints if c.type.startswith("LIMIT")
               and not c.mute]
     return PosedRig(rig, side.view_layers[0], controls, limits)
 
 
 def _trials(rig, side, controls: list[str], watched: list[str], size: float) -> tuple[np.ndarray, ...]:
-    """Poses (K, W, 4, 4) of the bones watched, the controls' own turns (K, n, 3, 3) and locations (K, n, 3)."""
+    """Run random trials: poses (K, W, 4, 4) of the bones watched, the controls' rotations (K, n, 3, 3) and locations
+    (K, n, 3).
+    """
     dice, own, went, poses = np.random.default_rng(5), [], [], []
     with _posed(rig, side, controls) as posed:
         for _ in range(TRIALS):
@@ -247,7 +284,7 @@ def _above(rig: bpy.types.Object, name: str) -> str:
 
 
 def _rests(rig: bpy.types.Object, name: str, parent: np.ndarray | None) -> np.ndarray:
-    """Where a bone's head is while its location is zero (K, 3), from the pose (K, 4, 4) of the bone above it."""
+    """Compute a bone's head while its location is zero (K, 3), from the pose (K, 4, 4) of the bone above it."""
     bone = rig.data.bones[name]
     if parent is None:
         return np.repeat(np.array(bone.head_local)[None], TRIALS, axis=0)

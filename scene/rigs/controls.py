@@ -1,7 +1,8 @@
-"""A pose asked for in the world as values of a rig's channels: plain arithmetic, without asking Blender for each frame.
+"""World poses as values of a rig's channels: plain arithmetic, without evaluating the rig for each frame.
 
-What the arithmetic needs is found out once (`control_study`): on what each driven bone rides, and which way it goes for
-each of its location channels.
+The arithmetic's parameters are found once (`control_study`): the carrier of each driven bone, and the direction in
+which
+each of its location channels moves it.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ _FOLLOW = re.compile(r"(?i)follow")
 
 @dataclass(frozen=True)
 class Switch:
-    """A number on a pose bone that has to stand at `value` for the controls to count."""
+    """A number on a pose bone that has to be `value` for the controls to take effect."""
 
     bone: str
     name: str
@@ -34,7 +35,7 @@ class Switch:
 
 @dataclass(frozen=True)
 class Override:
-    """A constraint that would hold a driven bone against its channels."""
+    """A constraint that would override a driven bone's channels."""
 
     bone: str
     constraint: str
@@ -43,7 +44,7 @@ class Override:
 
 @dataclass
 class _Ride:
-    """What one control rides on: the carrier's index (-1: the armature itself) and the constant part, seen in it."""
+    """The carrier of one control: its index (-1: the armature itself) and the constant part seen in it."""
 
     turn_of: int
     turn: np.ndarray
@@ -54,12 +55,17 @@ class _Ride:
 
 
 class Controls:
-    """The driven bones of a rig, studied."""
+    """The driven bones of a rig and their carriers."""
 
     def __init__(self, rig: bpy.types.Object, bones: list[str], movers: list[str], overrides: list[Override]):
-        """bones: driven ones, carriers before what they carry. movers: those of them that are also moved.
+        """Find the carriers of the driven bones; the rig is restored at the end.
 
-        overrides: constraints that are to be silent. The rig is as it was when this returns."""
+        Args:
+            rig: the armature.
+            bones: driven ones, carriers before what they carry.
+            movers: those that also get a location.
+            overrides: constraints to mute.
+        """
         self.rig, self.bones, self.movers = rig, list(bones), [bone for bone in bones if bone in movers]
         self.switches, self.overrides = list_switches(rig), overrides
         self.loose: list[str] = []
@@ -67,6 +73,7 @@ class Controls:
             self._study(posed)
 
     def _study(self, posed: PosedRig) -> None:
+        """Pose the rig in random trials and find carriers and axes."""
         dice, none = np.random.default_rng(7), quaternion.identity(len(self.bones))
         self.rest_turn, self.rest_place = split_poses(posed.pose(none, self.bones))
         self.size = float(np.ptp(self.rest_place, axis=0).max()) or 1.0
@@ -82,7 +89,7 @@ class Controls:
             self._measure_axes(posed, bone, own[-1], turns[-1])
 
     def _carried(self, turns: np.ndarray, places: np.ndarray, own: np.ndarray) -> list[_Ride]:
-        """What each bone rides on, from the trials' poses (K, B, 3, 3), (K, B, 3) and own turns (K, B, 3, 3)."""
+        """Find each bone's carriers from the trials' poses (K, B, 3, 3), (K, B, 3) and own rotations (K, B, 3, 3)."""
         base, found = turns @ own.transpose(0, 1, 3, 2), []
         turning, going = turn_spread(turns, base), place_spread(turns, places, places)
         for i, bone in enumerate(self.bones):
@@ -98,8 +105,10 @@ class Controls:
         return found
 
     def _measure_axes(self, posed: PosedRig, bone: str, own: np.ndarray, turns: np.ndarray) -> None:
-        """Which way a mover goes for each of its location channels: measured at rest, and in the last trial, in which
-        the bones turned by `own` (B, 4) and were posed as `turns` (B, 3, 3)."""
+        """Measure the directions of a mover's location channels.
+
+        At rest, and in the last trial, in which the bones were rotated by `own` (B, 4) and posed as `turns` (B, 3, 3).
+        """
         i = self.bones.index(bone)
         measured = [self._axes_of(posed, i, turn) for turn in (quaternion.identity(len(self.bones)), own)]
         if abs(np.linalg.det(measured[0])) < 1e-3:
@@ -112,7 +121,7 @@ class Controls:
         self.rides[i].axes_of, self.rides[i].axes = d, rest.T @ measured[0]
 
     def _axes_of(self, posed: PosedRig, i: int, own: np.ndarray) -> np.ndarray:
-        """Where bone i goes (3, 3), one column for each of its location channels, while the bones turn by `own`."""
+        """Measure how bone i moves (3, 3), one column per location channel, while the bones are rotated by `own`."""
         _, start = split_poses(posed.pose(own, self.bones))
         columns = []
         for axis in range(3):
@@ -122,10 +131,14 @@ class Controls:
         return np.stack(columns, axis=1)
 
     def basis(self, turns: dict[str, np.ndarray], places: dict[str, np.ndarray]):
-        """The channels that put the driven bones so, in the armature's space.
+        """Compute the channels for given poses of the driven bones.
 
-        turns: bone -> rotation matrices (F, 3, 3), for all bones; places: mover -> heads (F, 3). Returns bone ->
-        (basis rotations (F, 4), locations (F, 3) or None), and all heads (F, B, 3)."""
+        Args:
+            turns: bone -> rotation matrices (F, 3, 3), for all bones, armature space.
+            places: mover -> heads (F, 3), armature space.
+        Returns:
+            Bone -> (basis rotations (F, 4), locations (F, 3) or None), and all heads (F, B, 3).
+        """
         count = len(next(iter(turns.values())))
         turn = np.stack([turns[bone] for bone in self.bones], axis=1)
         heads, out = np.zeros((count, len(self.bones), 3)), {}
@@ -136,6 +149,7 @@ class Controls:
             location = None
             if bone in places:
                 axes = self._of(turn, ride.axes_of) @ ride.axes
+                # the location channels that move the head from where its carrier puts it to the given position
                 location = np.linalg.solve(axes, (places[bone] - heads[:, i])[..., None])[..., 0]
                 heads[:, i] = places[bone]
             rotation = quaternion.from_matrix(np.swapaxes(base, -1, -2) @ turn[:, i])
@@ -143,8 +157,14 @@ class Controls:
         return out, heads
 
     def forward(self, turns: dict[str, np.ndarray], locations: dict[str, np.ndarray | None]) -> np.ndarray:
-        """The opposite of `basis`: heads (F, B, 3) in the armature's space from channels, basis rotations (F, 4) of all
-        driven bones and locations (F, 3) of those that have some."""
+        """Compute heads (F, B, 3) in the armature's space from channels: the inverse of `compute_channels`.
+
+        Args:
+            turns: bone -> basis rotations (F, 4), for all driven bones.
+            locations: bone -> (F, 3), or None.
+        Returns:
+            (F, B, 3).
+        """
         count = len(next(iter(turns.values())))
         turn = np.zeros((count, len(self.bones), 3, 3))
         heads = np.zeros((count, len(self.bones), 3))
@@ -163,7 +183,7 @@ class Controls:
 
     @contextmanager
     def _posed(self):
-        """The rig without its animation, its switches on FK, overrides silent; all as it was afterwards."""
+        """Pose the rig without its animation, its switches on FK, overrides muted; all is restored afterwards."""
         bones = self.rig.pose.bones
         silent = [bones[one.bone].constraints[one.constraint] for one in self.overrides]
         with PosedRig(self.rig, bpy.context.view_layer, self.bones, silent) as posed:
@@ -177,13 +197,13 @@ class Controls:
 
 
 def _nearest_turn(matrix: np.ndarray) -> np.ndarray:
-    """The rotation (3, 3) nearest to a matrix."""
+    """Find the rotation (3, 3) nearest to a matrix."""
     u, _, v = np.linalg.svd(matrix)
     return u @ np.diag([1.0, 1.0, np.sign(np.linalg.det(u @ v))]) @ v
 
 
 def list_switches(rig: bpy.types.Object) -> list[Switch]:
-    """Numbers on pose bones that choose between IK and FK, or let a bone follow by halves."""
+    """List the numbers on pose bones that choose between IK and FK, or let a bone follow partly."""
     found = []
     for bone in rig.pose.bones:
         for name, value in bone.items():
@@ -200,7 +220,7 @@ def list_switches(rig: bpy.types.Object) -> list[Switch]:
 
 
 def list_overrides(rig: bpy.types.Object, bones: list[str]) -> list[Override]:
-    """Constraints that hold driven bones: those on them, and inverse kinematics below that reach up to them."""
+    """List the constraints that override driven bones: those on them, and inverse kinematics further down the chain."""
     driven, found = set(bones), []
     for bone in rig.pose.bones:
         for constraint in bone.constraints:

@@ -1,8 +1,9 @@
 """A take, or a whole match, as a file of Blender's or of its exporters (.blend, .fbx, .glb, .usdc), for the command
 line.
 
-It is put into an empty file of its own, at its own rate: a take with its armature, body and ball, a match as it is
-shown in the scene; nothing that is open is asked for, since a command has nothing open that it could lose.
+It is put into an empty file at its own rate: a take with its armature, body and ball, a match as shown in the scene.
+The
+open file is discarded without asking, since a command has nothing open that it could lose.
 """
 
 from __future__ import annotations
@@ -27,9 +28,12 @@ SHIRT = (0.75, 0.05, 0.06)
 
 
 def write(made: "Take | MatchResult", out: Path) -> tuple[str, ...]:
-    """Write a take or a match to `out` in the form that its suffix names; beside it first, then renamed. Returns lines
-    about whoever of a match could not be shown."""
-    from ...beyond_mocap.match.make import MatchResult  # brings scipy, which is slow to import
+    """Write a take or a match to `out` in the format of its suffix, completely or not at all.
+
+    Returns:
+        Messages about players of a match that could not be shown.
+    """
+    from ...beyond_mocap.match.make import MatchResult  # imports scipy, which is slow
 
     lines = stage_match(made) if isinstance(made, MatchResult) else stage(made)
     export.saved(out, EXPORTERS[out.suffix.lower()])
@@ -37,7 +41,7 @@ def write(made: "Take | MatchResult", out: Path) -> tuple[str, ...]:
 
 
 def stage(take: Take) -> tuple[str, ...]:
-    """An empty file with the take in it, first frame 0."""
+    """Create an empty file with the take in it, first frame 0."""
     scene = _empty(take.motion.fps)
     scene.frame_start, scene.frame_end = 0, len(take.motion) - 1
     room = bake.collection(scene)
@@ -51,7 +55,7 @@ def stage(take: Take) -> tuple[str, ...]:
 
 
 def stage_match(made: "MatchResult") -> tuple[str, ...]:
-    """An empty file with all of a made match in it, first frame 0."""
+    """Create an empty file with the whole match in it, first frame 0."""
     from ...beyond_mocap.match.folder import read_state
 
     order, state = made.order, read_state(made.order.out)
@@ -66,7 +70,7 @@ def stage_match(made: "MatchResult") -> tuple[str, ...]:
 
 
 def _empty(rate: float) -> bpy.types.Scene:
-    """The scene of an empty file at so many frames per second."""
+    """Create an empty file with a frame rate; returns its scene."""
     bpy.ops.wm.read_homefile(use_empty=True)
     scene = bpy.context.scene
     scene.render.fps = max(1, round(rate))
@@ -79,7 +83,7 @@ def _blend(path: str) -> None:
 
 
 def _by(format: str):
-    """The exporter of a format for all that is in the file, axes as Blender's exporters have them."""
+    """Build the exporter of a format for everything in the file, axes as in Blender's exporters."""
     return lambda path: export.EXPORTERS[format](path, "BLENDER", False)
 
 

@@ -1,5 +1,7 @@
-"""A rig's driven bones as a skeleton of the core, upright and facing +X however the rig lies; and the bones that go
-with a part of the body although they do not carry it: IK targets, poles, helper bones."""
+"""A rig's driven bones as a skeleton of the core, upright and facing +X whatever the rig's orientation; and the bones
+that
+belong to a part of the body without carrying it: IK targets, poles, helper bones.
+"""
 
 from __future__ import annotations
 
@@ -27,20 +29,25 @@ _ENDLESS = 99
 
 
 def check(rig: bpy.types.Object | None, source: bpy.types.Object | None = None) -> None:
-    """InputError, with what to do, where an object cannot be baked onto."""
+    """Check that an object can be baked onto (InputError with the next step).
+
+    Args:
+        rig: the target.
+        source: the armature whose motion is baked.
+    """
     if rig is None or rig.type != "ARMATURE":
         raise InputError("rig", "no armature is chosen", "the rig to bake to", "choose it in the panel or select it")
     where = f"rig {rig.name}"
     if rig == source:
-        raise InputError(where, "it is the source itself", "another armature", "choose the rig to bake to")
+        raise InputError(where, "is the source itself", "another armature", "choose the rig to bake to")
     if rig.library is not None:
-        raise InputError(where, f"it is linked from {rig.library.filepath}", "a rig of this file",
+        raise InputError(where, f"is linked from {rig.library.filepath}", "a rig of this file",
                          "make a library override (Object, Library Override, Make) or append it")
     if rig.override_library is not None and rig.override_library.is_system_override:
         raise InputError(where, "its library override is not editable", "an editable override",
                          "make it editable in the outliner (Library Override, Make Editable)")
     if rig.name not in bpy.context.view_layer.objects or not rig.visible_get():
-        raise InputError(where, "it is hidden or excluded", "a visible rig, which Blender poses",
+        raise InputError(where, "is hidden or excluded", "a visible rig, which Blender poses",
                          "show it in the outliner")
     if rig.mode == "EDIT":
         raise InputError(where, "its bones are being edited", "object or pose mode", "leave edit mode with Tab")
@@ -51,7 +58,16 @@ class Driven:
     """A rig's driven bones as a skeleton of the core."""
 
     def __init__(self, rig: bpy.types.Object, table: dict[str, str], scene: bpy.types.Scene, bakes_ik: bool = False):
-        """table: part -> bone name. Raises InputError where the map does not fit."""
+        """Analyse the rig.
+
+        Args:
+            rig: the armature.
+            table: part -> bone name.
+            scene: of the rig.
+            bakes_ik: bake IK targets too.
+        Raises:
+            InputError: if the map does not fit.
+        """
         bone_maps.check(rig, table)
         self.rig, self.scene = rig, scene
         self.table = {part: table[part] for part in bone_maps.PARTS if part in table}
@@ -69,18 +85,19 @@ class Driven:
         self.sole = self._sole()
 
     def bone(self, part: str) -> str:
-        """The bone of a part."""
+        """Return the bone of a part."""
         return self.table[part]
 
     def heads(self, *parts: str) -> np.ndarray:
-        """Places (n, 3) of parts at rest, in the armature's space."""
+        """Return the positions (n, 3) of parts at rest, in the armature's space."""
         return np.array([self.rest_place[self.bone(part)] for part in parts])
 
     def metres(self, vectors: np.ndarray) -> np.ndarray:
-        """Vectors of the armature's space in the core's upright metres."""
+        """Convert vectors of the armature's space to the core's upright metres."""
         return quaternion.rotate(self.upright, vectors) * self.placement.scale
 
     def _skeleton(self) -> Skeleton:
+        """Build the skeleton of the driven parts from their carriers and rest positions."""
         names = [bone_maps.JOINTS[part] for part in self.parts]
         parents, bones = [], list(self.table.values())
         for part in self.parts:
@@ -95,7 +112,8 @@ class Driven:
         return Skeleton(tuple(names), tuple(parents), offsets, ends, np.array(list(tips.values())).reshape(-1, 3))
 
     def _tip(self, part: str, parents: list[int]) -> np.ndarray | None:
-        """Where a hand's fingers begin and a foot ends, metres from its joint; None where the rig does not show it."""
+        """Find where a hand's fingers begin or a foot ends, metres from its joint; None where the rig does not show it.
+        """
         kind = part.partition(" ")[2]
         if kind not in ("hand", "foot", "toe") or self.parts.index(part) in parents:
             return None
@@ -112,25 +130,29 @@ class Driven:
         return tip if length > 1e-9 and tip @ toward > 0.5 * length else None
 
     def _sole(self) -> float:
-        """How high the foremost joint of a foot stands over the floor that the rig stands on at rest, metres."""
+        """Measure how high the foremost joint of a foot is above the floor of the rig at rest, metres."""
         ends = [part for part in ("left toe", "right toe") if part in self.table] or ["left foot", "right foot"]
         level = float(self.metres(self.heads(*ends))[:, 2].min())
         leg = float(np.linalg.norm(self.metres(np.subtract(*self.heads("left upper_leg", "left foot")))))
         if -0.02 * leg <= level <= 0.16 * leg:
-            return max(level, 0.0)  # the armature's origin lies on the floor
+            return max(level, 0.0)  # the armature's origin is on the floor
         tails = [self.metres(np.array(self.rig.data.bones[self.bone(part)].tail_local))[2] for part in ends]
         return float(np.clip(level - min(tails), 0.0, 0.16 * leg))
 
 
 def upright_turn(heads: dict[str, np.ndarray]) -> np.ndarray:
-    """The turn (4,) of `upright_axes`."""
+    """Compute the rotation (4,) of `compute_upright_axes`."""
     return quaternion.from_matrix(upright_axes(heads))
 
 
 def upright_axes(heads: dict[str, np.ndarray]) -> np.ndarray:
-    """The turn (3, 3), by quarter turns, that lets a body stand along Z and face +X.
+    """Compute the rotation (3, 3), by quarter turns, that makes a body upright along Z and facing +X.
 
-    heads: part -> its place (3,) at rest, in the armature's space; thighs and feet are needed."""
+    Args:
+        heads: part -> its position (3,) at rest, in the armature's space; thighs and feet are needed.
+    Returns:
+        (3, 3).
+    """
     legs = [heads["left upper_leg"], heads["right upper_leg"]]
     up = nearest_axis(np.mean(legs, axis=0) - 0.5 * (heads["left foot"] + heads["right foot"]))
     across = legs[0] - legs[1]
@@ -139,9 +161,15 @@ def upright_axes(heads: dict[str, np.ndarray]) -> np.ndarray:
 
 
 def list_targets(rig: bpy.types.Object, table: dict[str, str], overrides: list[Override]) -> dict[str, str]:
-    """IK targets -> the part they follow, carriers first: those of the overriding constraints, and those known by name.
+    """List IK targets -> the part they follow, carriers first: of the overriding constraints, and known by name.
 
-    table: part -> bone. Bones of the table itself follow nothing."""
+    Args:
+        rig: the armature.
+        table: part -> bone; these bones follow nothing.
+        overrides: constraints on driven bones.
+    Returns:
+        Bone -> part.
+    """
     part_of, found = {bone: part for part, bone in table.items()}, {}
     for override in overrides:
         constraint = rig.pose.bones[override.bone].constraints[override.constraint]
@@ -157,11 +185,15 @@ def list_targets(rig: bpy.types.Object, table: dict[str, str], overrides: list[O
 def list_followers(
     rig: bpy.types.Object, controls: dict[str, str], shown: dict[str, str], near: float
 ) -> dict[str, str]:
-    """Bones that go with a part -> the part: what its bones copy, targets and poles of its inverse kinematics, and
-    known names.
+    """List bones -> the part they belong to: copied bones, targets and poles of inverse kinematics, and known names.
 
-    controls, shown: part -> the bone that moves it, that shows it. near: metres of the armature within which a helper
-    bone rests where a part does."""
+    Args:
+        rig: the armature.
+        controls, display_bones: part -> the bone that moves it, that displays it.
+        tolerance: armature units within which a helper bone rests at a part.
+    Returns:
+        Bone -> part.
+    """
     part_of = {bone: part for table in (controls, shown) for part, bone in table.items()}
     trunk, held = _trunk(rig, controls), _held(rig)
     found: dict[str, str] = {}
@@ -180,7 +212,7 @@ def list_followers(
 
 
 def _constraints(rig: bpy.types.Object) -> Iterator[tuple[bpy.types.PoseBone, bpy.types.Constraint]]:
-    """All constraints of the rig's bones that aim at the rig itself."""
+    """Iterate over all constraints of the rig's bones that target the rig itself."""
     for bone in rig.pose.bones:
         for constraint in bone.constraints:
             if getattr(constraint, "target", None) == rig:
@@ -188,7 +220,7 @@ def _constraints(rig: bpy.types.Object) -> Iterator[tuple[bpy.types.PoseBone, bp
 
 
 def _goals(rig: bpy.types.Object, constraint: bpy.types.Constraint, part: str) -> Iterator[tuple[str, str]]:
-    """Target and pole of inverse kinematics on a part's bone, each with the part that it leads."""
+    """Iterate over target and pole of inverse kinematics on a part's bone, each with the part that it leads."""
     if constraint.type != "IK" or constraint.target != rig:
         return
     end, upper = _ends(part)
@@ -198,14 +230,14 @@ def _goals(rig: bpy.types.Object, constraint: bpy.types.Constraint, part: str) -
 
 
 def _ends(part: str) -> tuple[str, str]:
-    """The end of the limb to which a part belongs, and its upper part."""
+    """Find the end of the limb to which a part belongs, and its upper part."""
     side, kind = part.partition(" ")[::2]
     arm = kind in ("lower_arm", "upper_arm", "hand")
     return (f"{side} hand", f"{side} upper_arm") if arm else (f"{side} foot", f"{side} upper_leg")
 
 
 def _named(rig: bpy.types.Object) -> Iterator[tuple[str, str]]:
-    """Bones whose names say which part they lead, and the part."""
+    """Iterate over bones whose names show which part they lead, with the part."""
     for bone in rig.data.bones:
         for pattern, kind in _NAMED:
             if pattern.match(bone.name):
@@ -213,13 +245,13 @@ def _named(rig: bpy.types.Object) -> Iterator[tuple[str, str]]:
 
 
 def _trunk(rig: bpy.types.Object, controls: dict[str, str]) -> set[str]:
-    """The bones above hips and thighs, which go with the whole body."""
+    """List the bones above hips and thighs, which belong to the whole body."""
     parts = [part for part in ("hips", "left upper_leg", "right upper_leg") if part in controls]
     return {bone.name for part in parts for bone in rig.data.bones[controls[part]].parent_recursive}
 
 
 def _held(rig: bpy.types.Object) -> set[str]:
-    """The bones that inverse kinematics pose."""
+    """List the bones that inverse kinematics pose."""
     chains = [(bone, one) for bone in rig.pose.bones for one in bone.constraints if one.type in ("IK", "SPLINE_IK")]
     return {
         up.name for bone, one in chains for up in (bone, *bone.parent_recursive[: (one.chain_count or _ENDLESS) - 1])
@@ -227,13 +259,13 @@ def _held(rig: bpy.types.Object) -> set[str]:
 
 
 def _part_at(rig: bpy.types.Object, name: str, shown: dict[str, str], near: float) -> str | None:
-    """The part that rests where a helper bone does."""
+    """Find the part that rests at a helper bone's position."""
     at = rig.data.bones[name].head_local
     return next((part for part, bone in shown.items() if (rig.data.bones[bone].head_local - at).length < near), None)
 
 
 def _free_above(rig: bpy.types.Object, name: str, taken: set[str]) -> Iterator[str]:
-    """A bone and those above it up to one that is taken, but for those with constraints."""
+    """Iterate over a bone and its ancestors up to a used one, except those with constraints."""
     bone = rig.data.bones.get(name)
     while bone is not None and bone.name not in taken:
         if len(rig.pose.bones[bone.name].constraints) == 0:

@@ -1,8 +1,9 @@
-"""Motions as files of Blender's own exporters: what the rig shows becomes one action on a plain copy, and that is
-written.
+"""Motions as files of Blender's own exporters: the displayed motion of a rig becomes one action on a plain copy, and
+that is
+exported.
 
-The copy stands in a scene of its own and is taken away afterwards; the user's scene stays as it is. On the copy there
-are no constraints, drivers or NLA strips left that an exporter could read otherwise than Blender shows them.
+The copy is in a temporary scene and removed afterwards; the user's scene is unchanged. The copy has no constraints,
+drivers or NLA strips that an exporter could evaluate differently from Blender.
 """
 
 from __future__ import annotations
@@ -28,13 +29,22 @@ SUFFIXES = {"FBX": ".fbx", "GLB": ".glb", "USD": ".usdc", "BVH": ".bvh"}
 _OPERATORS = {"FBX": ("export_scene", "fbx"), "GLB": ("export_scene", "gltf"), "USD": ("wm", "usd_export")}
 _FBX_AXES = {"BLENDER": ("-Z", "Y"), "UNITY": ("-Z", "Y"), "GODOT": ("-Z", "Y"), "UNREAL": ("Y", "Z")}
 _USD_AXES = {"UNITY": ("NEGATIVE_Z", "Y"), "GODOT": ("NEGATIVE_Z", "Y")}
-_EVEN = 1e-4  # scale that is none
-HIDDEN = {"hide_viewport", "hide_render"}  # what is keyed on a mesh that is there for a part of the time only
+_EVEN = 1e-4  # deviation of a scale from 1 that is ignored
+HIDDEN = {"hide_viewport", "hide_render"}  # keyed channels of a mesh that is visible for a part of the time only
 
 
 @dataclass(frozen=True)
 class Wanted:
-    """What to write. rate: frames per second, None for the scene's. root: one of `rig.ROOTS`."""
+    """What to export.
+
+    Attributes:
+        path: of the file.
+        format, engine: see `rig.FORMATS` and `rig.ENGINES`.
+        rate: frames per second, None for the scene's.
+        root: one of `rig.ROOTS`.
+        deform_only: leave out controls and helper bones.
+        meshes: export meshes too.
+    """
 
     path: Path
     format: str = "FBX"
@@ -47,7 +57,7 @@ class Wanted:
 
 @dataclass(frozen=True, eq=False)
 class _Shown:
-    """What Blender shows: bones' poses (F, B, 4, 4) in the armature's space, the object's (F, 4, 4) in the world."""
+    """The displayed motion: bones' poses (F, B, 4, 4) in the armature's space, the object's (F, 4, 4) in the world."""
 
     bones: list[str]
     poses: np.ndarray
@@ -57,15 +67,24 @@ class _Shown:
 def write(
     context: bpy.types.Context, rigs: list[bpy.types.Object], wanted: Wanted, things: list[bpy.types.Object] = ()
 ) -> list[str]:
-    """Write the rigs' motions; returns lines for the user. InputError where they or the file are no good.
+    """Export the rigs' motions.
 
-    things: meshes that no rig moves, such as a ball and a pitch, which are written beside them (not as BVH)."""
+    Args:
+        context: of Blender.
+        rigs: armatures that move.
+        options: the options.
+        things: meshes that no rig moves, such as a ball and a pitch, which are exported beside them (not as BVH).
+    Returns:
+        Messages for the user.
+    Raises:
+        InputError: if an armature does not move or the file cannot be written.
+    """
     check(wanted.format)
     if not rigs:
-        raise InputError("export", "no armature", "an armature that moves", "select one, or choose players")
+        raise InputError("export", "no armature", "an armature that moves", "select one or choose players")
     if not wanted.path.parent.is_dir() or not os.access(wanted.path.parent, os.W_OK):
-        raise InputError(wanted.path, "the folder cannot be written", "a folder that exists and is yours",
-                         "choose another place")
+        raise InputError(wanted.path, "the folder cannot be written", "a folder that you can write to",
+                         "choose another folder")
     scene = context.scene
     first, last = extent(rigs)
     rate = wanted.rate or frames_per_second(scene)
@@ -80,7 +99,7 @@ def write(
         meshes = [_worn(stage, thing, rig, copy) for rig, copy in zip(rigs, copies) for thing in worn.get(rig.name, ())]
         free = [_free(stage, thing, shown[thing.name].lies) for thing in things]
         if wanted.format == "GLB" and not meshes:
-            told.append("no mesh hangs on the armature: glTF knows its bones as plain nodes then")
+            told.append("no mesh on the armature: glTF then stores its bones as plain nodes")
         dressed = [thing for rig in rigs for thing in worn.get(rig.name, ())]
         with _names([*rigs, *dressed, *things], [*copies, *meshes, *free]):
             _save(stage, copies, wanted)
@@ -91,7 +110,7 @@ def write(
 
 
 def check(format: str) -> None:
-    """InputError where this Blender lacks the exporter."""
+    """Check that this Blender has the exporter (InputError)."""
     if format not in _OPERATORS:
         return
     group, name = _OPERATORS[format]
@@ -99,14 +118,14 @@ def check(format: str) -> None:
         getattr(getattr(bpy.ops, group), name).get_rna_type()
     except (AttributeError, KeyError):
         others = ", ".join(f for f in SUFFIXES if f != format)
-        raise InputError("export", f"this Blender has no {format} exporter", f"one that it has ({others})",
-                         "choose another format, or switch the exporter's add-on on") from None
+        raise InputError("export", f"this Blender has no {format} exporter", f"an available format ({others})",
+                         "choose another format or enable the exporter's add-on") from None
 
 
 def _look(
     scene: bpy.types.Scene, rigs: list[bpy.types.Object], times: np.ndarray, things: list[bpy.types.Object]
 ) -> dict[str, _Shown]:
-    """What Blender shows of armatures and things without bones at scene frames (F,), whole or not."""
+    """Sample armatures and objects without bones at scene frames (F,), which may be fractional."""
     now, subframe = scene.frame_current, scene.frame_subframe
     names = {rig.name: [bone.name for bone in rig.data.bones] for rig in rigs}
     poses = {rig.name: np.empty((len(times), len(names[rig.name]), 4, 4), np.float32) for rig in rigs}
@@ -126,7 +145,7 @@ def _look(
 
 @contextmanager
 def _stage(context: bpy.types.Context, rate: float, frames: int):
-    """A scene of its own at this rate; afterwards selection and mode are the user's again."""
+    """Create a temporary scene at this rate; afterwards selection and mode are restored."""
     units, chosen = context.scene.unit_settings, list(context.selected_objects)
     active = context.view_layer.objects.active
     mode = active.mode if active is not None else "OBJECT"
@@ -147,7 +166,7 @@ def _stage(context: bpy.types.Context, rate: float, frames: int):
 
 
 def _copy(stage: bpy.types.Scene, rig: bpy.types.Object, shown: _Shown, wanted: Wanted, told: list[str]):
-    """A plain armature that plays what the rig shows."""
+    """Copy a rig to a plain armature that plays its displayed motion."""
     data = rig.data.copy()
     copy = bpy.data.objects.new(rig.name, data)
     stage.collection.objects.link(copy)
@@ -165,7 +184,7 @@ def _copy(stage: bpy.types.Scene, rig: bpy.types.Object, shown: _Shown, wanted: 
 
 
 def _kept(rig: bpy.types.Object, wanted: Wanted, root: str | None) -> set[str]:
-    """The bones that go into the file."""
+    """Select the bones that are exported."""
     every = {bone.name for bone in rig.data.bones}
     deform = {bone.name for bone in rig.data.bones if bone.use_deform}
     if not wanted.deform_only or len(deform) < 8:
@@ -175,8 +194,10 @@ def _kept(rig: bpy.types.Object, wanted: Wanted, root: str | None) -> set[str]:
 
 
 def _plain(stage, copy, rig, kept: set[str], hips: str | None, told: list[str]) -> dict[str, str | None]:
-    """Only the kept bones stay in the copy, each below the nearest kept one, turned and scaled with it in the plain
-    way; with `hips` a root bone is added above all. Returns bone -> parent."""
+    """Simplify the copy's bones: only the selected ones, each below the nearest selected one, with plain inheritance.
+
+    With `hips` a root bone is added above all. Returns bone -> parent.
+    """
     parents = {name: _above(rig, name, kept) for name in kept}
     layer = stage.view_layers[0]
     layer.update()
@@ -206,7 +227,8 @@ def _plain(stage, copy, rig, kept: set[str], hips: str | None, told: list[str]) 
 
 
 def _above(rig: bpy.types.Object, name: str, kept: set[str]) -> str | None:
-    """The nearest kept bone above; Rigify's deform bones hang on bones "ORG-x", which stand for "DEF-x"."""
+    """Find the nearest selected bone above; Rigify's deform bones hang on bones "ORG-x", which correspond to "DEF-x".
+    """
     bone = rig.data.bones[name].parent
     while bone is not None:
         for other in (bone.name, f"DEF-{bone.name[4:]}" if bone.name.startswith("ORG-") else ""):
@@ -217,7 +239,7 @@ def _above(rig: bpy.types.Object, name: str, kept: set[str]) -> str | None:
 
 
 def _play(copy, poses: dict[str, np.ndarray], parents: dict[str, str | None], lies: np.ndarray, wanted: Wanted) -> None:
-    """One action of the copy: its bones as `poses` (F, 4, 4) in its space, the object as `lies` (F, 4, 4)."""
+    """Create one action of the copy: its bones as `poses` (F, 4, 4) in its space, the object as `lies` (F, 4, 4)."""
     rest = {name: np.array(copy.data.bones[name].matrix_local) for name in parents}
     curves: dict[str, tuple[str, np.ndarray]] = {}
     for name, parent in parents.items():
@@ -231,7 +253,7 @@ def _play(copy, poses: dict[str, np.ndarray], parents: dict[str, str | None], li
 
 
 def _lying(copy: bpy.types.Object, lies: np.ndarray) -> dict[str, tuple[str, np.ndarray]]:
-    """Lays an object where it lies (F, 4, 4) at first; curves of its way, none where it stays there."""
+    """Place an object at its first matrix (F, 4, 4); returns curves of its movement, none where it stays there."""
     copy.rotation_mode = "QUATERNION"
     moves = _channels(lies)
     for channel, values in moves.items():
@@ -244,7 +266,7 @@ def _lying(copy: bpy.types.Object, lies: np.ndarray) -> dict[str, tuple[str, np.
 
 
 def _free(stage: bpy.types.Scene, thing: bpy.types.Object, lies: np.ndarray) -> bpy.types.Object:
-    """A copy of a mesh that hangs on nothing and lies (F, 4, 4) in the world as the thing does."""
+    """Copy a mesh without a parent, moving (F, 4, 4) in the world as the original does."""
     copy = thing.copy()
     copy.animation_data_clear()
     stage.collection.objects.link(copy)
@@ -260,7 +282,7 @@ def _free(stage: bpy.types.Scene, thing: bpy.types.Object, lies: np.ndarray) -> 
 
 
 def _channels(matrices: np.ndarray) -> dict[str, np.ndarray]:
-    """Location, rotation and, where it is not 1, scale of matrices (F, 4, 4)."""
+    """Compute location, rotation and, where it is not 1, scale of matrices (F, 4, 4)."""
     size = np.linalg.norm(matrices[:, :3, :3], axis=1)
     turn = matrices[:, :3, :3] / np.maximum(size, 1e-12)[:, None, :]
     found = {"location": matrices[:, :3, 3], "rotation_quaternion": quaternion.continuous(quaternion.from_matrix(turn))}
@@ -268,7 +290,7 @@ def _channels(matrices: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def _dress(scene: bpy.types.Scene, rig: bpy.types.Object) -> list[bpy.types.Object]:
-    """The meshes that an armature moves, visible now or at some other time by their keys."""
+    """List the meshes that an armature moves, visible now or at some other time by their keys."""
     moved = [thing for thing in scene.objects if thing.type == "MESH" and (
         thing.parent == rig or any(m.type == "ARMATURE" and m.object == rig for m in thing.modifiers))]
     return [thing for thing in moved if thing.visible_get() or _keyed(thing, HIDDEN)]
@@ -281,7 +303,7 @@ def _keyed(thing: bpy.types.Object, paths: set[str]) -> bool:
 
 
 def _worn(stage: bpy.types.Scene, thing: bpy.types.Object, rig: bpy.types.Object, copy: bpy.types.Object):
-    """A copy of a mesh, moved by the rig's copy."""
+    """Copy a mesh so that the rig's copy moves it."""
     place = thing.matrix_world.copy()
     twin = thing.copy()
     stage.collection.objects.link(twin)
@@ -293,7 +315,7 @@ def _worn(stage: bpy.types.Scene, thing: bpy.types.Object, rig: bpy.types.Object
     for modifier in twin.modifiers:
         if modifier.type == "ARMATURE" and modifier.object == rig:
             modifier.object = copy
-    if _keyed(thing, HIDDEN):  # the formats have no word for it
+    if _keyed(thing, HIDDEN):  # the formats cannot store it
         twin.animation_data_clear()
         twin.hide_viewport = twin.hide_render = False
     return twin
@@ -301,7 +323,7 @@ def _worn(stage: bpy.types.Scene, thing: bpy.types.Object, rig: bpy.types.Object
 
 @contextmanager
 def _names(rigs, copies):
-    """The copies have the rigs' own names, and their bones' data too, as long as they are written."""
+    """Give the copies the rigs' own names, and their bones' data too, while they are exported."""
     local = [(rig, copy, rig.name) for rig, copy in zip(rigs, copies) if rig.library is None]
     for rig, copy, name in local:
         rig.name = f"{name} (original)"
@@ -319,7 +341,7 @@ def _names(rigs, copies):
 
 
 def _save(stage, copies, wanted: Wanted) -> None:
-    """Written beside, then renamed: no half-written file is left."""
+    """Select the scene's objects and export them."""
     layer = stage.view_layers[0]
     layer.update()
     for thing in layer.objects:
@@ -332,22 +354,22 @@ def _save(stage, copies, wanted: Wanted) -> None:
 
 
 def with_ending(path: Path, ending: str) -> Path:
-    """A path with this ending: in place of another form's, else added ("walk.v2" keeps its ".v2")."""
+    """Return a path with this ending: replacing another format's, else appended ("walk.v2" keeps its ".v2")."""
     if path.suffix.lower() in {ending, *SUFFIXES.values()}:
         return path.with_suffix(ending)
     return path.with_name(path.name + ending)
 
 
 def saved(out: Path, write_to) -> None:
-    """Let `write_to(path)` write beside `out`, then rename; InputError for what exporters raise."""
+    """Let `write_to(path)` write a temporary file, then rename it to `out`; InputError for exporters' exceptions."""
     try:
         with beside(out, out.suffix) as part:
             write_to(str(part))
             if not part.is_file():
                 raise RuntimeError("nothing was written")
-    except (RuntimeError, AttributeError) as error:  # what operators raise: trouble while writing; a disabled exporter
-        found, expected = f"this Blender could not write it ({error})", "an exporter that it has, and a place to write"
-        raise InputError(out, found, expected, "choose another ending or place") from None
+    except (RuntimeError, AttributeError) as error:  # what operators raise: errors while writing; a disabled exporter
+        found, expected = f"Blender could not write it ({error})", "an available exporter and a writable folder"
+        raise InputError(out, found, expected, "choose another format or folder") from None
 
 
 def _write_bvh(stage: bpy.types.Scene, copies, path: Path) -> None:
@@ -387,4 +409,4 @@ def _usd(path: str, engine: str, selected: bool) -> None:
 
 
 EXPORTERS = {"FBX": _fbx, "GLB": _glb, "USD": _usd}
-"""Format -> function (path, engine, only what is selected) that writes the scene in the window."""
+"""Format -> function (path, engine, selected only) that exports the scene in the window."""

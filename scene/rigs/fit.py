@@ -1,5 +1,6 @@
-"""The motion that an armature plays, its action or what its NLA strips come to; and it on a rig's driven skeleton, feet
-planted on its legs."""
+"""The motion that an armature plays, from its action or its NLA strips; and the same on a rig's driven skeleton, feet
+planted with its legs.
+"""
 
 from __future__ import annotations
 
@@ -19,16 +20,22 @@ from . import armature
 from .driven import Driven
 
 LEGS_ALIKE = (0.8, 1.25)
-_FLOOR = (-0.01, 0.05)  # heights of standing toe joints, metres, whose soles are on the scene's own ground
+_FLOOR = (-0.01, 0.05)  # heights of toe joints in contact, metres, whose soles are on the scene's ground
 _MOST_LEAN = np.radians(30.0)
-_MISS = 0.005  # metres that are told
+_MISS = 0.005  # metres from which a miss is reported
 
 
 @dataclass(frozen=True)
 class BakeOptions:
-    """How to bake. root: one of `rig.ROOTS`. keeps_travel: footprints stay where they are (None: where the legs are
-    alike). bakes_ik: IK targets follow instead of being switched off. plants: feet are planted again. exact: the motion
-    is on the driven skeleton already and is played as it is."""
+    """How to bake.
+
+    Attributes:
+        root: one of `rig.ROOTS`.
+        keeps_travel: footprints stay where they are (None: where the legs are similar).
+        bakes_ik: IK targets follow instead of being switched off.
+        plants_feet: plant the feet again.
+        exact: the motion is on the driven skeleton already and is used unchanged.
+    """
 
     root: str = "KEEP"
     keeps_travel: bool | None = None
@@ -39,7 +46,12 @@ class BakeOptions:
 
 @dataclass(frozen=True, eq=False)
 class Slide:
-    """How far standing feet slide: mean cm/s while they stand, worst mm of a stance."""
+    """How far feet in contact slide.
+
+    Attributes:
+        cm_s: mean speed in contact, cm/s.
+        worst_mm: travel of the worst stance, mm.
+    """
 
     cm_s: float
     worst_mm: float
@@ -49,7 +61,7 @@ class Fit:
     """A source's motion on the driven skeleton, feet planted."""
 
     def __init__(self, driven: Driven, source: Source, options: BakeOptions):
-        from ...beyond_mocap.motion import contacts  # these bring scipy, which is slow to import
+        from ...beyond_mocap.motion import contacts  # these import scipy, which is slow
         from ...beyond_mocap.motion.foot_plant import plant
         from ...beyond_mocap.motion.retargeting.retarget import Retargeter
 
@@ -78,27 +90,29 @@ class Fit:
         self.told = self._lines(driven, planted.miss if options.plants else None, points, keeps)
 
     def _lines(self, driven: Driven, miss: np.ndarray | None, points: np.ndarray, keeps: bool) -> list[str]:
+        """Build messages about size, sliding feet, floor, and legs that are too short."""
         lines = [
             f"legs {self.scale:.2f} of the source's; {'footprints kept' if keeps else 'steps scaled with the legs'}"
         ]
         before, bare, after = self.slides
         lines.append(
-            f"standing feet slide {after.cm_s:.1f} cm/s, worst stance {after.worst_mm:.0f} mm "
+            f"feet in contact slide {after.cm_s:.1f} cm/s, worst stance {after.worst_mm:.0f} mm "
             f"(source {before.cm_s:.1f} and {before.worst_mm:.0f}; before planting {bare.cm_s:.1f} and "
             f"{bare.worst_mm:.0f})"
         )
-        lines.append(f"floor: the front of the foot stands {100 * driven.sole:.1f} cm high, as in the rig's rest pose")
+        lines.append(f"floor: the front of the foot is {100 * driven.sole:.1f} cm high, as in the rig's rest pose")
         short = np.where(points.any(axis=2), miss, 0.0) if miss is not None else np.zeros((1, 2))
         for side, name in enumerate(("left", "right")):
             if short[:, side].max(initial=0.0) > _MISS:
-                lines.append(f"the {name} leg is up to {1000 * short[:, side].max():.0f} mm too short for its place in "
+                lines.append(f"the {name} leg is up to {1000 * short[:, side].max():.0f} mm short of its target in "
                              f"{int(np.sum(short[:, side] > _MISS))} frames")
         return lines
 
 
 def _looking_ahead(skeleton: Skeleton, source: Skeleton) -> Skeleton:
-    """The driven skeleton with a crown on its head, as far off the vertical as the source's crown is in its rest pose,
-    so that heads which look straight ahead at rest do so together. Unchanged where the source's rest pose says nothing.
+    """Add a tip to the driven skeleton's head, as far off the vertical as the source's in its rest pose.
+
+    Heads that look straight ahead at rest then match. Unchanged where the source's rest pose shows nothing.
     """
     from ...beyond_mocap.motion.humanoid import identify
 
@@ -122,7 +136,7 @@ def _looking_ahead(skeleton: Skeleton, source: Skeleton) -> Skeleton:
 
 
 def _stand_spread(motion: Motion, points: np.ndarray) -> float:
-    """How unevenly high the toes stand, metres: 5 % to 95 %."""
+    """Measure how uneven the heights of toes in contact are, metres: 5 % to 95 %."""
     from ...beyond_mocap.motion.humanoid import identify
 
     body = identify(motion.skeleton)
@@ -132,7 +146,7 @@ def _stand_spread(motion: Motion, points: np.ndarray) -> float:
 
 
 def slide(motion: Motion, standing: np.ndarray) -> Slide:
-    """How far the feet of a motion slide while `standing` (T, 2) says that they stand."""
+    """Measure how far the feet of a motion slide while in contact, `foot_contacts` (T, 2) bool."""
     from ...beyond_mocap.synthesis.quality import movement
 
     joints = movement.foot_joints(motion.skeleton)
@@ -149,9 +163,14 @@ def _raised(motion: Motion, by: float) -> Motion:
 
 @dataclass(frozen=True, eq=False)
 class Source:
-    """A motion that a body plays, in metres at the scene's rate from scene frame `start`.
+    """The motion that a body plays, in metres at the scene's rate.
 
-    standing (T, 2) bool: feet on the ground as the take carries it; None where only the motion itself can tell."""
+    Attributes:
+        motion: F frames.
+        start: scene frame of the first.
+        name: of the action or strip.
+        foot_contacts: (F, 2) bool, feet in contact as stored in the take; None where only the motion shows it.
+    """
 
     motion: Motion
     start: int
@@ -160,19 +179,27 @@ class Source:
 
 
 def source_of(body: bpy.types.Object | None, scene: bpy.types.Scene, standing=None) -> Source:
-    """The motion that an armature plays: its action, or, with NLA strips, what these come to.
+    """Read the motion that an armature plays: its action, or the result of its NLA strips.
 
-    standing: function (frames) -> (F, 2) bool of a take, None where there is none."""
+    Args:
+        body: the armature.
+        scene: of the armature.
+        find_contacts: function (frames) -> (F, 2) bool of a take; None where there is none.
+    Returns:
+        The motion.
+    Raises:
+        InputError: if it plays nothing.
+    """
     if body is None or body.type != "ARMATURE":
         raise InputError("bake to rig", "no motion", "a player with a result or an armature with an action",
-                         "synthesize and accept first")
+                         "synthesize and press Apply first")
     data = body.animation_data
     strips = [strip for track in (data.nla_tracks if data and data.use_nla else ()) if not track.mute
               for strip in track.strips if not strip.mute]
     playing, _ = channels.playing(body)
     if playing is None and not strips:
-        raise InputError(f"armature {body.name}", "it plays no action", "an armature that moves",
-                         "synthesize and accept first, or choose another source")
+        raise InputError(f"armature {body.name}", "plays no action", "an armature that moves",
+                         "synthesize and press Apply first, or choose another source")
     if strips:
         first, last = _extent(body, strips)
         motion, start, name = evaluated(body, scene, np.arange(first, last + 1)), first, strips[0].name
@@ -191,7 +218,7 @@ def _extent(body: bpy.types.Object, strips) -> tuple[int, int]:
 
 
 def extent(rigs: list[bpy.types.Object]) -> tuple[float, float]:
-    """First and last scene frame of what the armatures play; InputError where one plays nothing."""
+    """Find the first and last scene frame of the armatures' motions; InputError where one plays nothing."""
     ends = []
     for rig in rigs:
         data = rig.animation_data
@@ -203,14 +230,14 @@ def extent(rigs: list[bpy.types.Object]) -> tuple[float, float]:
         own += [(s.frame_start, s.frame_end) for t in (data.nla_tracks if data and data.use_nla else ())
                 if not t.mute for s in t.strips if not s.mute]
         if not own:
-            raise InputError(f"armature {rig.name}", "it does not move", "an action or NLA strips",
-                             "bake or accept a motion first")
+            raise InputError(f"armature {rig.name}", "does not move", "an action or NLA strips",
+                             "bake or apply a motion first")
         ends += own
     return min(a for a, _ in ends), max(b for _, b in ends)
 
 
 def evaluated(body: bpy.types.Object, scene: bpy.types.Scene, frames: np.ndarray) -> Motion:
-    """The motion that Blender shows on an armature at these frames: NLA, constraints and all."""
+    """Sample the motion that Blender displays on an armature at these frames, with NLA and constraints."""
     skeleton = armature.skeleton_of(body, scene)
     rest = armature.rest_rotations(body, skeleton.names)
     now, subframe, rows = scene.frame_current, scene.frame_subframe, []

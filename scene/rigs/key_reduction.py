@@ -1,10 +1,10 @@
-"""Fewer keys: those that a curve does not need are left out, and what stays is within a tolerance on every frame.
+"""Keyframe reduction: keys that a curve does not need are removed, within a tolerance on every frame.
 
-All channels of a bone's rotation keep keys on the same frames. Between two keys the curve is the cubic with the slopes
-that the dense motion has there, which is what Blender draws with handles a third of the way; where it is off by more
-than the tolerance, the worst frame gets a key too (Douglas and Peucker 1973, with cubics). Quaternions are measured as
-the rotations that they are, so their length does no harm. A bone may turn by what moves the ends that it carries by the
-tolerance; as such turns add up along a limb, this share is lowered until hands, feet and head are where they may be.
+All channels of a bone's rotation have keys on the same frames. Between two keys the curve is the cubic with the slopes
+of the dense motion, which is what Blender draws with handles at a third of the distance; where it is off by more than
+the tolerance, the worst frame gets a key too (Douglas and Peucker 1973, with cubics). Quaternions are compared as
+rotations, so their length does not matter. A bone may rotate by as much as moves the ends that it carries by the
+tolerance; as such rotations add up along a limb, this share is lowered until hands, feet and head are within it.
 """
 
 from __future__ import annotations
@@ -27,12 +27,22 @@ _ENDS = ("head", "left hand", "right hand", "left foot", "right foot", "left toe
 def reduce(
     rig: bpy.types.Object, table: dict[str, str], scene: bpy.types.Scene, tolerance: float, turn_tolerance: float
 ) -> tuple[int, int]:
-    """Leave out keys of the action that the rig plays, driven by the bones of `table`; returns keys before and after.
+    """Remove keys of the action that the rig plays on the bones of `table`.
 
-    tolerance: metres that hands, feet, head and moved bones may be off. turn_tolerance: radians that a bone may be."""
+    Args:
+        rig: the armature.
+        table: part -> bone.
+        scene: of the rig.
+        tolerance: metres that hands, feet, head and moved bones may be off.
+        rotation_tolerance: radians that a bone may be off.
+    Returns:
+        The numbers of keys before and after.
+    Raises:
+        InputError: if the rig plays no action.
+    """
     playing, slot = channels.playing(rig)
     if playing is None:
-        raise InputError(f"rig {rig.name}", "it plays no action", "a baked rig", "Bake to Rig first")
+        raise InputError(f"rig {rig.name}", "plays no action", "a baked rig", "press Bake to Rig first")
     channels.check_free(rig)
     curves = channels.curves(playing, slot)
     ends = channels.keyed_range(curves)
@@ -62,7 +72,15 @@ def reduce(
 
 
 def kept_frames(values: np.ndarray, tolerance: float, metric) -> np.ndarray:
-    """Indices, rising, of the frames of values (F, n) that need a key. metric: (values, values) -> (F,) distances."""
+    """Select the frames that need a key.
+
+    Args:
+        values: (F, n) dense values.
+        tolerance: in the unit of the metric.
+        metric: (values, values) -> (F,) distances.
+    Returns:
+        Indices, rising.
+    """
     slopes = np.gradient(values, axis=0) if len(values) > 1 else np.zeros_like(values)
     kept, open_spans = {0, len(values) - 1}, [(0, len(values) - 1)]
     while open_spans:
@@ -80,7 +98,7 @@ def kept_frames(values: np.ndarray, tolerance: float, metric) -> np.ndarray:
 
 
 def between_keys(values: np.ndarray, kept: np.ndarray) -> np.ndarray:
-    """The curve (F, n) that keys on the frames `kept` of values (F, n) make."""
+    """Interpolate the curve (F, n) of keys on the frames `kept` of values (F, n)."""
     slopes = np.gradient(values, axis=0) if len(values) > 1 else np.zeros_like(values)
     out = values.copy()
     for low, high in zip(kept[:-1], kept[1:]):
@@ -90,7 +108,7 @@ def between_keys(values: np.ndarray, kept: np.ndarray) -> np.ndarray:
 
 
 def _cubic(values: np.ndarray, slopes: np.ndarray, low: int, high: int, at: np.ndarray) -> np.ndarray:
-    """Hermite's cubic from frame `low` to frame `high`, at frames (N,): (N, n)."""
+    """Interpolate with Hermite's cubic from frame `low` to frame `high`, at frames (N,): (N, n)."""
     width = float(high - low)
     u = ((at - low) / width)[:, None]
     a, b, c, d = 2 * u**3 - 3 * u**2 + 1, u**3 - 2 * u**2 + u, -2 * u**3 + 3 * u**2, u**3 - u**2
@@ -102,7 +120,7 @@ def _is_turn(path: str) -> bool:
 
 
 def _dense(rig: bpy.types.Object, curves: dict, frames: np.ndarray) -> dict[str, np.ndarray]:
-    """Values (F, n) of every whole channel of a bone: rotations and locations that are keyed in all components."""
+    """Sample the values (F, n) of every complete bone channel: rotations and locations with keys in all components."""
     found: dict[str, np.ndarray] = {}
     for path in dict.fromkeys(path for path, _ in curves):
         count = 4 if path.endswith(("quaternion", "axis_angle")) else 3
@@ -114,7 +132,7 @@ def _dense(rig: bpy.types.Object, curves: dict, frames: np.ndarray) -> dict[str,
 
 
 def _metric(rig: bpy.types.Object, path: str):
-    """How far two stretches of a channel's values are apart: radians of turns, units of places."""
+    """Build the distance of two stretches of a channel's values: radians of rotations, units of positions."""
     if not _is_turn(path):
         return lambda a, b: np.linalg.norm(a - b, axis=1)
     mode = rig.path_resolve(path.rpartition(".")[0]).rotation_mode
@@ -127,7 +145,9 @@ def _angle(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def _extremities(driven: Driven, dense: dict[str, np.ndarray]):
-    """Function from changed channels (path -> values) to where hands, feet and head are then: (F, E, 3) metres."""
+    """Build a function from changed channels (path -> values) to the positions of hands, feet and head: (F, E, 3)
+    metres.
+    """
     controls, rig = driven.controls, driven.rig
     ends = [controls.bones.index(driven.table[part]) for part in _ENDS if part in driven.table]
     count = len(next(iter(dense.values())))
@@ -146,7 +166,7 @@ def _extremities(driven: Driven, dense: dict[str, np.ndarray]):
 
 
 def _levers(driven: Driven) -> dict[str, float]:
-    """Path of each driven bone -> metres at rest to the farthest of those that it carries."""
+    """Measure for each driven bone's path the metres at rest to the farthest of those that it carries."""
     controls, scale = driven.controls, driven.placement.scale
     found: dict[str, float] = {}
     for i, bone in enumerate(controls.bones):
@@ -160,7 +180,7 @@ def _levers(driven: Driven) -> dict[str, float]:
 
 
 def _rekey(curve: bpy.types.FCurve, frames: np.ndarray, values: np.ndarray, kept: np.ndarray) -> None:
-    """Only the keys `kept`, joined by cubics with the slopes of the dense values."""
+    """Replace a curve's keys by those on `key_frames`, joined by cubics with the slopes of the dense values."""
     slopes = np.gradient(values) if len(values) > 1 else np.zeros_like(values)
     at, value, slope = frames[kept].astype(float), values[kept], slopes[kept]
     after = np.diff(at, append=at[-1] + 1.0) / 3.0

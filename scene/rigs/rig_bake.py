@@ -1,8 +1,9 @@
-"""A motion onto the user's own rig: retargeted, feet planted on its legs, and laid down on its controls as one action.
+"""Baking a motion onto the user's own rig: retargeted, feet planted with its legs, and written to its controls as one
+action.
 
-The rig's driven bones become a skeleton of the core (`rigs.driven`); the core carries the motion over (`retarget`) and
-plants the feet (`foot_plant`, both in `rigs.fit`); `rigs.controls` turns the pose that comes out into channels. The
-baked action remembers how the rig was before, and with which keys it was baked.
+The rig's driven bones become a skeleton of the core (`rigs.driven`); the core retargets the motion (`retarget`) and
+plants the feet (`foot_plant`, both in `rigs.fit`); `rigs.controls` converts the resulting pose to channels. The baked
+action stores the rig's previous state, and with which keys it was baked.
 """
 
 from __future__ import annotations
@@ -22,15 +23,23 @@ from .control_study import CHANNELS
 from .driven import Driven
 from .fit import BakeOptions, Fit, Slide, Source
 
-_OFF = 1e-3  # metres that are told
+_OFF = 1e-3  # metres from which a deviation is reported
 MARK = "beyond_mocap_rig"
 BEFORE = "beyond_mocap_before"
-KEYS = "beyond_mocap_keys"  # digest of the keys that were baked: with others somebody has worked on them
+KEYS = "beyond_mocap_keys"  # digest of the baked keys: if it differs, the user has edited them
 
 
 @dataclass
 class Baked:
-    """What came of it. slides: of the source, of the rig before and after planting; told: lines for the user."""
+    """The result of a bake.
+
+    Attributes:
+        action: the new action.
+        frames: (F,) scene frames.
+        scale: legs of the rig relative to the source's.
+        slides: of the source, of the rig before and after planting.
+        messages: messages for the user.
+    """
 
     action: bpy.types.Action
     frames: np.ndarray
@@ -41,8 +50,17 @@ class Baked:
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
-    """A motion worked out for a rig, which is still as it was: frames (F,) of the scene; curves as `channels.animate`
-    takes them; heads (F, B, 3) of the driven bones, in the armature's space; told: lines for the user."""
+    """A motion prepared for a rig that is still unchanged.
+
+    Attributes:
+        name: of the source.
+        driven: the rig.
+        fit: the motion on its skeleton.
+        frames: (F,) scene frames.
+        curves: as for `channels.create_action`.
+        heads: (F, B, 3) of the driven bones, armature space.
+        messages: messages for the user.
+    """
 
     name: str
     driven: Driven
@@ -56,7 +74,7 @@ class Fitted:
 def fitted(
     rig: bpy.types.Object, table: dict[str, str], source: Source, scene: bpy.types.Scene, options: BakeOptions
 ) -> Fitted:
-    """`source` on the rig's bones. InputError where the map or the rig does not serve."""
+    """Prepare a bake of `source` onto the rig's bones; InputError where the map or the rig cannot be used."""
     driven = Driven(rig, table, scene, options.bakes_ik)
     fit = Fit(driven, source, options)
     frames = source.start + np.arange(len(source.motion))
@@ -68,7 +86,7 @@ def fitted(
 
 
 def lay(one: Fitted) -> Baked:
-    """Let the rig play what was worked out for it, as a new action."""
+    """Apply a prepared bake to its rig as a new action."""
     rig, driven = one.driven.rig, one.driven
     left = riders.leave(rig)
     before, kept = record_before(rig, driven), keep_edited_bake(rig)
@@ -83,7 +101,7 @@ def lay(one: Fitted) -> Baked:
 
 
 def _told(driven: Driven, options: BakeOptions) -> list[str]:
-    """What the user has to know about this rig."""
+    """Describe what the user has to know about this rig."""
     lines = []
     if driven.controls.switches:
         names = sorted({switch.name for switch in driven.controls.switches})
@@ -97,14 +115,14 @@ def _told(driven: Driven, options: BakeOptions) -> list[str]:
     locked = [bone for part, bone in driven.table.items()
               if any(bones[bone].lock_rotation) or part in ("hips", "root") and any(bones[bone].lock_location)]
     if locked:
-        lines.append(f"locked channels were keyed all the same on {', '.join(locked[:4])}")
+        lines.append(f"locked channels were keyed on {', '.join(locked[:4])}")
     if driven.controls.loose:
-        lines.append(f"{', '.join(driven.controls.loose[:4])}: carried by more than one bone, may be off")
+        lines.append(f"{', '.join(driven.controls.loose[:4])}: carried by more than one bone, may be inaccurate")
     return lines
 
 
 def _off(driven: Driven, frames: np.ndarray, heads: np.ndarray, scene: bpy.types.Scene) -> list[str]:
-    """A line where Blender poses the rig elsewhere than it was worked out, looked at in a few frames."""
+    """Describe where Blender poses the rig differently from the computed pose, checked on a few frames."""
     now, subframe, worst, where = scene.frame_current, scene.frame_subframe, 0.0, ""
     for i in np.unique(np.linspace(0, len(frames) - 1, 4).astype(int)):
         scene.frame_set(int(frames[i]))
@@ -115,12 +133,12 @@ def _off(driven: Driven, frames: np.ndarray, heads: np.ndarray, scene: bpy.types
                 worst, where = off, bone
     scene.frame_set(now, subframe=subframe)
     if worst > _OFF:
-        return [f"the rig itself holds {where} up to {1000 * worst:.0f} mm from where it should be (constraints?)"]
+        return [f"{where} is up to {1000 * worst:.0f} mm from its computed position; check the rig's constraints"]
     return []
 
 
 def record_before(rig: bpy.types.Object, driven: Driven) -> dict:
-    """How the rig was before, for `remove_bake`; what an earlier bake remembered where it is still on."""
+    """Record the rig's state for `remove_bake`; while an earlier bake is still on, the state recorded with it."""
     playing, slot = channels.playing(rig)
     if playing is not None and playing.get(MARK) and BEFORE in playing:
         return json.loads(playing[BEFORE])
@@ -135,12 +153,12 @@ def record_before(rig: bpy.types.Object, driven: Driven) -> dict:
 
 
 def note_keys(rig: bpy.types.Object) -> None:
-    """Remember the keys of the action that the rig plays as those that were baked."""
+    """Record the keys of the action that the rig plays as the baked ones."""
     channels.playing(rig)[0][KEYS] = _digest(rig)
 
 
 def is_as_baked(rig: bpy.types.Object) -> bool:
-    """Whether nobody has changed the keys of the baked action that the rig plays."""
+    """Whether the keys of the baked action that the rig plays are unchanged."""
     return channels.playing(rig)[0].get(KEYS) == _digest(rig)
 
 
@@ -154,22 +172,22 @@ def _digest(rig: bpy.types.Object) -> str:
 
 
 def keep_edited_bake(rig: bpy.types.Object) -> list[str]:
-    """A baked action on which somebody has worked is the user's own from now on; a line about it."""
+    """Keep a baked action with edited keys as the user's own; returns a message about it."""
     playing, _ = channels.playing(rig)
     if playing is None or not playing.get(MARK) or is_as_baked(rig):
         return []
     for name in (MARK, BEFORE, KEYS):
         if name in playing:
             del playing[name]
-    return [f"keys of the bake before were changed by hand: it is kept as the action {playing.name}"]
+    return [f"the previous bake has edited keys and is kept as the action {playing.name}"]
 
 
 def remove_bake(rig: bpy.types.Object) -> None:
-    """Take a baked action off a rig and out of the file; the rig is as before. InputError where it plays none."""
+    """Remove a baked action from a rig and the file and restore the rig's state; InputError where it plays none."""
     playing, _ = channels.playing(rig) if rig is not None else (None, None)
     if playing is None or not playing.get(MARK):
-        raise InputError(f"rig {rig.name if rig else ''}", "it plays no action that was baked here", "a baked rig",
-                         "Bake to Rig first")
+        raise InputError(f"rig {rig.name if rig else ''}", "plays no baked action", "a baked rig",
+                         "press Bake to Rig first")
     channels.check_free(rig)
     before = json.loads(playing.get(BEFORE, "{}"))
     rig.animation_data.action = None

@@ -1,1 +1,1 @@
-"""Pitch, ball, body, cameras."""
+"""Pitch, ball, character mesh and cameras."""

@@ -1,4 +1,4 @@
-"""The ball: a mesh of the regulation size, and its way over the pitch with the roll that goes with it."""
+"""The ball: a mesh of the regulation size, and its trajectory over the pitch with matching roll."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from ..core.material import colour
 from ..core.measure import frames_per_second, units_per_metre, whole_frames
 
 RADIUS = 0.11  # metres, Laws of the Game: circumference 0.68 to 0.70 m
-ROLLING_BELOW = 0.16  # metres of the centre's height up to which the ground turns the ball
+ROLLING_BELOW = 0.16  # metres, height of the centre up to which the ball rolls on the ground
 
 
 def create(context: bpy.types.Context, name: str, collection, radius: float = RADIUS) -> bpy.types.Object:
-    """A ball object of `radius` m with dark patches where a football has its pentagons, in `collection`."""
+    """Create a ball of `radius` metres in a collection, with dark patches where a football has its pentagons."""
     mesh = bpy.data.meshes.new(name)
     shape = bmesh.new()
     bmesh.ops.create_icosphere(shape, subdivisions=4, radius=radius * units_per_metre(context.scene))
@@ -37,7 +37,16 @@ def create(context: bpy.types.Context, name: str, collection, radius: float = RA
 
 
 def write(ball: bpy.types.Object, path: BallPath, scene: bpy.types.Scene, start: float) -> bpy.types.Action:
-    """Bake the ball's way and roll, a key on every whole scene frame; the path's first sample is at frame `start`."""
+    """Bake the ball's trajectory and roll with a key on every whole scene frame.
+
+    Args:
+        ball: the object.
+        path: the trajectory.
+        scene: says frame rate and unit scale.
+        start: scene frame of the path's first sample.
+    Returns:
+        The action.
+    """
     fps = frames_per_second(scene)
     seconds = path.times - path.times[0]
     frames = whole_frames(start, float(seconds[-1]), fps)
@@ -50,7 +59,7 @@ def write(ball: bpy.types.Object, path: BallPath, scene: bpy.types.Scene, start:
 
 
 def _turned(path: BallPath, at: np.ndarray) -> np.ndarray:
-    """Rotations (F, 4) of a path that has its own, at seconds (F,) after its first sample."""
+    """Interpolate the rotations (F, 4) of a path that has its own, at seconds (F,) after its first sample."""
     seconds = path.times - path.times[0]
     after = np.clip(np.searchsorted(seconds, at), 1, len(seconds) - 1)
     share = np.clip((at - seconds[after - 1]) / (seconds[after] - seconds[after - 1]), 0.0, 1.0)
@@ -58,8 +67,13 @@ def _turned(path: BallPath, at: np.ndarray) -> np.ndarray:
 
 
 def rolling(places: np.ndarray) -> np.ndarray:
-    """Rotations (F, 4) of a ball whose centre passes `places` (F, 3) metres: it rolls on the ground, in the air it
-    keeps the turn per frame with which it left the ground."""
+    """Compute the rotations of a ball that rolls on the ground; in the air it keeps its rotation per frame.
+
+    Args:
+        places: (F, 3) metres, the ball's centre.
+    Returns:
+        (F, 4) quaternions.
+    """
     step = np.diff(places, axis=0)
     turn = np.stack([-step[:, 1], step[:, 0], np.zeros(len(step))], axis=1) / RADIUS  # up x step: rotation vectors
     for i in np.flatnonzero(places[1:, 2] > ROLLING_BELOW):
@@ -71,7 +85,7 @@ def rolling(places: np.ndarray) -> np.ndarray:
 
 
 def _pentagons() -> np.ndarray:
-    """Directions (12, 3) of a football's pentagons: the corners of an icosahedron."""
+    """Return the directions (12, 3) of a football's pentagons: the corners of an icosahedron."""
     golden = (1.0 + 5.0**0.5) / 2.0
     corners = [(0.0, a, b * golden) for a in (-1.0, 1.0) for b in (-1.0, 1.0)]
     corners = np.array([np.roll(corner, shift) for corner in corners for shift in range(3)])

@@ -1,4 +1,4 @@
-"""A low-poly person on an armature: one mesh, a vertex group per bone, the shirt in the player's colour."""
+"""A low-poly character on an armature: one mesh, a vertex group for each bone, the shirt in the player's colour."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 from ..core.material import colour
 from ..rigs import armature
 
-LOOKS = {  # linear RGB of what is the same on all players
+LOOKS = {  # linear RGB of the parts that all players share
     "skin": (0.46, 0.24, 0.15),
     "hair": (0.035, 0.02, 0.012),
     "shorts": (0.70, 0.70, 0.72),
@@ -18,10 +18,20 @@ LOOKS = {  # linear RGB of what is the same on all players
 
 
 def create(player, name: str, shirt, collection, scene: bpy.types.Scene, example) -> bpy.types.Object:
-    """Dress the armature `player`: a mesh named `name` with an armature modifier, as its child, in `collection`.
+    """Create a character mesh on an armature, as its child.
 
-    example: a `Motion` on the armature's skeleton; it shows how the body hangs on bones whose rest pose says little."""
-    from ...beyond_mocap.appearance.body import MATERIALS, low_poly_body  # brings scipy, which is slow to import
+    Args:
+        player: the armature.
+        name: of the mesh.
+        shirt: linear RGB.
+        collection: for the mesh.
+        scene: says the unit scale.
+        example: a `Motion` on the armature's skeleton; it shows how the body hangs on bones whose rest pose is
+            ambiguous.
+    Returns:
+        The mesh object.
+    """
+    from ...beyond_mocap.appearance.body import MATERIALS, low_poly_body  # imports scipy, which is slow
 
     skeleton = armature.skeleton_of(player, scene)
     body = low_poly_body(skeleton, example=example)
@@ -43,7 +53,7 @@ def create(player, name: str, shirt, collection, scene: bpy.types.Scene, example
 
 
 def _weigh(person: bpy.types.Object, names: tuple[str, ...], body) -> None:
-    """A vertex group per bone, filled in runs of equal weight: few calls, and no operator."""
+    """Write a vertex group for each bone, in runs of equal weight: few calls, and no operator."""
     for joint, name in enumerate(names):
         group = person.vertex_groups.new(name=name)
         weights = np.sum(np.where(body.joints == joint, body.weights, 0.0), axis=1)

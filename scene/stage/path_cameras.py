@@ -1,7 +1,7 @@
-"""Four cameras on riders and their paths: from above, from the side, from three quarters, and following behind a body.
+"""Four cameras on all edited paths and their bodies: from above, from the side, from three quarters, and behind a body.
 
-They are ordinary cameras in a collection of their own. Each remembers how it was laid; laid again are only those that
-nobody has moved, animated or changed since. The fourth hangs on an empty that runs along with the body, so that it can
+They are ordinary cameras in a collection of their own. Each stores how it was placed; only cameras that the user has
+not moved, animated or changed are placed again. The fourth is a child of an empty that moves with the body, so it can
 be moved to another place from which it follows.
 """
 
@@ -28,20 +28,26 @@ MARK, LAID, BEFORE = "beyond_mocap_path_camera", "beyond_mocap_laid", "beyond_mo
 
 LENSES = {"ABOVE": 50.0, "SIDE": 50.0, "QUARTER": 40.0, "BEHIND": 35.0}
 TILTS = {"SIDE": 8.0, "QUARTER": 32.0, "BEHIND": 12.0}  # degrees that a camera looks down
-ASIDE = 38.0  # degrees that the third camera stands round from the second
+ASIDE = 38.0  # degrees between the third and the second camera
 BEHIND = (-4.2, 0.0, 1.75)  # metres from the focus, which looks along X
-TALL, WIDE = 1.9, 0.6  # metres round every place that a body needs
+TALL, WIDE = 1.9, 0.6  # metres of height and half width that a body needs at every place
 MARGIN = 1.08
-ROUND = 0.75  # a way as wide as this share of its length has no side
-MOST = 400  # places that are looked at
-SECONDS = 0.45  # of the bell by which the focus is smoothed
-JUMP = 1.0  # metres from one frame to the next: no way, but a motion that starts again
+ROUND = 0.75  # ratio of width to length, from which on a path has no side
+MOST = 400  # places that are used
+SECONDS = 0.45  # of the Gaussian that smooths the focus
+JUMP = 1.0  # metres between two frames, from which on the motion starts again
 
 
 @dataclass(frozen=True, eq=False)
 class Route:
-    """What is to be seen: places (N, 3) m on the ground, all paths and bodies. Whom the last camera follows: at scene
-    frames (T,) he is at origin (T, 3) m on the ground with heading (T,) radians."""
+    """What the cameras show, and the body that the last one follows.
+
+    Attributes:
+        places: (N, 3) metres on the ground, all paths and bodies.
+        frames: (T,) scene frames of the followed body.
+        origin: (T, 3) metres, its place on the ground.
+        heading: (T,) radians.
+    """
 
     places: np.ndarray
     frames: np.ndarray
@@ -50,13 +56,22 @@ class Route:
 
 
 def route(scene: bpy.types.Scene, first: bpy.types.Object | None = None) -> Route:
-    """Of all riders of a scene; `first` is followed, where he rides. InputError where nobody does."""
+    """Collect what the cameras show in a scene.
+
+    Args:
+        scene: the scene.
+        first: the body to follow, if its path is edited; else another one.
+    Returns:
+        The targets.
+    Raises:
+        InputError: if no path is edited.
+    """
     known = {body: rides.shown(body) for body in riders(scene)}
     for body in [body for body, shown in known.items() if shown is None]:
         rides.renew(scene, body)
         known[body] = rides.shown(body)
     if not known:
-        raise InputError("path cameras", "nobody rides a path", "an armature that does",
+        raise InputError("path cameras", "no edited path", "an armature with an edited path",
                          "select one and press Edit Path")
     places = np.concatenate([part for shown in known.values() for part in (shown.line, shown.ridden.origin)])
     shown = known.get(first) or next(iter(known.values()))
@@ -65,8 +80,7 @@ def route(scene: bpy.types.Scene, first: bpy.types.Object | None = None) -> Rout
 
 
 def set_up(scene: bpy.types.Scene, route: Route) -> list[str]:
-    """Lay all cameras that are missing or as they were laid last; the names of those that are kept as somebody has
-    moved them."""
+    """Place all cameras that are missing or unchanged; return the names of those that the user has changed."""
     collection, kept = _collection(scene), []
     corners = _corners(route.places)
     for kind in KINDS:
@@ -87,8 +101,7 @@ def set_up(scene: bpy.types.Scene, route: Route) -> list[str]:
 
 
 def follow(scene: bpy.types.Scene, route: Route) -> None:
-    """Let the focus of the last camera run along with the body; nothing happens where it is gone or has keys of
-    others."""
+    """Animate the focus of the last camera along the body; nothing happens where it is missing or has other keys."""
     focus = _marked(scene, FOCUS)
     if focus is None:
         return
@@ -104,7 +117,7 @@ def follow(scene: bpy.types.Scene, route: Route) -> None:
 
 
 def followed(route: Route, fps: float) -> tuple[np.ndarray, np.ndarray]:
-    """Place (T, 3) m and turn (T,) of the focus: the body's, smooth enough to look at."""
+    """Smooth place (T, 3) metres and rotation (T,) radians of the focus."""
     step = np.linalg.norm(np.diff(route.origin, axis=0), axis=1)
     starts = np.flatnonzero(step > JUMP) + 1
     pieces = [(gaussian_smooth(place, SECONDS * fps / 2.0), gaussian_smooth(turn, SECONDS * fps)) for place,
@@ -113,18 +126,18 @@ def followed(route: Route, fps: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def found(scene: bpy.types.Scene, kind: str) -> bpy.types.Object | None:
-    """The camera of a kind; None where there is none."""
+    """Find the camera of a kind; None where there is none."""
     return _marked(scene, kind)
 
 
 def any_in(scene: bpy.types.Scene) -> bool:
-    """Whether there is one of them at all."""
+    """Return whether the scene has any of these cameras."""
     collection = _kept(scene)
     return collection is not None and any(thing.get(MARK) in KINDS for thing in collection.objects)
 
 
 def take(scene: bpy.types.Scene, camera: bpy.types.Object) -> None:
-    """Make one of them the scene's camera, and remember whose place it took."""
+    """Make one of these cameras the scene's camera, and store the one that it replaces."""
     collection, before = _kept(scene), scene.camera
     if before is not None and not before.get(MARK):
         collection[BEFORE] = before
@@ -132,14 +145,14 @@ def take(scene: bpy.types.Scene, camera: bpy.types.Object) -> None:
 
 
 def give_back(scene: bpy.types.Scene) -> None:
-    """The scene has the camera again that it had before `take`, which is remembered no more."""
+    """Restore the scene's camera from before `activate_camera`."""
     before = _kept(scene).pop(BEFORE, None)
     if before is not None and before.name in scene.objects:
         scene.camera = before
 
 
 def untouched(camera: bpy.types.Object) -> bool:
-    """Whether a camera is as it was laid: nobody has moved, animated or changed it."""
+    """Return whether a camera is as it was placed: not moved, animated or changed."""
     laid, now = camera.get(LAID), _laid(camera)
     if laid is None or len(laid) != len(now) or camera.animation_data or camera.data.animation_data:
         return False
@@ -148,7 +161,7 @@ def untouched(camera: bpy.types.Object) -> bool:
 
 
 def _laid(camera: bpy.types.Object) -> list[float]:
-    """Where a camera is and what it sees, as numbers."""
+    """List place, lens and type of a camera as numbers."""
     data = camera.data
     own = [number for row in camera.matrix_basis for number in row]
     return [*own, data.lens, data.ortho_scale, float(data.type == "ORTHO"), data.shift_x, data.shift_y]
@@ -183,7 +196,7 @@ def _made(collection: bpy.types.Collection, kind: str) -> bpy.types.Object:
 
 
 def _frame(scene: bpy.types.Scene, camera: bpy.types.Object, kind: str, corners: np.ndarray, side: float) -> None:
-    """Place a camera so that all corners (N, 3) m are in its frame; side: the yaw at which the way lies across."""
+    """Place a camera so that all corners (N, 3) metres are in its frame; `side` is the yaw of the side view."""
     units = units_per_metre(scene)
     if kind == "ABOVE":
         turn = Euler((0.0, 0.0, 0.0))
@@ -200,11 +213,18 @@ def _frame(scene: bpy.types.Scene, camera: bpy.types.Object, kind: str, corners:
 
 
 def fitted(corners: np.ndarray, axes: np.ndarray, half: np.ndarray) -> np.ndarray:
-    """The nearest place (3,) from which a camera sees all corners (N, 3), the nearest ones being at its frame's edge.
+    """Fit the nearest place from which a camera sees all corners, the nearest ones at its frame's edge.
 
-    axes: (3, 3) the camera's own, in columns: right, up, back. half: (2,) half its frame's width and height at 1 m.
-    With f the depth of a corner, it is inside where |x - X| <= (f - F) half, four half-spaces whose tips are the
-    solution."""
+    With f the depth of a corner, it is inside where |x - X| <= (f - F) half: four half-spaces whose apexes are the
+    solution.
+
+    Args:
+        corners: (N, 3) metres.
+        axes: (3, 3) the camera's axes in columns: right, up, back.
+        half: (2,) half its frame's width and height at 1 m.
+    Returns:
+        (3,) metres.
+    """
     seen = corners @ axes * [1.0, 1.0, -1.0]
     right, left = (np.max(sign * seen[:, :2] - seen[:, 2:] * half, axis=0) for sign in (1.0, -1.0))
     depth = float(np.min(-(right + left) / (2.0 * half)))
@@ -212,16 +232,17 @@ def fitted(corners: np.ndarray, axes: np.ndarray, half: np.ndarray) -> np.ndarra
 
 
 def _half_frame(scene: bpy.types.Scene, camera: bpy.types.Object) -> np.ndarray:
-    """(2,) half the width and height of what a camera sees: 1 unit before it, or at a scale of 1 where it is
-    orthographic."""
+    """Measure half the width and height of a camera's frame (2,): at 1 unit, or at a scale of 1 if orthographic."""
     frame = np.array(camera.data.view_frame(scene=scene))
     size = np.abs(frame[:, :2]).max(axis=0)
     return size if camera.data.type == "ORTHO" else size / np.abs(frame[0, 2])
 
 
 def _side(places: np.ndarray) -> float:
-    """The yaw in which a way's length lies across the picture, from left to right where it goes along X; 0 where it is
-    round."""
+    """Find the yaw in which the path's length lies across the picture; 0 where it is round.
+
+    It runs from left to right where it runs along X.
+    """
     level = places[:, :2] - places[:, :2].mean(axis=0)
     spread, axes = np.linalg.eigh(level.T @ level)
     if spread[1] <= 0.0 or math.sqrt(max(spread[0], 0.0) / spread[1]) > ROUND:
@@ -231,14 +252,14 @@ def _side(places: np.ndarray) -> float:
 
 
 def _corners(places: np.ndarray) -> np.ndarray:
-    """The places with the room that a body takes there."""
+    """Return the corners of the boxes that a body needs at the places."""
     some = places[np.linspace(0, len(places) - 1, min(len(places), MOST)).astype(int)]
     room = np.array([(x, y, z) for x in (-WIDE, WIDE) for y in (-WIDE, WIDE) for z in (0.0, TALL)])
     return (some[:, None] + room).reshape(-1, 3)
 
 
 def _hang(scene: bpy.types.Scene, collection: bpy.types.Collection, camera: bpy.types.Object) -> None:
-    """Hang the camera behind its focus, which is made where it is missing."""
+    """Make the camera a child of its focus, which is created where it is missing."""
     units = units_per_metre(scene)
     focus = _marked(scene, FOCUS)
     if focus is None:

@@ -1,5 +1,6 @@
-"""Where the players stand: a pitch of any size that the Laws of the Game allow with grass, lines and goals with nets,
-daylight, and a camera that keeps them in view."""
+"""The stage: a pitch of any size that the Laws of the Game allow, with grass, lines, goals and nets, daylight, and a
+camera that follows the players.
+"""
 
 from __future__ import annotations
 
@@ -14,21 +15,21 @@ NAME = "Stage"
 FOCUS = "Stage focus"
 MARK = "beyond_mocap_focus"
 OURS = "beyond_mocap_stage"
-"""Custom property of the collection and of all that `create` puts into it."""
+"""Custom property of the collection and of everything that `create_stage` adds to it."""
 
-EARLIER = {"Grass", "Lines", "Sun", "Camera", FOCUS}  # what stages of files from before that property hold
-HALF_WIDTH = 0.36  # metres to either side that the camera shows with some margin, per metre of its distance
+EARLIER = {"Grass", "Lines", "Sun", "Camera", FOCUS}  # objects of stages in older files, without that property
+HALF_WIDTH = 0.36  # metres to either side that the camera shows with some margin, for each metre of distance
 CAMERA_FROM = (-1.5, -8.5, 1.3)  # metres from the focus: from the touchline, a little above the players' heads
 
 SIZE, LINE_WIDTH = (105.0, 68.0), 0.12  # metres; International Football Association Board, Laws of the Game, Law 1
 GOAL, BAR, POST = 7.32, 2.44, 0.06  # metres between the posts, below the bar, of a post's radius
-ROOF, FLOOR = 0.9, 2.1  # metres that the net reaches back, at the bar and on the ground
+ROOF, FLOOR = 0.9, 2.1  # metres, depth of the net at the bar and on the ground
 MESH, CORD = 0.15, 0.003  # metres between the net's cords, and half a cord's width
 BEYOND = 6.0  # metres of grass beyond the lines
 
 
 def create(context: bpy.types.Context, camera: bool = True) -> bpy.types.Collection:
-    """A collection "Stage" with pitch, sun and, if wanted, a camera; an older one is taken away first."""
+    """Create the collection "Stage" with pitch, sun and, if wanted, a camera; an older stage is removed first."""
     scene = context.scene
     remove(scene)
     stage = bpy.data.collections.new(NAME)
@@ -47,8 +48,10 @@ def create(context: bpy.types.Context, camera: bool = True) -> bpy.types.Collect
 
 
 def remove(scene: bpy.types.Scene) -> None:
-    """Take the stage away, with the meshes, lights and cameras that only it used; what the user has put into its
-    collection stays, and so does a collection of his own that has its name."""
+    """Remove the stage with the meshes, lights and cameras that only it used.
+
+    Objects that the user added to its collection stay, and so does another collection of that name.
+    """
     stage = _stage(scene)
     if stage is None:
         return
@@ -62,16 +65,22 @@ def remove(scene: bpy.types.Scene) -> None:
 
 
 def focus(scene: bpy.types.Scene) -> bpy.types.Object | None:
-    """The empty that the stage's camera hangs on; None where there is no such camera."""
+    """Return the empty that the stage's camera is attached to; None where there is no such camera."""
     stage = _stage(scene)
     return stage.objects.get(FOCUS) if stage else None
 
 
 def follow(scene: bpy.types.Scene, frames: np.ndarray, places: np.ndarray, reach: np.ndarray) -> None:
-    """Let the stage's camera follow and stand back as far as it takes; nothing happens where there is no such camera.
+    """Animate the stage's camera to follow the players at a sufficient distance; nothing happens without such a camera.
 
-    frames: (F,) scene frames. places: (F, 2) metres, the middle of what is to be seen. reach: (F,) metres from there to
-    the farthest player. The camera hangs on an empty, whose size is its distance."""
+    The camera is a child of an empty, whose scale is its distance.
+
+    Args:
+        scene: the scene.
+        frames: (F,) scene frames.
+        places: (F, 2) metres, the middle of what should be visible.
+        reach: (F,) metres from there to the farthest player.
+    """
     target = focus(scene)
     if target is None:
         return
@@ -84,7 +93,7 @@ def follow(scene: bpy.types.Scene, frames: np.ndarray, places: np.ndarray, reach
 
 
 def sun(collection) -> bpy.types.Object:
-    """Daylight from above, a little aside."""
+    """Create daylight from above, slightly from the side."""
     light = bpy.data.lights.new("Sun", "SUN")
     light.energy, light.angle = 2.8, 0.03
     thing = place_object(collection, "Sun", light)
@@ -93,7 +102,7 @@ def sun(collection) -> bpy.types.Object:
 
 
 def sky() -> bpy.types.World:
-    """A world of pale blue."""
+    """Create a world of pale blue."""
     world = bpy.data.worlds.new("Sky")
     if world.node_tree is None:
         world.use_nodes = True
@@ -104,7 +113,7 @@ def sky() -> bpy.types.World:
 
 
 def lay_grass(collection, units: float, size: tuple[float, float] = SIZE) -> bpy.types.Object:
-    """Mown grass in stripes, a little beyond a pitch of `size` (length, width) m."""
+    """Create mown grass in stripes, a little larger than a pitch of `size` (length, width) metres."""
     x, y = (size[0] / 2 + BEYOND) * units, (size[1] / 2 + BEYOND) * units
     stripes = np.linspace(-x, x, 25)
     corners = [(a, b, 0.0) for a in stripes for b in (-y, y)]
@@ -117,7 +126,7 @@ def lay_grass(collection, units: float, size: tuple[float, float] = SIZE) -> bpy
 
 
 def lay_lines(collection, units: float, size: tuple[float, float] = SIZE) -> bpy.types.Object:
-    """All markings as ribbons a few millimetres above the grass, each a little higher, lest crossings flicker."""
+    """Create all markings as ribbons a few millimetres above the grass, each a little higher to avoid z-fighting."""
     corners, faces = [], []
     for number, stroke in enumerate(_strokes(*size)):
         height = 0.004 + 0.0004 * number
@@ -130,7 +139,7 @@ def lay_lines(collection, units: float, size: tuple[float, float] = SIZE) -> bpy
 
 
 def set_goals(collection, units: float, length: float = SIZE[0]) -> list[bpy.types.Object]:
-    """Both goals of a pitch of `length` m, posts and bar with the net behind them, on one mesh each for both."""
+    """Create both goals of a pitch of `length` metres: posts and bar with the net behind, one shared mesh each."""
     frame = _tubes(_frame())
     frame.materials.append(colour("Goal white", (0.9, 0.9, 0.9), 0.35))
     net = _cords(_net())
@@ -147,7 +156,7 @@ def set_goals(collection, units: float, length: float = SIZE[0]) -> list[bpy.typ
 
 
 def place_object(collection, name: str, data) -> bpy.types.Object:
-    """An object in `collection` that a click in the view passes through."""
+    """Create an object in a collection; meshes are not selectable in the view."""
     thing = bpy.data.objects.new(name, data)
     thing.hide_select = data is not None and isinstance(data, bpy.types.Mesh)
     collection.objects.link(thing)
@@ -155,7 +164,7 @@ def place_object(collection, name: str, data) -> bpy.types.Object:
 
 
 def _stage(scene: bpy.types.Scene) -> bpy.types.Collection | None:
-    """The collection that `create` has made, by now or in an earlier version."""
+    """Find the collection of `create_stage`, of this or an earlier version."""
     found = next((one for one in scene.collection.children if one.get(OURS) and one.library is None), None)
     if found is not None:
         return found
@@ -164,7 +173,7 @@ def _stage(scene: bpy.types.Scene) -> bpy.types.Collection | None:
 
 
 def _own(stage: bpy.types.Collection) -> list[bpy.types.Object]:
-    """What `create` has put into a collection."""
+    """List the objects that `create_stage` added to a collection."""
     if stage.get(OURS):
         return [thing for thing in stage.objects if thing.get(OURS)]
     named = {thing: thing.name.split(".")[0] for thing in stage.objects}
@@ -173,6 +182,7 @@ def _own(stage: bpy.types.Collection) -> list[bpy.types.Object]:
 
 
 def _camera(stage, units: float) -> bpy.types.Object:
+    """Create the camera with the empty that it looks at and moves with."""
     focus = place_object(stage, FOCUS, None)
     focus.empty_display_size = 0.5 * units
     focus.location = (0.0, 0.0, 0.9 * units)
@@ -188,7 +198,7 @@ def _camera(stage, units: float) -> bpy.types.Object:
 
 
 def _strokes(length: float, width: float) -> list:
-    """The middles of all lines, each a row of points (x, y) in metres."""
+    """Build the centre lines of all markings, each a list of points (x, y) in metres."""
     x, y, spot = length / 2, width / 2, LINE_WIDTH / 2
     strokes = [_box(-x, -y, x, y), [(0, -y), (0, y)], _arc((0, 0), 9.15, 0, 360), _arc((0, 0), spot, 0, 360)]
     for side in (-1, 1):
@@ -204,7 +214,7 @@ def _strokes(length: float, width: float) -> list:
 
 
 def _ribbon(points: np.ndarray) -> np.ndarray:
-    """Left and right edge, in turn, of a line along points (N, 2), mitred at its corners: (2 N, 2)."""
+    """Build left and right edges, alternating, of a line along points (N, 2), mitred at its corners: (2 N, 2)."""
     along = np.diff(points, axis=0)
     along /= np.linalg.norm(along, axis=1, keepdims=True)
     closed = np.allclose(points[0], points[-1])
@@ -226,14 +236,14 @@ def _arc(centre, radius, start, end):
 
 
 def _frame() -> list[tuple[np.ndarray, np.ndarray]]:
-    """Posts and bar of the goal at x = 0 that opens towards -x: the ends of their middles, metres."""
+    """Build posts and bar of the goal at x = 0 that opens towards -x: the ends of their centre lines, metres."""
     y, z = GOAL / 2 + POST, BAR + POST
     ends = [((0, -y, 0), (0, -y, z)), ((0, y, 0), (0, y, z)), ((0, -y - POST, z), (0, y + POST, z))]
     return [(np.array(a, float), np.array(b, float)) for a, b in ends]
 
 
 def _net() -> list[tuple[np.ndarray, np.ndarray]]:
-    """The net's cords behind that goal, as ends (3,) m: roof, back and both sides."""
+    """Build the net's cords behind that goal, as ends (3,) metres: roof, back and both sides."""
     y, z = GOAL / 2 + POST, BAR
     roof, floor = np.array([ROOF, 0, z]), np.array([FLOOR, 0, 0])
     cords = []
@@ -255,7 +265,7 @@ def _net() -> list[tuple[np.ndarray, np.ndarray]]:
 
 
 def _tubes(ends, sides: int = 12) -> bpy.types.Mesh:
-    """Round tubes of a post's radius between pairs of ends."""
+    """Create round tubes of a post's radius between pairs of ends."""
     corners, faces = [], []
     angles = 2.0 * np.pi * np.arange(sides) / sides
     for low, high in ends:
@@ -272,7 +282,7 @@ def _tubes(ends, sides: int = 12) -> bpy.types.Mesh:
 
 
 def _cords(ends) -> bpy.types.Mesh:
-    """Thin crossed ribbons between pairs of ends, seen from everywhere."""
+    """Create thin crossed ribbons between pairs of ends, visible from all directions."""
     corners, faces = [], []
     for low, high in ends:
         for aside in _across(high - low):
@@ -283,7 +293,7 @@ def _cords(ends) -> bpy.types.Mesh:
 
 
 def _across(along: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Two unit vectors at right angles to `along` (3,) and to each other."""
+    """Return two unit vectors at right angles to `along` (3,) and to each other."""
     along = along / np.linalg.norm(along)
     first = np.cross(along, [0.0, 0.0, 1.0] if abs(along[2]) < 0.9 else [1.0, 0.0, 0.0])
     first /= np.linalg.norm(first)

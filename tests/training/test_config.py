@@ -37,7 +37,7 @@ def test_what_is_refused(tmp_path, text, said):
 
 def test_what_is_no_file_of_text_is_refused(tmp_path):
     (tmp_path / "c.json").write_bytes(b"\xff\xfe\x00")
-    for path, said in ((tmp_path / "c.json", "no text"), (tmp_path / "no.json", "no such file"),
+    for path, said in ((tmp_path / "c.json", "not UTF-8"), (tmp_path / "no.json", "no such file"),
                        (tmp_path, "a folder")):
         with pytest.raises(InputError, match=said) as error:
             read_config(path)

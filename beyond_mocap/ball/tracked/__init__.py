@@ -1,1 +1,3 @@
-"""The ball from tracking: who touched it where and when, and how it went between, solved from noisy samples."""
+"""The ball from tracking data: who touched it where and when, and its trajectory in between, solved from noisy
+samples.
+"""

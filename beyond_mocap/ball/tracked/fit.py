@@ -1,9 +1,9 @@
-"""Launches that explain the samples between two touches: flight with bounces, slide and roll by the physics of `ball`.
+"""Fit launches to the samples between two touches: flight with bounces, slide and roll by the physics of `ball`.
 
-All stretches are fitted at once by damped least squares: the unknowns are where the ball leaves (a little), its
-velocity and its spin; heights come out of it where the feed has none, for a ball in the air slows otherwise than one on
-the ground. Fits that try thousands of flights take coarse steps, a sample's distance each, within which a ball may
-bounce once; `batch.courses` is the judge; at 0.04 s they agree within some centimetres over a second.
+All stretches are fitted together by damped least squares. The unknowns are the start position (slightly), velocity and
+spin. Heights follow from the fit where the feed has none, because a ball slows differently in the air and on the
+ground. Fits simulate thousands of flights, so they use coarse steps, about one sample apart, in which a ball may bounce
+once. `batch.simulate_trajectories` is the reference: at 0.04 s the two agree within some centimetres over a second.
 """
 
 from __future__ import annotations
@@ -19,33 +19,40 @@ from ...base.vectors import unit_vectors
 from ..batch import courses
 from ..physics import FOOTBALL, Ball, bounced, gripped, in_air, length, rolling_spin, sliding, slip, slowing
 
-GRID = 0.04  # s between the moments in which flights are looked at
-LONGEST = 5.0  # s of a stretch
-_ROUGH_ROUNDS, _ROUNDS = 3, 5  # of descending by coarse steps: for each of _UPWARD; from the best of them
-_FINE_ROUNDS = 1  # by the physics as it is
-_UPWARD = (0.0, 2.0, 4.5, 7.0, 10.0, 14.0)  # m/s, tried where heights are not known
-_LOW_ONES = 2  # of them hardly leave the ground
-_CLEARLY, _MARGIN = 0.7, 3.0  # share of the lower one's cost, and nats twice, by which a loft must be better
-_FLAT = 6.0  # m, a stretch so short is on the ground in the end: no more than a hop
-_SEEN, _FILLED, _SEEN_HEIGHT = 0.08, 0.6, 0.12  # m, how far samples lie from the ball, filled-in ones, heights
-_PLACED = 0.12  # m, how far the places of touches are wrong
-_SPUN = 25.0  # rad/s, usual spin about either axis
-_HOP = 1.0  # m/s upward, less stays on the ground
+GRID = 0.04  # s between the simulated moments of a flight
+LONGEST = 5.0  # s, the longest stretch that is fitted
+_ROUGH_ROUNDS, _ROUNDS = 3, 5  # rounds with coarse steps: for each upward speed; from the best
+_FINE_ROUNDS = 1  # rounds with the reference physics
+_UPWARD = (0.0, 2.0, 4.5, 7.0, 10.0, 14.0)  # m/s, tried where heights are unknown
+_LOW_ONES = 2  # of them the ball hardly leaves the ground
+_CLEARLY, _MARGIN = 0.7, 3.0  # a loft must cost less than this share of the low one's cost, less this
+_FLAT = 6.0  # m, a shorter stretch stays on the ground: no more than a hop
+_SEEN, _FILLED, _SEEN_HEIGHT = 0.08, 0.6, 0.12  # m, deviation of samples, of filled-in samples, of heights
+_PLACED = 0.12  # m, deviation of touch positions
+_SPUN = 25.0  # rad/s, usual spin about each axis
+_HOP = 1.0  # m/s upward, a slower ball stays on the ground
 _LOFTED = 8.0  # m/s, usual velocity upward
-_TAKEN, _HIGH = 1.5, 2.2  # m, the ball's usual height at the next touch; hardly more than this
-_ENOUGH = 0.01  # share of the cost, below which nothing more is won
-_AT_ONCE = 300  # stretches
-_MOST = 40  # samples of a stretch that are looked at
+_TAKEN, _HIGH = 1.5, 2.2  # m, usual and highest likely height of the ball at the next touch
+_ENOUGH = 0.01  # share of the cost; the iteration stops when it gains less
+_AT_ONCE = 300  # stretches fitted together, to limit memory
+_MOST = 40  # samples used per stretch
 
-_LEAST_HOP = 0.35  # m/s upward after a bounce: less is over within one step
+_LEAST_HOP = 0.35  # m/s upward after a bounce: a lower hop ends within one step
 
 
 @dataclass(frozen=True, eq=False)
 class Stretches:
-    """S stretches between touches, each with up to K samples (rows padded with weight zero).
+    """S stretches between touches, each with up to K samples; rows are padded with weight zero.
 
-    seconds: (S,) s from start to end. start, end: (S, 3) m, and velocity: (S, 3) m/s at the start, z NaN where unknown.
-    since: (S, K) s after the start. points: (S, K, 3) m. weight, weight_z: (S, K) 1/m, over the ground and in height.
+    Attributes:
+        seconds: (S,) s from start to end.
+        start: (S, 3) m, z NaN where unknown.
+        end: (S, 3) m, z NaN where unknown.
+        velocity: (S, 3) m/s at the start, z NaN where unknown.
+        since: (S, K) s of each sample after the start.
+        points: (S, K, 3) m, the samples.
+        weight: (S, K) 1/m, horizontal.
+        weight_z: (S, K) 1/m, vertical.
     """
 
     seconds: np.ndarray
@@ -61,13 +68,20 @@ class Stretches:
         return len(self.seconds)
 
     def take(self, which: np.ndarray) -> Stretches:
-        """Some of them."""
+        """Select some of the stretches."""
         return Stretches(*(getattr(self, name)[which] for name in self.__dataclass_fields__))
 
 
 @dataclass(frozen=True, eq=False)
 class Launches:
-    """One launch for each of S stretches: place (S, 3) m, velocity (S, 3) m/s, spin (S, 3) rad/s, cost (S,)."""
+    """One launch for each of S stretches.
+
+    Attributes:
+        place: (S, 3) m of the centre.
+        velocity: (S, 3) m/s.
+        spin: (S, 3) rad/s.
+        cost: (S,) of the fit, sum of squared residuals.
+    """
 
     place: np.ndarray
     velocity: np.ndarray
@@ -76,13 +90,22 @@ class Launches:
 
 
 def gathered(times, positions, measured, used, spans) -> Stretches:
-    """The stretches of (start, end, start place (3,), end place (3,), start velocity (3,)) `spans` with their samples.
+    """Collect stretches with their samples.
 
-    times (N,), positions (N, 3), measured and used (N,) bool: the feed's."""
+    Args:
+        times: (N,) s of the feed.
+        positions: (N, 3) m of the ball.
+        measured: (N,) bool, measured samples; the others are filled in.
+        used: (N,) bool.
+        spans: per stretch (start s, end s, start (3,) m, end (3,) m, start velocity (3,) m/s).
+    Returns:
+        The stretches.
+    """
     begins = np.array([span[0] for span in spans])
     ends = np.array([span[1] for span in spans])
     first, last = np.searchsorted(times, begins, "right"), np.searchsorted(times, ends, "left")
     most = min(max(int((last - first).max(initial=0)), 1), _MOST)
+    # A stretch with more than _MAX_SAMPLES samples uses every stride-th of them.
     stride = np.ceil((last - first) / most).astype(int)
     index = first[:, None] + np.arange(most) * np.maximum(stride, 1)[:, None]
     inside = index < last[:, None]
@@ -98,7 +121,20 @@ def gathered(times, positions, measured, used, spans) -> Stretches:
 
 
 def fit_launches(stretches: Stretches, ball: Ball = FOOTBALL, cancelled: Callable[[], bool] | None = None) -> Launches:
-    """The best launch for every stretch, from the velocity upward that was seen; else several are tried."""
+    """Fit the best launch of every stretch.
+
+    Starts from the measured upward velocity; where heights are unknown, several are tried and the lower one is
+    preferred.
+
+    Args:
+        stretches: S stretches.
+        ball: the ball's physics.
+        cancelled: called between batches; True cancels the work.
+    Returns:
+        The launches.
+    Raises:
+        Cancelled: if `cancelled` returns True.
+    """
     if np.isfinite(stretches.velocity[:, 2]).all():
         tried = [_guess(stretches, stretches.velocity[:, 2])]
     else:
@@ -106,21 +142,21 @@ def fit_launches(stretches: Stretches, ball: Ball = FOOTBALL, cancelled: Callabl
     fitted = [_fitted(stretches, start, ball, rounds=_ROUNDS, follow=_coarsely, cancelled=cancelled) for start in tried]
     best, cost = fitted[0]
     for other, costs in fitted[1:]:
-        clearly = costs < _CLEARLY * cost - _MARGIN  # where it cannot be told, the lower one
+        clearly = costs < _CLEARLY * cost - _MARGIN  # when in doubt, keep the lower launch
         best, cost = np.where(clearly[:, None], other, best), np.where(clearly, costs, cost)
     best, cost = _fitted(stretches, best, ball, rounds=_FINE_ROUNDS, follow=_finely, cancelled=cancelled)
     return Launches(*_launch(stretches, best, ball), cost)
 
 
 def _lofted(stretches: Stretches, ball: Ball, cancelled) -> list[np.ndarray]:
-    """Two beginnings (S, 7), the best after some rounds from low and from high velocities upward."""
+    """Choose two initial unknowns (S, 7): the best after some rounds from low and from high upward speeds."""
     row = np.arange(len(stretches))
     start = _guess(stretches, np.zeros(len(stretches)))
     far = np.flatnonzero(np.linalg.norm((stretches.end - stretches.start)[:, :2], axis=1) > _FLAT)
     if not len(far):
         return [start]
     some = stretches.take(far)
-    most = 0.5 * ball.gravity * some.seconds + 2.0  # it has come down again by then
+    most = 0.5 * ball.gravity * some.seconds + 2.0  # with this speed the ball is down again at the end
     rough = [_fitted(some, _guess(some, np.minimum(upward, most)), ball, rounds=_ROUGH_ROUNDS, follow=_coarsely,
                      cancelled=cancelled)
              for upward in _UPWARD]  # fmt: skip
@@ -142,7 +178,7 @@ def _finely(place, velocity, spin, ball: Ball, count: int):
 
 
 def _guess(stretches: Stretches, upward: np.ndarray) -> np.ndarray:
-    """(S, 7) unknowns dx, dy, vx, vy, vz, top spin, side spin to begin with."""
+    """Build initial unknowns (S, 7): dx, dy, vx, vy, vz, top spin, side spin."""
     unknown = np.zeros((len(stretches), 7))
     unknown[:, 2:4] = stretches.velocity[:, :2]
     unknown[:, 4] = upward
@@ -150,6 +186,7 @@ def _guess(stretches: Stretches, upward: np.ndarray) -> np.ndarray:
 
 
 def _launch(stretches: Stretches, unknown: np.ndarray, ball: Ball) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Build positions (S, 3) m, velocities (S, 3) m/s and spins (S, 3) rad/s from the unknowns (S, 7)."""
     place = np.nan_to_num(stretches.start, nan=ball.radius)
     place[:, :2] += unknown[:, :2]
     place[:, 2] = np.maximum(place[:, 2], ball.radius)
@@ -161,14 +198,14 @@ def _launch(stretches: Stretches, unknown: np.ndarray, ball: Ball) -> tuple[np.n
 
 
 def _ways(stretches: Stretches, unknown: np.ndarray, ball: Ball, follow) -> tuple[np.ndarray, np.ndarray]:
-    """(S, K, 3) m where the balls are at the samples' moments, (S, 3) m at the end."""
+    """Simulate the balls; return positions at the samples (S, K, 3) m and at the end (S, 3) m."""
     count = int(np.ceil(stretches.seconds.max() / GRID))
     places, speeds = follow(*_launch(stretches, unknown, ball), ball, count)
     return _between(places, speeds, stretches.since), _between(places, speeds, stretches.seconds[:, None])[:, 0]
 
 
 def _between(places, speeds, since) -> np.ndarray:
-    """(S, K, 3): cubic between the moments of the grid."""
+    """Interpolate (S, K, 3) m cubically between the moments of the grid."""
     cell = np.clip((since / GRID).astype(int), 0, places.shape[1] - 2)
     share = (since / GRID - cell)[..., None]
     row = np.arange(len(places))[:, None]
@@ -178,10 +215,19 @@ def _between(places, speeds, since) -> np.ndarray:
 
 
 def _misses(stretches: Stretches, unknown: np.ndarray, seen: np.ndarray, end: np.ndarray) -> np.ndarray:
-    """(S, R) weighted misses, whose squares are made small, of balls at `seen` (S, K, 3) and `end` (S, 3)."""
+    """Compute the weighted residuals of balls against samples, end positions and usual values.
+
+    Args:
+        stretches: S stretches.
+        unknown: (S, 7).
+        seen: (S, K, 3) m, the balls at the samples' times.
+        end: (S, 3) m, the balls at the end.
+    Returns:
+        (S, R) residuals: horizontal, vertical, then the prior terms.
+    """
     off = seen - stretches.points
     count = np.maximum((stretches.weight > 0).sum(axis=1), 1)
-    even = np.sqrt(np.minimum(1.0, 12.0 / count))[:, None]  # neighbouring samples err together
+    even = np.sqrt(np.minimum(1.0, 12.0 / count))[:, None]  # errors of neighbouring samples correlate
     flat = off[..., :2] * (stretches.weight * even)[..., None]
     high = off[..., 2] * stretches.weight_z * even
     known = np.isfinite(stretches.end[:, 2])
@@ -190,13 +236,13 @@ def _misses(stretches: Stretches, unknown: np.ndarray, seen: np.ndarray, end: np
     rise = np.where(np.isfinite(stretches.velocity[:, 2]), 0.0, unknown[:, 4] / _LOFTED)
     speed = np.linalg.norm(unknown[:, 2:4], axis=1)
     rolls = np.where(unknown[:, 4] < _HOP, np.clip(unknown[:, 5], 0.0, speed / FOOTBALL.radius), 0.0)
-    spun = np.stack([unknown[:, 5] - rolls, unknown[:, 6]])  # along the ground anything between sliding and rolling
+    spun = np.stack([unknown[:, 5] - rolls, unknown[:, 6]])  # rolling: any spin between sliding and rolling is free
     prior = np.stack([last[:, 0], last[:, 1], over, *(unknown[:, :2] / _PLACED).T, rise, *(spun / _SPUN)], axis=1)
     return np.concatenate([_soft(flat.reshape(len(off), -1)), _soft(high), prior], axis=1)
 
 
 def _soft(off: np.ndarray) -> np.ndarray:
-    """Misses beyond two deviations grow like their square root."""
+    """Soften residuals: beyond two deviations they grow like their square root."""
     far = np.abs(off) > 2.0
     return np.where(far, np.sign(off) * np.sqrt(np.maximum(4.0 * np.abs(off) - 4.0, 0.0)), off)
 
@@ -205,7 +251,7 @@ _NUDGE = np.array([0.01, 0.01, 0.02, 0.02, 0.05, 0.5, 0.5])
 
 
 def _fitted(stretches: Stretches, unknown, ball: Ball, rounds: int, follow, cancelled) -> tuple[np.ndarray, np.ndarray]:
-    """Unknowns (S, 7) and costs (S,) after some rounds; stretches of about equal lengths together."""
+    """Fit stretches in batches of about equal length; return unknowns (S, 7) and costs (S,)."""
     order = np.argsort(stretches.seconds, kind="stable")
     out, costs = unknown.copy(), np.zeros(len(unknown))
     for low in range(0, len(order), _AT_ONCE):
@@ -217,13 +263,14 @@ def _fitted(stretches: Stretches, unknown, ball: Ball, rounds: int, follow, canc
 
 
 def _descend(stretches: Stretches, unknown, ball: Ball, rounds: int, follow) -> tuple[np.ndarray, np.ndarray]:
-    """Levenberg and Marquardt's method, every stretch with a damping of its own."""
+    """Solve the least-squares fit by the Levenberg-Marquardt method, each stretch with its own damping."""
     stretches, count = _cropped(stretches), unknown.shape[1]
     off = _misses(stretches, unknown, *_ways(stretches, unknown, ball, follow))
     cost = (off**2).sum(axis=1)
     damping = np.full(len(unknown), 1e-2)
     for _ in range(rounds):
         slope = _slopes(stretches, unknown, ball)
+        # i, j: unknowns; s: stretch; r: residual. Normal equations per stretch.
         normal = np.einsum("isr,jsr->sij", slope, slope)
         right = -np.einsum("isr,sr->si", slope, off)
         diagonal = np.einsum("sii->si", normal) + 1e-9
@@ -236,6 +283,7 @@ def _descend(stretches: Stretches, unknown, ball: Ball, rounds: int, follow) -> 
         better = np.where(good, cost - cost_tried, 0.0) > _ENOUGH * cost
         unknown, off = np.where(good[:, None], tried, unknown), np.where(good[:, None], off_tried, off)
         cost = np.where(good, cost_tried, cost)
+        # Less damping after a success, more after a failure.
         damping = np.clip(np.where(good, damping / 5.0, damping * 8.0), 1e-6, 1e4)
         if not better.any():
             break
@@ -243,7 +291,11 @@ def _descend(stretches: Stretches, unknown, ball: Ball, rounds: int, follow) -> 
 
 
 def _slopes(stretches: Stretches, unknown: np.ndarray, ball: Ball) -> np.ndarray:
-    """(7, S, R) changes of the misses with the unknowns, by coarse steps; another place moves the whole way alike."""
+    """Compute (7, S, R): the change of the residuals with each unknown, by coarse steps.
+
+    Rows s, S + s, 2 S + s ... of the simulation are stretch s with none and with one of the unknowns 2..6 changed; a
+    change of the start position (unknowns 0, 1) moves the whole trajectory and needs no simulation.
+    """
     count = len(unknown)
     six = stretches.take(np.tile(np.arange(count), 6))
     nudged = np.tile(unknown, (6, 1))
@@ -259,7 +311,7 @@ def _slopes(stretches: Stretches, unknown: np.ndarray, ball: Ball) -> np.ndarray
 
 
 def _cropped(stretches: Stretches) -> Stretches:
-    """The same with as few columns as their samples need."""
+    """Crop the stretches to the columns that have samples."""
     used = np.flatnonzero((stretches.weight > 0).any(axis=0))
     last = int(used[-1]) + 1 if len(used) else 1
     wide = {name: getattr(stretches, name)[:, :last] for name in ("since", "points", "weight", "weight_z")}
@@ -269,8 +321,18 @@ def _cropped(stretches: Stretches) -> Stretches:
 
 def coarse_courses(place: np.ndarray, velocity: np.ndarray, spin: np.ndarray, ball: Ball, step: float,
                    count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Positions and velocities (B, count + 1, 3) of balls launched with place, velocity and spin (B, 3), at every
-    `step` s."""
+    """Simulate balls in coarse steps.
+
+    Args:
+        place: (B, 3) m at the launch.
+        velocity: (B, 3) m/s at the launch.
+        spin: (B, 3) rad/s at the launch.
+        ball: the ball's physics.
+        step: s between the moments.
+        count: number of steps.
+    Returns:
+        Positions (B, count + 1, 3) m and velocities (B, count + 1, 3) m/s.
+    """
     place, velocity, spin = place.copy(), velocity.copy(), spin.copy()
     places, velocities = np.empty((count + 1, *place.shape)), np.empty((count + 1, *place.shape))
     low = ball.radius
@@ -291,6 +353,10 @@ def coarse_courses(place: np.ndarray, velocity: np.ndarray, spin: np.ndarray, ba
 
 
 def _in_air(place, velocity, spin, ball: Ball, step: float, low: float):
+    """Step balls in the air by Heun's method; a ball that crosses the ground bounces once within the step.
+
+    `lies` marks balls that stay on the ground from there.
+    """
     first = in_air(velocity, spin, ball)
     then = in_air(velocity + step * first, spin, ball)
     after = velocity + 0.5 * step * (first + then)
@@ -300,6 +366,7 @@ def _in_air(place, velocity, spin, ball: Ball, step: float, low: float):
     if len(down):
         fall, pull = velocity[down, 2], first[down, 2]
         deep = np.maximum(place[down, 2] - low, 0.0)
+        # Time to the ground from a parabola, then the rest of the step after the bounce.
         until = (fall + np.sqrt(np.maximum(fall**2 - 2.0 * pull * deep, 0.0))) / np.minimum(-pull, -1e-6)
         until = np.clip(np.abs(until), 0.0, step)[:, None]
         meets = velocity[down] + until * first[down]
@@ -317,6 +384,7 @@ def _in_air(place, velocity, spin, ball: Ball, step: float, low: float):
 
 
 def _on_ground(place, velocity, spin, ball: Ball, step: float):
+    """Step balls on the ground: slide while there is slip, else roll."""
     before = slip(velocity, spin, ball)
     rubs = length(before) > 1e-6
     faster, turning = sliding(velocity, spin, ball)

@@ -1,4 +1,4 @@
-"""The ways between touches as flights: where one launch explains a stretch's samples, it takes the curves' place."""
+"""Replace the trajectory between touches by flights, where one launch explains the samples of a stretch."""
 
 from __future__ import annotations
 
@@ -13,25 +13,36 @@ from .fit import LONGEST, Stretches, fit_launches, gathered
 from .path import BallPiece
 from .samples import Samples
 
-STEP = 0.02  # s between the moments in which a flight is kept
-_SHORTEST, _LEAST_WAY = 0.25, 2.5  # s, m, of a stretch worth a flight
-_WELL, _BARELY = 0.1, 0.2  # m root mean square: as good as the samples; not worse than this
-_BARELY_HIGH = 0.25  # m root mean square in height
-_WORSE = 2.5  # times the curves' own misses, at most
-_FILLED_OFF = 1.2  # m from samples that the feed made
-_TRUSTED = 5.0  # 1/m, the weight of samples that were measured
-_STRAY, _STRAY_LEAST, _MOST_SOUND = 3.0, 0.4, 0.85  # times the median, m: a sample beside; share that is not beside
-_WAVE = 0.4  # s, in which a shift beside the flight may turn
-_SCATTER, _SHIFTED = 0.08, 0.3  # m of samples; m, its usual size
-_END_OFF = 0.5  # m from the place of the next touch
-_HIGH = 0.6  # m, where a foot hardly takes a ball
-_AIR = 0.35  # m of the centre above the ground, from which it flies
+STEP = 0.02  # s between the stored moments of a flight
+_SHORTEST, _LEAST_WAY = 0.25, 2.5  # s, m, the shortest stretch that is fitted
+_WELL, _BARELY = 0.1, 0.2  # m root mean square: as good as the samples; the worst that is accepted
+_BARELY_HIGH = 0.25  # m root mean square in height, the worst that is accepted
+_WORSE = 2.5  # times the curves' residual, at most
+_FILLED_OFF = 1.2  # m root mean square to filled-in samples, at most
+_TRUSTED = 5.0  # 1/m, weights above this belong to measured samples
+_STRAY, _STRAY_LEAST, _MOST_SOUND = 3.0, 0.4, 0.85  # times the median, and m: an outlier; least share of inliers
+_WAVE = 0.4  # s in which a shift from the flight may change direction
+_SCATTER, _SHIFTED = 0.08, 0.3  # m, scatter of samples; m, usual size of a shift
+_END_OFF = 0.5  # m from the position of the next touch, at most
+_HIGH = 0.6  # m, above this a foot hardly reaches the ball
+_AIR = 0.35  # m of the centre above its rest: higher is a flight
 
 
 def flown(samples: Samples, pieces: list[BallPiece], moments: np.ndarray, heights: bool,
           cancelled=None) -> list[BallPiece]:
-    """The pieces (in order, without gaps in a window), those between neighbouring `moments` (K,) s of touches replaced
-    by flights where these fit. heights: whether those of the samples are meant."""
+    """Replace pieces between neighbouring touches by flights, where these fit.
+
+    Args:
+        samples: the ball's samples.
+        pieces: in order, without gaps within a window.
+        moments: (K,) s of the touches.
+        heights: whether the heights of the samples are used.
+        cancelled: called between batches; True cancels the work.
+    Returns:
+        The pieces with flights in place of those they explain.
+    Raises:
+        Cancelled: if `cancelled` returns True.
+    """
     groups = _between(pieces, moments)
     groups = [group for group in groups if _worth(group)]
     if not groups:
@@ -39,6 +50,7 @@ def flown(samples: Samples, pieces: list[BallPiece], moments: np.ndarray, height
     spans = [_span(group, heights) for group in groups]
     stretches = _stretches(samples, spans, heights)
     flights, offs = _fitted(stretches, spans, cancelled)
+    # A ball that arrives high at a touch also leaves from there: fit the stretches after such touches again.
     if not heights and len(high := _from_above(groups, flights, offs)):
         for number, height in high.items():
             spans[number][2][2] = height
@@ -60,7 +72,7 @@ def _fitted(stretches: Stretches, spans, cancelled) -> tuple[list[BallPiece], li
 
 
 def _from_above(groups, flights, offs) -> dict[int, float]:
-    """The heights m at which stretches begin whose ball has come flying."""
+    """Find the start heights m, by number, of stretches that begin where a flight ends high."""
     found = {}
     for number in range(1, len(groups)):
         together = abs(groups[number - 1][-1].end - groups[number][0].start) < 1e-6
@@ -71,7 +83,7 @@ def _from_above(groups, flights, offs) -> dict[int, float]:
 
 
 def _exchanged(pieces, groups, stretches, flights, offs) -> list[BallPiece]:
-    """The pieces, each group that a flight fits replaced by it."""
+    """Replace each group of pieces that a flight fits by that flight."""
     index = {id(piece): number for number, piece in enumerate(pieces)}
     replaced, gone = {}, set()
     for number, (group, flight, off) in enumerate(zip(groups, flights, offs)):
@@ -84,7 +96,7 @@ def _exchanged(pieces, groups, stretches, flights, offs) -> list[BallPiece]:
 
 
 def _between(pieces: list[BallPiece], moments: np.ndarray) -> list[list[BallPiece]]:
-    """The pieces between each two neighbouring touches, where they follow each other without a gap."""
+    """Group the pieces between each two neighbouring touches, if they follow each other without a gap."""
     groups: list[list[BallPiece]] = []
     touched = set(np.round(moments, 6).tolist())
     open_group: list[BallPiece] | None = None
@@ -108,7 +120,7 @@ def _worth(group: list[BallPiece]) -> bool:
 
 
 def _ends(group: list[BallPiece]) -> tuple[np.ndarray, np.ndarray]:
-    """Where the first piece begins and the last ends (3,) m."""
+    """Start of the first piece and end of the last, (3,) m each."""
     return group[0].positions[0], group[-1].positions[-1]
 
 
@@ -123,8 +135,12 @@ def _heights(samples: Samples, heights: bool) -> np.ndarray:
 
 
 def _followed(stretches: Stretches, launches, spans) -> tuple[list[BallPiece], list[tuple]]:
-    """The flights as pieces, and how far each is off: root mean squares over the ground and in height of
-    measured samples, of filled ones, and the end, m."""
+    """Simulate the launches as pieces and measure their deviations.
+
+    Returns:
+        Pieces, and per piece the root mean squares m: horizontal and vertical to measured samples, to filled-in
+            samples, and the distance m at the end.
+    """
     found: list[BallPiece] = [None] * len(spans)
     offs: list[tuple] = [None] * len(spans)
     order = np.argsort(stretches.seconds, kind="stable")
@@ -139,6 +155,7 @@ def _followed(stretches: Stretches, launches, spans) -> tuple[list[BallPiece], l
 
 
 def _piece(grid, places, speeds, span, spin) -> BallPiece:
+    """Build the piece of one flight, cut to its span, with an interpolated end."""
     seconds = span[1] - span[0]
     inside = grid < seconds - 1e-3
     share = (seconds - grid[inside][-1]) / STEP
@@ -154,13 +171,16 @@ def _piece(grid, places, speeds, span, spin) -> BallPiece:
 
 
 def _bounces(times, places, speeds) -> np.ndarray:
-    """Seconds at which the velocity turns upward near the ground."""
+    """Detect bounces: seconds at which the velocity turns upward near the ground."""
     turns = np.flatnonzero((speeds[:-1, 2] < -0.3) & (speeds[1:, 2] > 0.1))
     falls = np.maximum(places[turns, 2] - FOOTBALL.radius, 0.0) / -speeds[turns, 2]
     return times[turns] + np.minimum(falls, times[turns + 1] - times[turns])
 
 
 def _off(piece: BallPiece, stretches: Stretches, number: int, span) -> tuple[float, float, float, float]:
+    """Measure root mean squares m of a flight to its samples (horizontal, vertical, filled in) and its miss m at the
+    end.
+    """
     since, weight = stretches.since[number], stretches.weight[number]
     at = interpolate(since, piece.times - span[0], piece.positions[:, :2])
     off = np.linalg.norm(at - stretches.points[number, :, :2], axis=1)
@@ -173,7 +193,7 @@ def _off(piece: BallPiece, stretches: Stretches, number: int, span) -> tuple[flo
 
 
 def _sound(off: np.ndarray, measured: np.ndarray) -> np.ndarray:
-    """(K,) bool: measured samples that are not off far more than most; where these are many, all measured ones."""
+    """Find inliers (K,) bool among measured samples; where too few are inliers, all measured samples."""
     if not measured.any():
         return measured
     near = measured & (off < max(_STRAY_LEAST, _STRAY * float(np.median(off[measured]))))
@@ -192,8 +212,11 @@ def _fits(group: list[BallPiece], off: tuple) -> bool:
 
 
 def _brought(piece: BallPiece, stretches: Stretches, number: int, ends: tuple[np.ndarray, np.ndarray]) -> BallPiece:
-    """The same with its ends over the ground where the touches are, and what wind, pitch and knuckles did to it: a slow
-    shift over the ground, as far as the measured samples ask for it."""
+    """Align a flight with its touches and samples.
+
+    Its ends are moved horizontally onto the touches. A slow horizontal shift stands for wind, pitch and knuckling,
+    limited to what the measured samples show.
+    """
     seconds = piece.end - piece.start
     shift = np.stack([ends[0] - piece.positions[0], ends[1] - piece.positions[-1]])[:, :2]
     measured = stretches.weight[number] > _TRUSTED
@@ -205,6 +228,7 @@ def _brought(piece: BallPiece, stretches: Stretches, number: int, ends: tuple[np
     since, there = since[sound], there[sound]
     waves, _ = _waves(since / seconds, seconds)
     off = stretches.points[number][measured, :2] - there - waves[:, :2] @ shift
+    # Ridge regression of the shapes that are zero at both ends, on what the end shifts leave.
     slow = waves[:, 2:]
     size = np.linalg.solve(slow.T @ slow + (_SCATTER / _SHIFTED) ** 2 * np.eye(slow.shape[1]), slow.T @ off)
     every, slopes = _waves((piece.times - piece.start) / seconds, seconds)
@@ -220,7 +244,7 @@ def _brought(piece: BallPiece, stretches: Stretches, number: int, ends: tuple[np
 
 
 def _dropped(pieces: list[BallPiece]) -> list[BallPiece]:
-    """The pieces, in order; what comes down on somebody falls from there, where heights are not known."""
+    """Add falls: where heights are unknown, a ball that arrives high at a player falls from there."""
     out = []
     for piece in pieces:
         joined = out and abs(out[-1].end - piece.start) < 1e-6
@@ -230,7 +254,7 @@ def _dropped(pieces: list[BallPiece]) -> list[BallPiece]:
 
 
 def _falling(piece: BallPiece, height: float) -> BallPiece:
-    """The same, from `height` m down to where it is."""
+    """Build the same piece with a fall from `height` m down to its own trajectory."""
     since = piece.times - piece.start
     falls = height - 0.5 * FOOTBALL.gravity * since**2
     higher = falls > piece.positions[:, 2]
@@ -240,8 +264,14 @@ def _falling(piece: BallPiece, height: float) -> BallPiece:
 
 
 def _waves(share: np.ndarray, seconds: float) -> tuple[np.ndarray, np.ndarray]:
-    """(n, 2 + W) shapes over a stretch, one beginning at 1, one ending at 1, the others zero at both ends; their slopes
-    in 1/s."""
+    """Build shift shapes over a stretch.
+
+    Args:
+        share: (n,) of the stretch, 0 to 1.
+        seconds: s, its duration.
+    Returns:
+        Shapes (n, 2 + W): one is 1 at the start, one is 1 at the end, the others are 0 at both; and their slopes 1/s.
+    """
     count = int(np.clip(round(seconds / _WAVE), 1, 6))
     angles = np.pi * np.arange(1, count + 1)
     values = np.column_stack([1.0 - share, share, np.sin(share[:, None] * angles)])

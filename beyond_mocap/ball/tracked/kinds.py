@@ -1,4 +1,4 @@
-"""What a touch was: the part that met the ball, and a word for what it did; where play ends."""
+"""Classify touches: the body part that met the ball and what it did; find where the ball leaves the pitch."""
 
 from __future__ import annotations
 
@@ -9,13 +9,20 @@ import numpy as np
 from ...motion.track import BALL_RADIUS
 
 GOAL_HEIGHT = 2.44  # m
-_BACK = 0.5  # s in the field before it can go out again
+_BACK = 0.5  # s on the pitch before it can go out again
 
 
 @dataclass(frozen=True)
 class TouchKind:
-    """What a touch was. ball: "sends", "takes", "carries" or "". labels: of what a player does at it, () where it is no
-    wish. event, details: kind and details of an event like it."""
+    """A kind of touch.
+
+    Attributes:
+        name: identifier.
+        ball: "sends", "takes", "carries" or "": what the touch does to the ball.
+        labels: what a player does at it; () if there is no such label.
+        event: kind of the corresponding event.
+        details: details of that event.
+    """
 
     name: str
     ball: str
@@ -34,29 +41,37 @@ TOUCH_KINDS = (TouchKind(KICK, "sends", ("kick",), "pass"), TouchKind(RECEIVE, "
                TouchKind(HAND, "takes", ("catchb",), "catch"), TouchKind(SAVE, "takes", ("catchb",), "save"),
                TouchKind(DEFLECTION, "", (), "deflection"))
 KINDS = tuple(kind.name for kind in TOUCH_KINDS)
-CHEST, HEAD = 0.95, 1.45  # m of the ball's centre from which the chest, the head meets it
-_FAST = 7.0  # m/s relative to the player, more than a dribble's touch
-_STOPPED = 4.0  # m/s, less than a pass
-_TURN = np.cos(np.radians(50.0))  # a deflection keeps to its way within this
-_LINE = 1.2  # m, beyond or before the touch line, where a throw-in is taken
-_ON_LINE = 0.35  # m before it, where a ball lies that was out
-_STILL = 0.5  # s between the touch before and a throw-in
+CHEST, HEAD = 0.95, 1.45  # m of the ball's centre, from which the chest, the head plays it
+_FAST = 7.0  # m/s relative to the player, faster than a dribble's touch
+_STOPPED = 4.0  # m/s, slower than a pass
+_TURN = np.cos(np.radians(50.0))  # a deflection changes direction by less than this angle
+_LINE = 1.2  # m from the touch line, within which a throw-in is taken
+_ON_LINE = 0.35  # m inside the line, where a ball that was out is placed
+_STILL = 0.5  # s between the previous touch and a throw-in
 AREA_DEPTH, AREA_WIDTH, GOAL_WIDTH = 16.5, 40.32, 7.32  # m
-_SHOT, _BESIDE = 10.0, 1.5  # m/s toward the goal line; m beside the goal
-_LOW, _HELD = 0.35, 0.6  # m of the ball's centre: below, a foot's; above, a keeper's hands
+_SHOT, _BESIDE = 10.0, 1.5  # m/s towards the goal line; m beside the goal
+_LOW, _HELD = 0.35, 0.6  # m of the ball's centre: below, the foot; above, a keeper's hands
 
 
 def part_of(height: float | None) -> str:
-    """The part of a body that meets a ball at `height` m, None where unknown."""
+    """Choose the body part that plays a ball at `height` m; None or NaN (unknown) gives the foot."""
     if height is None or not np.isfinite(height) or height < CHEST:
         return "foot"
     return "chest" if height < HEAD else "head"
 
 
 def kind_of(part: str, before: np.ndarray, after: np.ndarray, same_next: bool, same_before: bool) -> str:
-    """The word for a touch by foot, chest or head: before, after (3,) m/s relative to the player.
+    """Choose the kind of a touch by foot, chest or head.
 
-    same_next, same_before: whether the same player has the next touch, had the one before."""
+    Args:
+        part: "foot", "chest" or "head".
+        before: (3,) m/s of the ball before the touch, relative to the player.
+        after: (3,) m/s after it.
+        same_next: the same player has the next touch.
+        same_before: the same player had the previous touch.
+    Returns:
+        One of KINDS.
+    """
     fast_in, fast_out = np.linalg.norm(before[:2]), np.linalg.norm(after[:2])
     if part == "head":
         return HEADER
@@ -76,9 +91,17 @@ def _is_deflection(before, after, fast_in, fast_out, same_next) -> bool:
 
 
 def is_throw_in(place: np.ndarray, before: np.ndarray, after: np.ndarray, since: float, width: float) -> bool:
-    """Whether a ball that nobody has touched for `since` s, slow, on its line or held there, leaves it by a throw-in.
+    """Say whether a touch is a throw-in: a slow ball on the line or held, untouched for a while, that enters the pitch.
 
-    place (3,) m; before, after (3,) m/s."""
+    Args:
+        place: (3,) m of the ball.
+        before: (3,) m/s before the touch.
+        after: (3,) m/s after it.
+        since: s since the previous touch.
+        width: m of the pitch.
+    Returns:
+        True for a throw-in.
+    """
     on_line = abs(place[1]) > width / 2.0 - _ON_LINE
     held = place[2] > CHEST
     slow = np.linalg.norm(before[:2]) < _STOPPED
@@ -86,15 +109,22 @@ def is_throw_in(place: np.ndarray, before: np.ndarray, after: np.ndarray, since:
 
 
 def leaves_line(place: np.ndarray, after: np.ndarray, width: float) -> bool:
-    """Whether a ball comes into the field from its touch line."""
+    """Say whether a ball at `place` (3,) m with velocity `after` (3,) m/s enters the pitch from its touch line."""
     inward = -np.sign(place[1]) * after[1] > 0.0
     return bool(abs(place[1]) > width / 2.0 - _LINE and inward and np.linalg.norm(after[:2]) > 3.0)
 
 
 def keeper_kind(place: np.ndarray, before: np.ndarray, goal: float, known_height: bool) -> tuple[str, str] | None:
-    """Part and word of a touch by a goalkeeper in his area: a save of a shot, or a ball taken with the hands.
+    """Choose part and kind of a goalkeeper's touch in their penalty area: a save, or a ball taken with the hands.
 
-    place (3,) m, before (3,) m/s; goal: x of his goal line. None where it is a touch like any other's."""
+    Args:
+        place: (3,) m of the ball.
+        before: (3,) m/s before the touch.
+        goal: m, x of the keeper's goal line.
+        known_height: whether the feed has heights.
+    Returns:
+        (part, kind), or None if it is an ordinary touch.
+    """
     away = abs(goal - place[0])
     if away > AREA_DEPTH or abs(place[1]) > AREA_WIDTH / 2.0:
         return None
@@ -107,7 +137,14 @@ def keeper_kind(place: np.ndarray, before: np.ndarray, goal: float, known_height
 
 
 def keepers(positions: np.ndarray, teams: list[str]) -> dict[str, int]:
-    """For each team the player who stands deepest on the whole (index): its goalkeeper."""
+    """Find each team's goalkeeper: the player farthest from the team's middle on average.
+
+    Args:
+        positions: (P, N, 2) m of the players, NaN where absent.
+        teams: (P,) names.
+    Returns:
+        Player index by team; teams of fewer than four players have none.
+    """
     found = {}
     middle = np.array([_middle(path) for path in positions])
     for team in dict.fromkeys(teams):
@@ -123,14 +160,21 @@ def _middle(path: np.ndarray) -> float:
 
 
 def ground_height(height: float) -> float:
-    """The height of the ball's centre: some feeds say 0 for a ball on the ground."""
+    """Limit a height of the ball's centre to its radius: some feeds give 0 for a ball on the ground."""
     return max(float(height), BALL_RADIUS) if np.isfinite(height) else BALL_RADIUS
 
 
 @dataclass(frozen=True, kw_only=True)
 class BallEnd:
-    """The whole ball over a line: time s; kind "goal", "goal line" or "touch line"; x, y m; player: who touched it last
-    ("" unknown)."""
+    """The moment the whole ball crosses a line of the pitch.
+
+    Attributes:
+        time: s.
+        kind: "goal", "goal line" or "touch line".
+        x: m.
+        y: m.
+        player: id of the player who touched it last, "" if unknown.
+    """
 
     time: float
     kind: str
@@ -140,7 +184,16 @@ class BallEnd:
 
 
 def ball_ends(times: np.ndarray, ball: np.ndarray, length: float, width: float) -> list[BallEnd]:
-    """The moments in which the ball (N, 3) m leaves a pitch of `length` x `width` m, between samples."""
+    """Find the moments the ball leaves the pitch, interpolated between samples.
+
+    Args:
+        times: (N,) s.
+        ball: (N, 3) m of the centre.
+        length: m of the pitch.
+        width: m of the pitch.
+    Returns:
+        The moments, in order.
+    """
     over_end = np.abs(ball[:, 0]) - length / 2.0 - BALL_RADIUS
     over_side = np.abs(ball[:, 1]) - width / 2.0 - BALL_RADIUS
     beyond = np.maximum(over_end, over_side)

@@ -1,4 +1,4 @@
-"""The solved path of the ball: pieces between the moments in which its course changes."""
+"""The solved trajectory of the ball: pieces between the moments its direction or speed changes."""
 
 from __future__ import annotations
 
@@ -13,11 +13,17 @@ from ...motion.skeleton import frozen_array
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class BallPiece:
-    """The ball between two changes of its course.
+    """The ball between two changes of its trajectory.
 
-    times: (n,) s, n >= 2, from its start to its end; positions (n, 3) m of the centre and velocities (n, 3) m/s then.
-    kind: "flight", "roll" or "still". spin: (3,) rad/s at its start.
-    residual: m, root mean square over the ground to the measured samples, NaN where there are none. bounces: (k,) s."""
+    Attributes:
+        times: (n,) s, n >= 2, from start to end.
+        positions: (n, 3) m of the centre.
+        velocities: (n, 3) m/s.
+        kind: "flight", "roll" or "still".
+        spin: (3,) rad/s at the start.
+        residual: m, horizontal root mean square to the measured samples, NaN if there are none.
+        bounces: (k,) s.
+    """
 
     times: np.ndarray
     positions: np.ndarray
@@ -33,19 +39,25 @@ class BallPiece:
 
     @property
     def start(self) -> float:
-        """Seconds."""
+        """s of its first moment."""
         return float(self.times[0])
 
     @property
     def end(self) -> float:
-        """Seconds."""
+        """s of its last moment."""
         return float(self.times[-1])
 
 
 @dataclass(frozen=True, eq=False)
 class SolvedPath:
-    """Pieces one after the other; before the first and after the last the ball rests where they begin and end, and
-    where none is in between it goes straight and evenly from one to the next."""
+    """Pieces in order of time.
+
+    Before the first and after the last piece the ball rests; in a gap between two pieces it moves straight at constant
+    speed.
+
+    Attributes:
+        pieces: the pieces.
+    """
 
     pieces: tuple[BallPiece, ...]
 
@@ -56,18 +68,19 @@ class SolvedPath:
 
     @cached_property
     def _begins(self) -> np.ndarray:
-        """The numbers of the knots at which pieces begin."""
+        """Indices of the knots at which pieces start."""
         return np.cumsum([0, *(len(piece.times) for piece in self.pieces[:-1])])
 
     def at(self, times: np.ndarray) -> np.ndarray:
-        """(N, 3) m, the ball's centre at `times` (N,) s."""
+        """Give the positions (N, 3) m of the ball's centre at `times` (N,) s."""
         return self._hermite(np.asarray(times, float), False)
 
     def velocity(self, times: np.ndarray) -> np.ndarray:
-        """(N, 3) m/s at `times` (N,) s; in the moment of a touch, the velocity after it."""
+        """Give the velocities (N, 3) m/s at `times` (N,) s; at a touch, the velocity after it."""
         return self._hermite(np.asarray(times, float), True)
 
     def _hermite(self, at: np.ndarray, slope: bool) -> np.ndarray:
+        """Interpolate positions, or with `slope` velocities, between the knots by cubic Hermite polynomials."""
         times, places, speeds = self._knots
         after = np.clip(np.searchsorted(times, at, "right"), 1, len(times) - 1)
         before = after - 1
@@ -85,5 +98,7 @@ class SolvedPath:
         return np.where(inside[:, None], np.where(step > 1e-9, out / safe, speeds[after]), 0.0)
 
     def residuals(self, times: np.ndarray, points: np.ndarray) -> np.ndarray:
-        """(N,) m over the ground from points (N, 2 or 3) seen at `times` (N,) s; NaN where a point is."""
+        """Give the horizontal distances (N,) m to `points` (N, 2 or 3) m at `times` (N,) s; NaN where a point is
+        NaN.
+        """
         return np.linalg.norm(self.at(times)[:, :2] - np.asarray(points)[:, :2], axis=1)

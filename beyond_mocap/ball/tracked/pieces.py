@@ -1,13 +1,13 @@
-"""Pieces of the ball's path, smooth curves of third degree through runs of samples, and the cuts between them.
+"""Fit smooth cubic pieces to runs of the ball's samples, and choose the cuts between them.
 
-A piece is x(t) = p + v t + a t^2 / 2 + j t^3 / 6 from its first moment on. Nothing but friction and drag, and gravity
-in the air, bends it: a and j are held near zero by their usual size at the piece's speed. So a short piece is nearly a
+A piece is x(t) = p + v t + a t^2 / 2 + j t^3 / 6 from its first moment on. Only friction, drag and (in the air) gravity
+bend it: a and j are held near zero relative to their usual size at the piece's speed. So a short piece is nearly a
 line, and a slow ball that gains speed was touched.
 
-A cut k lies between the samples k - 1 and k: a small set holds every real change of course and more. First each place
-between two samples is judged by how much the lines through the samples before and after it differ; then dynamic
-programming chooses, among the promising ones, those that explain the samples by smooth pieces, with a low price per
-cut. What a cut is (a touch, a bounce, nothing) is decided later, with the players.
+Cut k lies between the samples k - 1 and k. A small set of cuts contains every real change of velocity and more: each
+place between two samples is rated by how much the lines through the samples before and after it differ; then dynamic
+programming chooses the cuts that explain the samples by smooth pieces, with a low cost per cut. What a cut is (a touch,
+a bounce, nothing) is decided later, with the players.
 """
 
 from __future__ import annotations
@@ -17,24 +17,30 @@ from dataclasses import dataclass
 import numpy as np
 
 USUAL_SPEED = 20.0  # m/s
-REST_ACCELERATION, REST_JERK = 2.0, 2.0  # m/s^2, m/s^3 of a ball that hardly moves
-BY_SPEED = 0.35  # 1/s, 1/s^2, more of either with its speed
-IN_AIR, FALLING = 0.5, 9.0  # m above which it falls; m/s^2
-_CHUNK = 400  # starts worked out at once
+REST_ACCELERATION, REST_JERK = 2.0, 2.0  # m/s^2, m/s^3, usual for a ball that hardly moves
+BY_SPEED = 0.35  # 1/s, 1/s^2, growth of both with its speed
+IN_AIR, FALLING = 0.5, 9.0  # m, above this the ball falls; m/s^2
+_CHUNK = 400  # starts fitted together, to limit memory
 
-_SIDES = (0.12, 0.28)  # seconds looked at on either side
-_WORTH = 0.9  # m/s, the least change of velocity looked at
-_LONGEST = 2.4  # seconds of a piece here
-_PAUSE = 0.8  # seconds after which a place is offered in any case
-PRICE = 5.0  # nats for one more cut here
+_SIDES = (0.12, 0.28)  # s of the lines on either side
+_WORTH = 0.9  # m/s, least change of velocity of a candidate
+_LONGEST = 2.4  # s of a piece while cuts are chosen
+_PAUSE = 0.8  # s without a candidate after which one is added
+PRICE = 5.0  # nats for each cut while cuts are chosen
 
 
 @dataclass(frozen=True, eq=False)
 class Fits:
-    """K pieces over samples first[k] .. last[k] (inclusive).
+    """K pieces over the samples first[k] .. last[k] (inclusive).
 
-    begin: (K,) s, the origin of each. coefficients: (K, 4, D): p, v, a/2, j/6. cost: (K,) half the weighted squares.
-    inverse: (K, 4, 4) covariance of one coordinate's coefficients."""
+    Attributes:
+        first: (K,) index of the first sample.
+        last: (K,) index of the last sample.
+        begin: (K,) s, the time origin of each piece.
+        coefficients: (K, 4, D): p, v, a/2, j/6.
+        cost: (K,) nats, half the sum of weighted squares.
+        inverse: (K, 4, 4) covariance of one coordinate's coefficients.
+    """
 
     first: np.ndarray
     last: np.ndarray
@@ -47,41 +53,49 @@ class Fits:
         return len(self.first)
 
     def take(self, which) -> Fits:
-        """Some of them."""
+        """Select some of the pieces."""
         return Fits(*(getattr(self, name)[which] for name in self.__dataclass_fields__))
 
     def position(self, time: np.ndarray, which=slice(None)) -> np.ndarray:
-        """(n, D) m at `time` (n,), each of its own piece."""
+        """Give the position (n, D) m at `time` (n,) s, each of its own piece."""
         return np.einsum("ni,nid->nd", powers(time - self.begin[which]), self.coefficients[which])
 
     def velocity(self, time: np.ndarray, which=slice(None)) -> np.ndarray:
-        """(n, D) m/s at `time` (n,), each of its own piece."""
+        """Give the velocity (n, D) m/s at `time` (n,) s, each of its own piece."""
         return np.einsum("ni,nid->nd", slopes(time - self.begin[which]), self.coefficients[which])
 
     def spread(self, time: np.ndarray, which=slice(None)) -> tuple[np.ndarray, np.ndarray]:
-        """Variances (n,) of one coordinate's position and velocity at `time` (n,)."""
+        """Give the variances (n,) of one coordinate's position and velocity at `time` (n,) s."""
         since = time - self.begin[which]
         place, speed, inverse = powers(since), slopes(since), self.inverse[which]
         return (np.einsum("ni,nij,nj->n", place, inverse, place), np.einsum("ni,nij,nj->n", speed, inverse, speed))
 
 
 def powers(since: np.ndarray) -> np.ndarray:
-    """(n, 4): 1, t, t^2, t^3."""
+    """Build (n, 4): 1, t, t^2, t^3."""
     return since[:, None] ** np.arange(4)
 
 
 def slopes(since: np.ndarray) -> np.ndarray:
-    """(n, 4): the derivatives of `powers`."""
+    """Build (n, 4): the derivatives of 1, t, t^2, t^3."""
     one = np.ones_like(since)
     return np.stack([0.0 * one, one, 2.0 * since, 3.0 * since**2], axis=1)
 
 
 def fit_between(times: np.ndarray, points: np.ndarray, weights: np.ndarray, cuts: np.ndarray, longest: float,
                 steps: int | None = None) -> Fits:  # fmt: skip
-    """Pieces between all pairs of cuts that are at most `longest` seconds (and `steps` cuts) apart.
+    """Fit pieces between all pairs of cuts that are close enough.
 
-    times: (N,) s. points: (N, D) m, any number where weights (N,) (1 / m^2) are zero. cuts: (C,) growing indices; a
-    piece between cuts a and b has the samples a .. b - 1. Neighbouring cuts always make a piece."""
+    Args:
+        times: (N,) s.
+        points: (N, D) m, any number where the weight is zero.
+        weights: (N,) 1/m^2.
+        cuts: (C,) ascending indices; a piece between cuts a and b has the samples a .. b - 1.
+        longest: s, the longest piece; neighbouring cuts always form a piece.
+        steps: the most cuts one piece may leave out. None: any.
+    Returns:
+        The pieces, grouped by their first cut.
+    """
     parts = []
     for low in range(0, len(cuts) - 1, _CHUNK):
         starts = np.arange(low, min(low + _CHUNK, len(cuts) - 1))
@@ -91,6 +105,7 @@ def fit_between(times: np.ndarray, points: np.ndarray, weights: np.ndarray, cuts
         end = np.maximum(np.minimum(end, len(cuts) - 1), starts + 1)
         counts = end - starts
         begin = np.repeat(starts, counts)
+        # For start s the ends s + 1 .. end: a running count that restarts with each start.
         upto = begin + 1 + np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
         parts.append(_solve(times, points, weights, cuts=cuts, begin=begin, upto=upto))
     names = Fits.__dataclass_fields__
@@ -98,7 +113,10 @@ def fit_between(times: np.ndarray, points: np.ndarray, weights: np.ndarray, cuts
 
 
 def _solve(times, points, weights, cuts, begin, upto) -> Fits:
-    """The pieces between cuts begin[k] and upto[k], whose starts are a few neighbouring cuts."""
+    """Fit the pieces between cuts begin[k] and upto[k], whose starts are a few neighbouring cuts.
+
+    The sums of all pieces that share a start are prefixes of one cumulative sum over its samples.
+    """
     starts = np.unique(begin)
     length = int((cuts[upto] - cuts[begin]).max())
     index = np.minimum(cuts[starts][:, None] + np.arange(length), len(times) - 1)
@@ -110,6 +128,7 @@ def _solve(times, points, weights, cuts, begin, upto) -> Fits:
     cross = np.cumsum(powered[..., :4, None] * value[..., None, :], axis=1)
     square = np.cumsum(weight * (value**2).sum(axis=2), axis=1)
     row, column = np.searchsorted(starts, begin), cuts[upto] - cuts[begin] - 1
+    # normal[i, j] = sum of w t^(i + j); `rigid` adds the prior on each coefficient.
     normal = moments[row, column][:, np.add.outer(np.arange(4), np.arange(4))]
     seconds = np.maximum(since[row, column], 1e-3)
     speed = np.linalg.norm(value[row, column] - value[row, 0], axis=1) / seconds
@@ -130,7 +149,16 @@ def _solve(times, points, weights, cuts, begin, upto) -> Fits:
 
 
 def find_promising(times: np.ndarray, points: np.ndarray, known: np.ndarray, interval: float) -> np.ndarray:
-    """Growing places 0 < k < N where the velocity may change, and 0 and N. points (N, D) with gaps bridged."""
+    """Find candidate cuts where the velocity may change.
+
+    Args:
+        times: (N,) s.
+        points: (N, D) m, gaps bridged.
+        known: (N,) bool, samples the feed has.
+        interval: s between samples.
+    Returns:
+        Ascending indices 0 < k < N, with 0 and N added.
+    """
     count = len(times)
     chosen = np.zeros(count + 1, bool)
     for seconds in _SIDES:
@@ -140,7 +168,7 @@ def find_promising(times: np.ndarray, points: np.ndarray, known: np.ndarray, int
         for near in (-1, 0, 1):
             chosen[np.clip(peaks + near, 1, count - 1)] = True
     chosen[[0, count]] = True
-    chosen[np.flatnonzero(np.diff(known.astype(int))) + 1] = True  # gaps begin and end
+    chosen[np.flatnonzero(np.diff(known.astype(int))) + 1] = True  # where gaps start and end
     places = np.flatnonzero(chosen)
     pause = max(2, round(_PAUSE / interval))
     for first, second in zip(places[:-1], places[1:]):
@@ -149,7 +177,15 @@ def find_promising(times: np.ndarray, points: np.ndarray, known: np.ndarray, int
 
 
 def velocity_change(points: np.ndarray, side: int, interval: float) -> np.ndarray:
-    """(N + 1,) m/s: how much the slopes of the lines through `side` samples before and after each place differ."""
+    """Measure how much the slopes of the lines before and after each place differ.
+
+    Args:
+        points: (N, D) m.
+        side: samples in each line.
+        interval: s between samples.
+    Returns:
+        (N + 1,) m/s, zero near both ends.
+    """
     count = len(points)
     share = np.arange(side) - (side - 1) / 2.0
     share = share / (share**2).sum() / interval
@@ -163,18 +199,36 @@ def velocity_change(points: np.ndarray, side: int, interval: float) -> np.ndarra
 
 
 def choose_cuts(times, points, weights, places, price: float = PRICE) -> np.ndarray:
-    """Those of `places` that, as cuts between pieces, explain the samples best (the first and last always)."""
+    """Choose the cuts between pieces that explain the samples best.
+
+    Args:
+        times: (N,) s.
+        points: (N, D) m.
+        weights: (N,) 1/m^2.
+        places: candidate cuts, ascending; the first and last always stay.
+        cut_cost: nats per cut.
+    Returns:
+        The chosen places.
+    """
     pieces = fit_between(times, points, weights, places, _LONGEST)
     return places[find_cheapest(pieces, places, price)]
 
 
 def find_cheapest(pieces: Fits, places: np.ndarray, price: float) -> np.ndarray:
-    """Indices into `places` of the cheapest way from the first to the last, each piece paying `price` beside its
-    cost."""
+    """Find the chain of pieces with the lowest cost, by dynamic programming.
+
+    Args:
+        pieces: the pieces between all pairs of places.
+        places: candidate cuts, ascending.
+        cut_cost: nats added per piece.
+    Returns:
+        Indices into `places`, from the first to the last.
+    """
     begin = np.searchsorted(places, pieces.first)
     upto = np.searchsorted(places, pieces.last + 1)
     order = np.argsort(upto, kind="stable")
     begin, upto, cost = begin[order], upto[order], pieces.cost[order] + price
+    # Pieces sorted by their end: those that end at place p are edges[p] .. edges[p + 1].
     edges = np.searchsorted(upto, np.arange(len(places) + 1))
     best, back = np.zeros(len(places)), np.zeros(len(places), int)
     for place in range(1, len(places)):

@@ -1,4 +1,4 @@
-"""The ball's samples as a feed has them: which are filled in, which are wrong, and how far they scatter."""
+"""The ball's samples from a feed: which are filled in, which are wrong, and how much they scatter."""
 
 from __future__ import annotations
 
@@ -12,23 +12,28 @@ from ...motion.skeleton import frozen_array
 from ...motion.track import BALL_RADIUS
 
 FASTEST_BALL = 45.0  # m/s, well above the hardest kicks (38 m/s)
-_STRAIGHT = 0.4  # seconds that must be straight at constant velocity to be called filled in
-_SCATTER_WINDOW = 1.2  # seconds over which the scatter is taken
+_STRAIGHT = 0.4  # s: samples on a straight line at constant velocity for so long count as filled in
+_SCATTER_WINDOW = 1.2  # s over which the scatter is estimated
 _LEAST_SCATTER, _MOST_SCATTER = 0.03, 0.35  # m
-_WRONG = 6.0  # times the scatter
-_FARTHEST = 1e4  # m from the middle; beyond is no place
-_MEDIAN_LENGTH = 1.177  # of vectors of two normal values
-_LOW = 0.3  # m, of a ball on the ground
+_WRONG = 6.0  # times the scatter: an outlier
+_FARTHEST = 1e4  # m from the middle; positions beyond are invalid
+_MEDIAN_LENGTH = 1.177  # median length of a vector of two standard normal values
+_LOW = 0.3  # m, heights below this belong to a ball on the ground
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Samples:
     """N samples of the ball.
 
-    times: (N,) s, growing. positions: (N, 3) m of its centre, z NaN where the feed has no height; known (N,) bool,
-    whether x and y are numbers. filled: (N,) bool, made by the feed at constant velocity. outlier: (N,) bool, single
-    samples far from both neighbours. scatter: (N,) m, standard deviation of x and of y around it. interval: s, the
-    usual step."""
+    Attributes:
+        times: (N,) s, ascending.
+        positions: (N, 3) m of its centre, z NaN where the feed has no height.
+        known: (N,) bool, x and y are finite.
+        filled: (N,) bool, filled in by the feed at constant velocity.
+        outlier: (N,) bool, single samples far from both neighbours.
+        scatter: (N,) m, standard deviation of x and of y.
+        interval: s, the usual step.
+    """
 
     times: np.ndarray
     positions: np.ndarray
@@ -40,7 +45,7 @@ class Samples:
 
     @property
     def used(self) -> np.ndarray:
-        """(N,) bool: known and not wrong."""
+        """(N,) bool: known and no outlier."""
         return self.known & ~self.outlier
 
     @property
@@ -50,10 +55,19 @@ class Samples:
 
 
 def read_samples(times: np.ndarray, ball: np.ndarray, where: str = "ball") -> Samples:
-    """The samples of a feed: times (N,) s, ball (N, 3) m, NaN where unknown.
+    """Build the samples of a feed.
 
-    Samples whose time is no number, or not after the one before, are left out. InputError where fewer than five have a
-    place."""
+    Samples whose time is not finite, or not after the previous one, are left out.
+
+    Args:
+        times: (N,) s.
+        ball: (N, 3) m, NaN where unknown.
+        where: what error messages name.
+    Returns:
+        The samples.
+    Raises:
+        InputError: if fewer than five samples have a position.
+    """
     times, ball = np.asarray(times, float), np.asarray(ball, float)
     ball = np.where(np.abs(ball) < _FARTHEST, ball, np.nan)
     keep = np.isfinite(times)
@@ -63,7 +77,7 @@ def read_samples(times: np.ndarray, ball: np.ndarray, where: str = "ball") -> Sa
     known = np.isfinite(ball[:, :2]).all(axis=1)
     if np.count_nonzero(known) < 5:
         raise InputError(where, f"{np.count_nonzero(known)} samples of the ball", "at least five",
-                         "choose a feed with a ball, times that rise, or more seconds of it")
+                         "choose a feed with a ball and ascending times, or a longer part of it")
     interval = float(np.median(np.diff(times)))
     filled = _filled(ball[:, :2], known, interval)
     scatter = _scatter(ball[:, :2], interval)
@@ -74,21 +88,21 @@ def read_samples(times: np.ndarray, ball: np.ndarray, where: str = "ball") -> Sa
 
 
 def _centred(ball: np.ndarray) -> np.ndarray:
-    """The same with heights of the ball's centre: some feeds say 0 for a ball on the ground."""
+    """Shift heights to the ball's centre: some feeds give 0 for a ball on the ground."""
     low = ball[:, 2][ball[:, 2] < _LOW]
     lies_at_zero = len(low) > 0 and np.median(low) < BALL_RADIUS / 2.0
     return ball + [0.0, 0.0, BALL_RADIUS] if lies_at_zero else ball
 
 
 def quantum(points: np.ndarray) -> float:
-    """The step (m) to which a feed rounds: the least difference of neighbouring values (N, k), at most 0.1."""
+    """Estimate the step m to which a feed rounds: the least difference of neighbouring values (N, k), at most 0.1."""
     steps = np.abs(np.diff(points, axis=0))
     steps = steps[np.isfinite(steps) & (steps > 1e-6)]
     return float(min(steps.min(initial=0.1), 0.1))
 
 
 def _filled(points: np.ndarray, known: np.ndarray, interval: float) -> np.ndarray:
-    """(N,) bool: within a stretch that no measurement makes: straight and even to within the rounding."""
+    """Detect samples (N,) bool in stretches no measurement produces: straight and even to within the rounding."""
     count = max(5, round(_STRAIGHT / interval) + 1)
     if len(points) < count:
         return np.zeros(len(points), bool)
@@ -98,6 +112,7 @@ def _filled(points: np.ndarray, known: np.ndarray, interval: float) -> np.ndarra
     chord = first + (last - first) * np.linspace(0.0, 1.0, count)
     straight = np.nan_to_num(np.abs(windows - chord).max(axis=(1, 2)), nan=np.inf) <= tolerance
     moves = np.linalg.norm((last - first)[..., 0], axis=1) > 5.0 * tolerance
+    # +1 where a straight window starts, -1 after its end: the cumulative sum counts the windows over each sample.
     inside = np.zeros(len(points) + 1, int)
     begins = np.flatnonzero(straight & moves)
     np.add.at(inside, begins, 1)
@@ -106,8 +121,10 @@ def _filled(points: np.ndarray, known: np.ndarray, interval: float) -> np.ndarra
 
 
 def _scatter(points: np.ndarray, interval: float) -> np.ndarray:
-    """(N,) standard deviation of x and of y of points (N, 2), from second differences: the middle one over a window
-    around each."""
+    """Estimate the standard deviation (N,) m of x and of y of points (N, 2) m.
+
+    From second differences: their median over a window around each sample.
+    """
     from scipy.ndimage import median_filter
 
     count = len(points)
@@ -122,7 +139,9 @@ def _scatter(points: np.ndarray, interval: float) -> np.ndarray:
 
 
 def _outliers(times: np.ndarray, points: np.ndarray, known: np.ndarray, scatter: np.ndarray) -> np.ndarray:
-    """(N,) bool: samples that no ball can reach from either side, or that stick out alone between quiet neighbours."""
+    """Detect samples (N,) bool that no ball can reach from either side, or that deviate alone between smooth
+    neighbours.
+    """
     wrong = np.zeros(len(points), bool)
     there = np.flatnonzero(known)
     at, when = points[there], times[there]
@@ -142,5 +161,5 @@ def _outliers(times: np.ndarray, points: np.ndarray, known: np.ndarray, scatter:
     wrong[there[2:-2]] |= (out > limit) & (out > 4.0 * off)
     for first, end in runs(wrong):
         if end - first > 3:
-            wrong[first:end] = False  # not single samples: the feed has gone elsewhere
+            wrong[first:end] = False  # not single samples: the feed follows something else
     return wrong

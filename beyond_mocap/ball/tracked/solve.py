@@ -1,9 +1,9 @@
-"""The ball solved from samples: touches, the path between them, and where play ends; `solve_ball` is the recipe for a
-match or one player's track.
+"""Solve touches, trajectory and ball exits from samples; `solve_ball` does it for a match or one player's track.
 
-1. `samples`: what the feed filled in, what is wrong, how far the rest scatters. 2. `pieces`: all places where the
-course may change. 3. `touches`: which of them are touches, which are none, in one search that weighs how the velocity
-changes against who is near; then one chain of players. 4. `kinds`: what each touch was, and where play ends.
+1. `samples`: what the feed filled in, which samples are wrong, how much the rest scatters. 2. `pieces`: all places
+where the trajectory may change. 3. `touches`: which of them are touches, in one search that weighs the change of
+velocity against the players nearby; then one chain of players. 4. `kinds`: what each touch was, and where the ball left
+the pitch.
 """
 
 from __future__ import annotations
@@ -25,26 +25,34 @@ from .path import BallPiece, SolvedPath
 from .samples import Samples, read_samples
 
 PITCH = (105.0, 68.0)  # m, the standard pitch
-_GAP = 1.5  # s without a sample, over which nothing is solved
-_SHORTEST, _FEWEST = 0.3, 5  # s that are solved where there are longer stretches; samples that can be
-_TOGETHER = 0.06  # s in which samples err together: they count as one
-_STEP = 0.04  # s between the knots of a path
-_BLEND = 0.2  # s over which a path is brought to the place of a touch
-_RESTART = 60.0  # s after which a ball over the touch line has been thrown in
-_DOUBT = 4.0  # nats, by which what is usual for feeds is told wrongly
-_SINKS = 4.0  # m/s downward, the most after a touch that stops the ball; feeds let heights fall at once
-_MANY = 0.05  # share of filled samples from which it is told
-_EVERYBODY = 14  # players who are tracked: a touch by nobody among so many is a corner that the feed made
+_GAP = 1.5  # s without a sample: a longer gap is not solved
+_SHORTEST, _FEWEST = 0.3, 5  # s, samples: shorter stretches are left out
+_TOGETHER = 0.06  # s in which errors of samples correlate: they count as one sample
+_STEP = 0.04  # s between the knots of a trajectory
+_BLEND = 0.2  # s over which a trajectory is bent to the position of a touch
+_RESTART = 60.0  # s within which a ball over the touch line is thrown in
+_DOUBT = 4.0  # nats: margins below this mean doubt, since the costs are only typical for feeds
+_SINKS = 4.0  # m/s downward, at most, after a touch that stops the ball; feeds let heights drop at once
+_MANY = 0.05  # share of filled samples from which it is reported
+_EVERYBODY = 14  # tracked players: with so many, a touch by none of them is an error of the feed
 _HEIGHTS = 0.8  # share of samples with a height from which heights are used
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SolvedTouch:
-    """Somebody changed the ball's course.
+    """A touch: a player changed the ball's trajectory.
 
-    time: s; uncertainty: s, standard deviation. player: id, "" where nobody tracked was near. part: "foot", "head",
-    "chest" or "hand". kind: one of `kinds.KINDS`. position: (3,) m, the ball's centre. before, after: (3,) m/s of the
-    ball. confidence: 0 to 1, that there was a touch and that it was this player's."""
+    Attributes:
+        time: s.
+        uncertainty: s, standard deviation of the time.
+        player: id, "" if no tracked player was near.
+        part: "foot", "head", "chest" or "hand".
+        kind: one of `kinds.KINDS`.
+        position: (3,) m of the ball's centre.
+        before: (3,) m/s of the ball before the touch.
+        after: (3,) m/s after it.
+        confidence: 0 to 1, that there was a touch and that it was this player's.
+    """
 
     time: float
     uncertainty: float
@@ -63,11 +71,20 @@ class SolvedTouch:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SolvedBall:
-    """What was solved from N samples.
+    """The solution for N samples.
 
-    times: (N,) s of the samples. touches: in order. ball: the path, `.at(times)`, with its pieces. filled, outlier,
-    measured: (N,) bool. residuals: (N,) m over the ground from each sample to the path, NaN where unknown. ends: where
-    the ball left the pitch. confidence: 0 to 1, the touches' mean. notes: lines for people."""
+    Attributes:
+        times: (N,) s of the samples.
+        touches: in order of time.
+        ball: the trajectory with its pieces.
+        filled: (N,) bool, filled in by the feed.
+        outlier: (N,) bool, wrong samples.
+        measured: (N,) bool, used and not filled in.
+        residuals: (N,) m, horizontal, from each sample to the trajectory, NaN where unknown.
+        ends: where the ball left the pitch.
+        confidence: 0 to 1, the mean of the touches.
+        notes: messages for people.
+    """
 
     times: np.ndarray
     touches: tuple[SolvedTouch, ...]
@@ -82,16 +99,30 @@ class SolvedBall:
 
     @property
     def pieces(self) -> tuple[BallPiece, ...]:
-        """The pieces of the path."""
+        """The pieces of the trajectory."""
         return self.ball.pieces
 
 def solve(times: np.ndarray, ball: np.ndarray, positions: np.ndarray, players: Sequence[str], teams: Sequence[str] = (),
           pitch: tuple[float, float] = PITCH, where: str = "ball", progress: Callable[[float, str], None] | None = None,
           cancelled: Callable[[], bool] | None = None) -> SolvedBall:
-    """Solves a feed: times (N,) s, ball (N, 3) m with NaN where unknown, positions (P, N, 2) m of the `players`.
+    """Solve the ball of a feed.
 
-    teams: (P,) names, () where unknown. pitch: length, width m. where: the feed's name, for messages. InputError where
-    the ball has fewer than five samples, or never so many without a long gap."""
+    Args:
+        times: (N,) s.
+        ball: (N, 3) m, NaN where unknown.
+        positions: (P, N, 2) m of the players, NaN where absent.
+        players: (P,) ids.
+        teams: (P,) names, () if unknown.
+        pitch: length and width m.
+        where: the feed's name, for messages.
+        progress: receives the share done and the step.
+        cancelled: called between steps; True cancels the work.
+    Returns:
+        Touches, trajectory and exits.
+    Raises:
+        InputError: if the ball has fewer than five samples, or never so many without a long gap.
+        Cancelled: if `cancelled` returns True.
+    """
     samples = read_samples(times, ball, where)
     every, first = np.unique(np.asarray(times, float), return_index=True)
     positions = np.asarray(positions, float)[:, first[np.searchsorted(every, samples.times)]]
@@ -123,7 +154,7 @@ def solve(times: np.ndarray, ball: np.ndarray, positions: np.ndarray, players: S
 
 
 def _windows(samples: Samples, where: str) -> list[slice]:
-    """The stretches in which the ball is known, gaps of up to _GAP bridged; one at least."""
+    """Find the stretches in which the ball is known, with gaps of up to _MAX_GAP; at least one."""
     there = np.flatnonzero(samples.used)
     breaks = np.flatnonzero(np.diff(samples.times[there]) > _GAP)
     firsts, lasts = [there[0], *there[breaks + 1]], [*there[breaks], there[-1]]
@@ -131,13 +162,13 @@ def _windows(samples: Samples, where: str) -> list[slice]:
     spans = [span for span in spans if span.stop - span.start >= _FEWEST]
     if not spans:
         found = f"the ball's samples are mostly more than {_GAP:g} s apart"
-        raise InputError(where, found, "at least five closer together", "a feed that sees the ball more often")
+        raise InputError(where, found, "at least five closer together", "choose a feed that has the ball more often")
     kept = [span for span in spans if samples.times[span.stop - 1] - samples.times[span.start] >= _SHORTEST]
     return kept or spans[:1]
 
 
 def _bridged(samples: Samples, window: slice) -> np.ndarray:
-    """(n, 2 or 3) m of a window, gaps and wrong samples bridged; heights where the feed has them."""
+    """Bridge gaps and wrong samples of a window: (n, 2 or 3) m, with heights if the feed has them."""
     points, used = samples.positions[window], samples.used[window]
     heights = np.isfinite(points[:, 2])
     axes = 3 if np.count_nonzero(heights & used) > _HEIGHTS * np.count_nonzero(used) else 2
@@ -156,7 +187,7 @@ def _solve_window(samples: Samples, window: slice, positions: np.ndarray, strang
 
 
 def _reach_cost(times, points, positions, cuts, stranger) -> np.ndarray:
-    """(C,) nats of the nearest player touching between the samples before and after each cut."""
+    """Compute the nats (C,) of the nearest player touching the ball between the samples before and after each cut."""
     costs = []
     for near in (cuts - 1, cuts):
         index = np.clip(near, 0, len(times) - 1)
@@ -166,7 +197,7 @@ def _reach_cost(times, points, positions, cuts, stranger) -> np.ndarray:
 
 
 def _pieces(samples: Samples, window: slice, cuts: touches.Cuts) -> list[BallPiece]:
-    """The path of one window, its ends brought to the places of the cuts."""
+    """Build the trajectory of one window; the ends of pieces are bent to the positions of the cuts."""
     times = samples.times[window]
     edges = np.concatenate([[times[0]], cuts.time, [times[-1]]])
     edges = np.maximum.accumulate(edges)
@@ -179,6 +210,7 @@ def _pieces(samples: Samples, window: slice, cuts: touches.Cuts) -> list[BallPie
         at = np.linspace(start, end, count)
         which = np.full(count, index)
         places, speeds = cuts.pieces.position(at, which), cuts.pieces.velocity(at, which)
+        # At the start (cut index - 1) and at the end (cut index) add a shift that falls quadratically to zero.
         for edge, place, way in ((index - 1, 0, -2.0), (index, -1, 2.0)):
             if 0 <= edge < len(cuts.time):
                 miss, over = cuts.place[edge] - places[place], min(_BLEND, end - start)
@@ -189,7 +221,7 @@ def _pieces(samples: Samples, window: slice, cuts: touches.Cuts) -> list[BallPie
 
 
 def _lifted(places: np.ndarray, speeds: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Three coordinates, the ball's centre never below its radius."""
+    """Add heights: three coordinates, the ball's centre never below its radius."""
     if places.shape[1] == 2:
         places = np.pad(places, ((0, 0), (0, 1)), constant_values=BALL_RADIUS)
         return places, np.pad(speeds, ((0, 0), (0, 1)))
@@ -199,6 +231,7 @@ def _lifted(places: np.ndarray, speeds: np.ndarray) -> tuple[np.ndarray, np.ndar
 
 
 def _piece(samples: Samples, at: np.ndarray, places: np.ndarray, speeds: np.ndarray) -> BallPiece:
+    """Build one piece with its kind and its residual to the measured samples."""
     part = slice(*np.searchsorted(samples.times, [at[0], at[-1]]))
     seen = samples.measured[part]
     piece = BallPiece(times=at, positions=places, velocities=speeds, kind="", spin=np.zeros(3), residual=np.nan,
@@ -211,7 +244,7 @@ def _piece(samples: Samples, at: np.ndarray, places: np.ndarray, speeds: np.ndar
 
 
 def _named(samples, found, positions, players, teams, pitch, stranger) -> list[SolvedTouch]:
-    """The touches with their players, parts and kinds."""
+    """Label the touches with their players, parts and kinds."""
     fields = ("time", "spread", "margin", "place", "before", "after")
     rows = [tuple(_three(getattr(cuts, name)[cuts.touch]) for name in fields) for cuts in found]
     columns = [np.concatenate(column) for column in zip(*rows)]
@@ -248,23 +281,23 @@ def _named(samples, found, positions, players, teams, pitch, stranger) -> list[S
 
 
 def _notes(samples: Samples, heights: bool) -> tuple[str, ...]:
-    """What people should know of the feed."""
+    """Describe what people should know about the feed."""
     filled, wrong = float(samples.filled.mean()), int(np.count_nonzero(samples.outlier))
-    lines = [f"{filled:.0%} of the ball's samples were made by the feed at constant velocity"] if filled > _MANY else []
-    lines += [f"{wrong} of the ball's samples {'is' if wrong == 1 else 'are'} wrong and left out"] if wrong else []
-    lines += [] if heights else ["no heights of the ball: solved from how it slows, good to a metre or two at best"]
+    lines = [f"{filled:.0%} of the ball's samples were filled in at constant velocity"] if filled > _MANY else []
+    lines += [f"{wrong} of the ball's samples {'is' if wrong == 1 else 'are'} wrong and ignored"] if wrong else []
+    lines += [] if heights else ["the feed has no ball heights: estimates are good to a metre or two at best"]
     return tuple(lines)
 
 
 def _goals(positions: np.ndarray, teams: Sequence[str], length: float) -> dict[int, float]:
-    """The goalkeepers (indices) and the x of their goal lines, those of this part of the match."""
+    """Find the goalkeepers (indices) and the x m of their goal lines in this part of the match."""
     found = kinds.keepers(positions, list(teams)) if len(teams) == len(positions) else {}
     places = {keeper: np.nanmedian(positions[keeper, :, 0]) for keeper in found.values()}
     return {keeper: float(np.sign(x)) * length / 2.0 for keeper, x in places.items() if abs(x) > length / 5.0}
 
 
 def _thrown_in(solved: list[SolvedTouch], ends: list[BallEnd], width: float) -> list[SolvedTouch]:
-    """The touches, the first from the touch line after each ball over it being its throw-in."""
+    """Label throw-ins: the first touch from the touch line after each ball over it."""
     out = list(solved)
     for end in ends:
         later = [k for k, touch in enumerate(solved) if end.time < touch.time < end.time + _RESTART]
@@ -280,8 +313,10 @@ def _has_heights(samples: Samples) -> bool:
 
 
 def _along(touch: SolvedTouch, path: SolvedPath, heights: bool) -> SolvedTouch:
-    """The touch with the velocities that the path has just before and after it; where the feed has no heights, with the
-    height and the part that a flight into it asks for."""
+    """Update a touch with the trajectory's velocities just before and after it.
+
+    Where the feed has no heights, also with the height and body part that the arriving flight implies.
+    """
     before, after = path.velocity(np.array([touch.time - 1e-4, touch.time + 1e-4]))
     if touch.kind in (kinds.RECEIVE, kinds.DRIBBLE, kinds.CHESTED):
         after = np.array([after[0], after[1], max(after[2], -_SINKS)])
@@ -295,24 +330,25 @@ def _along(touch: SolvedTouch, path: SolvedPath, heights: bool) -> SolvedTouch:
 
 
 def _three(values: np.ndarray) -> np.ndarray:
-    """Rows of two coordinates with a zero third."""
+    """Pad rows of two coordinates with a zero third."""
     return np.pad(values, ((0, 0), (0, 1))) if values.ndim == 2 and values.shape[1] == 2 else values
 
 
 def _between(samples: Samples, positions: np.ndarray, time: np.ndarray) -> np.ndarray:
-    """(P, K) m, each player's mean distance from the samples since the touch before."""
+    """Measure each player's mean distance (P, K) m from the ball since the previous touch."""
     ball = samples.positions[:, :2]
     away = np.linalg.norm(positions - ball, axis=2)
     seen = np.isfinite(away)
     total = np.pad(np.cumsum(np.where(seen, away, 0.0), axis=1), ((0, 0), (1, 0)))
     count = np.pad(np.cumsum(seen, axis=1), ((0, 0), (1, 0)))
     at = np.searchsorted(samples.times, time)
+    # Differences of the cumulative sums give the mean between two touches.
     before = np.concatenate([[0], at[:-1]])
     return (total[:, at] - total[:, before]) / np.maximum(count[:, at] - count[:, before], 1)
 
 
 def _player_velocity(samples: Samples, positions: np.ndarray, player: int, time: float) -> np.ndarray:
-    """(3,) m/s of a player's middle around `time`; zero where he is not known."""
+    """Estimate a player's velocity (3,) m/s around `time`; zero if the player is not known then."""
     if player < 0:
         return np.zeros(3)
     ends = np.array([time - 0.2, time + 0.2])
@@ -324,7 +360,7 @@ def _player_velocity(samples: Samples, positions: np.ndarray, player: int, time:
 
 
 def _sure(margin: float, away: np.ndarray, player: int) -> float:
-    """0 to 1: that it was a touch, times that it was this player's."""
+    """Compute the confidence, 0 to 1: that it was a touch, times that it was this player's."""
     touch = 1.0 / (1.0 + np.exp(-margin / _DOUBT))
     if player < 0:
         return float(0.5 * touch)
@@ -340,15 +376,27 @@ def _by_whom(end: BallEnd, solved: list[SolvedTouch]) -> BallEnd:
 def solve_ball(source: Match | Track, progress: Callable[[float, str], None] | None = None,
                cancelled: Callable[[], bool] | None = None, start: float | None = None,
                end: float | None = None) -> SolvedBall:
-    """Touches and the path of the ball in `source`, or from `start` to `end` seconds of it.
+    """Solve the ball of a match or of one player's track, whole or from `start` to `end`.
 
-    A track has one player: touches of others have the player "". Referees touch no ball. InputError where the source
-    has no ball then."""
+    A track has one player: touches by others have the player "". Referees do not touch the ball.
+
+    Args:
+        source: the match or track.
+        progress: receives the share done and the step.
+        cancelled: called between steps; True cancels the work.
+        start: s. None: from the beginning.
+        end: s. None: to the end.
+    Returns:
+        Touches, trajectory and exits.
+    Raises:
+        InputError: if the source has no ball in that time.
+        Cancelled: if `cancelled` returns True.
+    """
     low, high = -np.inf if start is None else start, np.inf if end is None else end
     part = (source.times >= low) & (source.times <= high)
     if not part.any():
         span = f"{source.times[0]:g} to {source.times[-1]:g} s"
-        raise InputError("times", f"no sample from {low:g} to {high:g} s", span)
+        raise InputError("times", f"no sample between {low:g} and {high:g} s", span)
     if isinstance(source, Track):
         unknown = ~source.ball_height_known[:, None] & [False, False, True]
         ball = np.where(unknown, np.nan, source.ball)

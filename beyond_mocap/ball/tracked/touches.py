@@ -1,9 +1,9 @@
-"""Which cuts of the ball's path are touches, and by whom: one search over all of them at once.
+"""Decide which cuts of the ball's trajectory are touches, and by whom, in one search over all of them.
 
-Between two cuts lies a smooth piece. A cut is one of three things, each with a probability of what is seen there:
-**touch**: a player is near enough, and the velocity changes by any amount; **free**: a bounce, the beginning of
-rolling, a corner that the feed made: the ball slows a little and keeps its way; **nothing**: the cut is left out, and
-one piece goes through. The lowest cost wins. Costs are negative logarithms of probabilities (nats).
+Between two cuts lies a smooth piece. A cut is one of three things, each with a probability of what is observed there:
+**touch**: a player is near enough, and the velocity changes by any amount; **free**: a bounce, the start of rolling, an
+error of the feed: the ball slows a little and keeps its direction; **nothing**: the cut is left out, and one piece goes
+through. The lowest cost wins. Costs are negative logarithms of probabilities (nats).
 """
 
 from __future__ import annotations
@@ -14,33 +14,41 @@ import numpy as np
 
 from .pieces import Fits, fit_between
 
-USUAL_CHANGE = 9.0  # m/s, the mean change of velocity by a touch
-TOUCH, FREE = 4.0, 3.5  # nats for a cut of either kind beside what is seen there
-_NEAR = 1.0  # nats for a course that changes by itself just where somebody is
-_LONGEST = 6.0  # seconds of one piece
-_STEPS = 14  # cuts that one piece may leave out
-_JOINT = 0.12  # m by which neighbouring pieces may miss each other
-_JUMP = 8.0  # nats at most for missing each other: the feed has lost the ball and found it elsewhere
-_SKIP = 0.16  # s around a cut in which samples may be wrong: bodies hide the ball there, feeds pin it to a player
-_SKIPPED = 40.0  # nats for a second left out so
-_SHORT, _SHORT_PRICE = 0.24, 6.0  # s within which the course hardly changes twice, nats for twice at once
+USUAL_CHANGE = 9.0  # m/s, mean change of velocity by a touch
+TOUCH, FREE = 4.0, 3.5  # nats for a cut of either kind, in addition to what is observed there
+_NEAR = 1.0  # nats for a free change just where a player is
+_LONGEST = 6.0  # s, the longest piece
+_STEPS = 14  # most cuts one piece may leave out
+_JOINT = 0.12  # m, deviation between the ends of neighbouring pieces
+_JUMP = 8.0  # nats at most for such a gap: the feed lost the ball and found it elsewhere
+_SKIP = 0.16  # s around a cut in which samples may be wrong: bodies hide the ball, feeds attach it to a player
+_SKIPPED = 40.0  # nats per second of samples left out for this
+_SHORT, _SHORT_PRICE = 0.24, 6.0  # s, shorter pieces are unlikely; nats for a piece of no length
 
-REACH = 0.6  # m from a player's middle at which the ball is played without cost
-STRAY = 0.45  # m, by which bodies and tracking go beyond it
-HIGHEST = 2.4  # m of the ball's centre, a header without cost
-STRANGER = 9.0  # nats for a touch by nobody who is tracked, in a match
-ALONE = 4.0  # the same where one player alone is tracked
-_RISE = 0.3  # m, by which jumps and heights go beyond HIGHEST
-_OTHER = 1.0  # nats for a touch by somebody else than the one before
-_FOLLOWED = 1.0  # s, a player who touches twice within this is near the ball meanwhile
+REACH = 0.6  # m from a player's centre within which a touch has no cost
+STRAY = 0.45  # m, deviation beyond REACH by bodies and tracking
+HIGHEST = 2.4  # m of the ball's centre, up to which a header has no cost
+STRANGER = 9.0  # nats for a touch by no tracked player, in a match
+ALONE = 4.0  # the same if only one player is tracked
+_RISE = 0.3  # m, deviation of jumps and heights beyond HIGHEST
+_OTHER = 1.0  # nats for a touch by another player than the previous one
+_FOLLOWED = 1.0  # s, a player with two touches within this stays near the ball
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Cuts:
-    """The cuts that remain, in order, C of them, and the C + 1 pieces around them.
+    """The C cuts that remain, in order, and the C + 1 pieces around them.
 
-    time: (C,) s between two samples. spread: (C,) s. touch: (C,) bool, else free. margin: (C,) nats by which the other
-    kind is dearer. before, after: (C, D) m/s; place: (C, D) m."""
+    Attributes:
+        time: (C,) s, between two samples.
+        spread: (C,) s, standard deviation of the time.
+        touch: (C,) bool, True for a touch, False for a free change.
+        margin: (C,) nats by which the other kind costs more.
+        place: (C, D) m.
+        before: (C, D) m/s before the cut.
+        after: (C, D) m/s after it.
+        pieces: the fitted pieces.
+    """
 
     time: np.ndarray
     spread: np.ndarray
@@ -53,15 +61,26 @@ class Cuts:
 
 
 def solve_cuts(times, points, weights, cuts, player_cost) -> Cuts:
-    """The likeliest choice among `cuts` (growing sample indices, the first 0 and the last N).
+    """Choose the most likely cuts by dynamic programming over pieces.
 
-    player_cost: (len(cuts),) nats for the nearest player being the one who touches there."""
+    Args:
+        times: (N,) s.
+        points: (N, D) m.
+        weights: (N,) 1/m^2.
+        cuts: ascending sample indices, the first 0 and the last N.
+        player_cost: (len(cuts),) nats for the nearest player being the one who touches there.
+    Returns:
+        The cuts that remain, with their pieces.
+    """
     pieces = fit_between(times, points, weights, cuts=cuts, longest=_LONGEST, steps=_STEPS)
+    # begin, upto: number of the cut at which each piece starts and ends. Pieces are sorted by begin;
+    # `ending` sorts them by upto. Pieces that start at cut c: by_begin[c] .. by_begin[c + 1], likewise by_end.
     begin = np.searchsorted(cuts, pieces.first)
     upto = np.searchsorted(cuts, pieces.last + 1)
     by_begin = np.searchsorted(begin, np.arange(len(cuts) + 1))
     ending = np.argsort(upto, kind="stable")
     by_end = np.searchsorted(upto[ending], np.arange(len(cuts) + 1))
+    # After a cut, a piece may start up to _SKIP_SECONDS later, so that samples hidden at the touch are left out.
     reach = np.searchsorted(cuts, np.searchsorted(times, times[cuts[:-1]] + _SKIP), "left") - 1
     reach = np.clip(np.maximum(reach, np.arange(len(cuts) - 1)), 0, len(cuts) - 2)
     outof = [(by_begin[cut], by_begin[reach[cut] + 1]) for cut in range(len(cuts) - 1)]
@@ -72,6 +91,8 @@ def solve_cuts(times, points, weights, cuts, player_cost) -> Cuts:
     best = np.where(begin == 0, own, np.inf)
     back = np.full(len(pieces), -1)
     offset = 0
+    # best[k]: lowest cost of a chain that ends with piece k; back[k]: the piece before it.
+    # The pair costs lie cut by cut in one array: rows are pieces into the cut, columns pieces out of it.
     for cut in range(1, len(cuts) - 1):
         into, (low, high) = ending[by_end[cut] : by_end[cut + 1]], outof[cut]
         count = len(into) * (high - low)
@@ -91,13 +112,13 @@ def solve_cuts(times, points, weights, cuts, player_cost) -> Cuts:
 
 
 def _short(pieces: Fits, times: np.ndarray) -> np.ndarray:
-    """Nats for pieces that last less than _SHORT."""
+    """Compute nats for pieces shorter than _SHORT_SECONDS."""
     ends = times[np.minimum(pieces.last + 1, len(times) - 1)]
     return _SHORT_PRICE * np.maximum(0.0, 1.0 - (ends - pieces.begin) / _SHORT)
 
 
 def _pairs(ending, by_end, outof) -> tuple[np.ndarray, np.ndarray]:
-    """Indices of all pieces that may follow each other, cut by cut, row by row."""
+    """Build the indices of all pieces that may follow each other, cut by cut, row by row."""
     left, right = [np.zeros(0, int)], [np.zeros(0, int)]
     for cut in range(1, len(outof)):
         into, following = ending[by_end[cut] : by_end[cut + 1]], np.arange(*outof[cut])
@@ -108,6 +129,7 @@ def _pairs(ending, by_end, outof) -> tuple[np.ndarray, np.ndarray]:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class _Knots:
+    """Estimates at K cuts: time, spread, place, velocity before and after, and nats of both kinds."""
     time: np.ndarray
     spread: np.ndarray
     place: np.ndarray
@@ -118,11 +140,12 @@ class _Knots:
 
 
 def _knots(pieces: Fits, left, right, times, cuts, upto, begin, player_cost) -> _Knots:
-    """What neighbouring pieces say of the cut between them, and the costs of both kinds."""
+    """Estimate each cut from its neighbouring pieces, with the costs of both kinds."""
     cut, resumed = upto[left], begin[right]
     first, second = times[cuts[cut] - 1], times[np.minimum(cuts[resumed], len(times) - 1)]
     middle, step = 0.5 * (first + second), np.maximum(second - first, 1e-3)
     before, after = pieces.velocity(middle, left), pieces.velocity(middle, right)
+    # Move the cut to the time at which the two pieces come closest.
     gap = pieces.position(middle, left) - pieces.position(middle, right)
     change = after - before
     size = (change**2).sum(axis=1)
@@ -153,14 +176,17 @@ def _usual(times: np.ndarray) -> float:
 
 
 def _log_touch(size, variance, axes) -> np.ndarray:
-    """Cost of a change of velocity by a touch: its length falls off exponentially, its direction is any."""
+    """Compute the cost of a velocity change by a touch: its size falls off exponentially, its direction is
+    arbitrary.
+    """
     size = np.sqrt(size**2 + variance)
     return size / USUAL_CHANGE + np.log(USUAL_CHANGE * 2.0 * np.pi * np.maximum(size, 0.3))
 
 
 def _free_cost(before, change, place, variance) -> np.ndarray:
-    """Cost of a change of velocity without a touch: along the way a little slower, across hardly, upward at the
-    ground."""
+    """Compute the cost of a velocity change without a touch: slightly slower along the direction, hardly any
+    sideways, and upward only at the ground.
+    """
     flat = before[:, :2]
     speed = np.linalg.norm(flat, axis=1)
     way = flat / np.maximum(speed, 1e-6)[:, None]
@@ -178,11 +204,14 @@ def _free_cost(before, change, place, variance) -> np.ndarray:
 
 
 def _heavy(squares: np.ndarray) -> np.ndarray:
-    """Squares (in deviations) that grow more slowly beyond three deviations: feeds err more than a bell curve does."""
+    """Soften squares (in deviations) beyond three deviations: errors of feeds have heavier tails than a normal
+    distribution.
+    """
     return np.where(squares < 9.0, squares, 6.0 * np.sqrt(np.maximum(squares, 9.0)) - 9.0)
 
 
 def _chosen(pieces: Fits, times, cuts, player_cost) -> Cuts:
+    """Build the cuts between the chosen pieces."""
     upto = np.searchsorted(cuts, pieces.last + 1)
     left = np.arange(len(pieces) - 1)
     knots = _knots(pieces, left, left + 1, times=times, cuts=cuts, upto=upto, begin=np.searchsorted(cuts, pieces.first),
@@ -193,9 +222,16 @@ def _chosen(pieces: Fits, times, cuts, player_cost) -> Cuts:
 
 
 def player_distances(times: np.ndarray, ball: np.ndarray, positions: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """(P, K) m over the ground from each player to the ball at moments `at` (K,), inf where a player is not there.
+    """Measure the horizontal distance from each player to the ball.
 
-    times: (N,) s; ball: (K, 2) m, where it is then; positions: (P, N, 2) m."""
+    Args:
+        times: (N,) s of the positions.
+        ball: (K, 2) m at the moments.
+        positions: (P, N, 2) m of the players.
+        at: (K,) s, the moments.
+    Returns:
+        (P, K) m, inf where a player is absent.
+    """
     out = np.full((len(positions), len(at)), np.inf)
     after = np.clip(np.searchsorted(times, at), 1, len(times) - 1)
     share = np.clip((at - times[after - 1]) / (times[after] - times[after - 1]), 0.0, 1.0)[:, None]
@@ -207,7 +243,15 @@ def player_distances(times: np.ndarray, ball: np.ndarray, positions: np.ndarray,
 
 
 def reach_cost(away: np.ndarray, height: np.ndarray | None, stranger: float = STRANGER) -> np.ndarray:
-    """Nats for a player `away` m from the ball (over the ground) touching it at `height` m."""
+    """Compute the nats for a player touching the ball at a horizontal distance.
+
+    Args:
+        distance: m between the player's centre and the ball.
+        height: m of the ball's centre. None: unknown.
+        untracked_cost: nats of a touch by no tracked player, the upper limit.
+    Returns:
+        Nats, same shape as `distance`.
+    """
     cost = 0.5 * (np.maximum(away - REACH, 0.0) / STRAY) ** 2
     if height is not None:
         cost = cost + 0.5 * (np.maximum(height - HIGHEST, 0.0) / _RISE) ** 2
@@ -215,9 +259,16 @@ def reach_cost(away: np.ndarray, height: np.ndarray | None, stranger: float = ST
 
 
 def choose_players(away: np.ndarray, times: np.ndarray, between: np.ndarray, stranger: float = STRANGER) -> np.ndarray:
-    """(K,) the player of every touch, -1 for nobody: the cheapest chain by dynamic programming over the touches.
+    """Choose the player of every touch: the chain with the lowest cost, by dynamic programming over the touches.
 
-    away: (P, K) m. times: (K,) s. between: (P, K) m, a player's mean distance from the ball since the touch before."""
+    Args:
+        distances: (P, K) m from each player to the ball at each touch.
+        times: (K,) s.
+        between: (P, K) m, a player's mean distance from the ball since the previous touch.
+        untracked_cost: nats of a touch by no tracked player.
+    Returns:
+        (K,) player indices, -1 for none.
+    """
     players, count = away.shape
     if not count:
         return np.zeros(0, int)
@@ -225,6 +276,8 @@ def choose_players(away: np.ndarray, times: np.ndarray, between: np.ndarray, str
     own[:players] = 0.5 * (np.maximum(away - REACH, 0.0) / STRAY) ** 2 + away / STRAY
     back = np.zeros((players + 1, count), int)
     best = own[:, 0]
+    # best[p]: lowest cost of a chain whose last touch is by p (row P: no tracked player).
+    # Either the same player touches again, or the best other one plus _PLAYER_CHANGE_COST.
     for touch in range(1, count):
         stays = best.copy()
         if times[touch] - times[touch - 1] < _FOLLOWED:

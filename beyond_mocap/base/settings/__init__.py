@@ -1,7 +1,8 @@
-"""The table of all settings, one row each: command-line options, Blender's properties, presets, limits, defaults and
-docs/settings.md are made from it. A new setting is a row here, and the code that uses it.
+"""The table of all settings, one row each.
 
-Files and objects that a command reads or writes, lists, and what a panel only keeps are no settings.
+Command-line options, Blender's properties, presets, limits, defaults and docs/settings.md are generated from it. To add
+a setting, add a row here and the code that uses it. Not settings: files and objects that a command reads or writes,
+lists, and values that a panel only stores.
 """
 
 from __future__ import annotations
@@ -21,19 +22,38 @@ TABLES: dict[str, tuple[Setting, ...]] = {
     group: tuple(replace(row, feature=feature) for row in rows)
     for feature, module in FEATURES.items() for group, rows in module.TABLES.items()
 }
-"""Group -> its settings. A group is what one verb, or one class of properties, takes together."""
+"""Group -> its settings. A group is the set of settings that one verb or one property class uses together."""
 
 
 def rows_of(group: str) -> tuple[Setting, ...]:
-    """The settings of a group."""
+    """List the settings of a group.
+
+    Args:
+        group: key of `TABLES`.
+    Returns:
+        The settings in the table's order.
+    """
     return TABLES[group]
 
 
 def setting(group: str, name: str) -> Setting:
-    """One setting."""
+    """Find one setting.
+
+    Args:
+        group: key of `TABLES`.
+        name: name of the setting within the group.
+    Returns:
+        The setting.
+    """
     return next(row for row in TABLES[group] if row.name == name)
 
 
 def defaults(*groups: str) -> dict[str, Any]:
-    """The defaults of groups of settings, by name."""
+    """Collect the defaults of groups of settings.
+
+    Args:
+        groups: keys of `TABLES`.
+    Returns:
+        Setting name -> default.
+    """
     return {row.name: row.default for group in groups for row in TABLES[group]}

@@ -1,4 +1,4 @@
-"""The settings as options of the command line."""
+"""Settings as command-line options."""
 
 from __future__ import annotations
 
@@ -12,21 +12,34 @@ from .setting import Setting, collect
 
 
 def add_options(parser, group: str, *names: str) -> None:
-    """Adds the options of a group of settings, in their order; of `names` alone, where there are any.
-    parser: of argparse, or a group of one."""
+    """Add the options of a group of settings, in their order.
+
+    Args:
+        parser: an argparse parser or argument group.
+        group: key of the settings table.
+        names: add only these settings; none adds all.
+    """
     for row in rows_of(group):
         if row.option and (not names or row.name in names):
             parser.add_argument(*row.option.split(), **_arguments(row))
 
 
 def option_values(record: type, options: argparse.Namespace, *groups: str) -> dict[str, Any]:
-    """What the command line says about fields of the dataclass `record`, in groups of settings."""
+    """Collect the values that the command line sets for fields of a dataclass.
+
+    Args:
+        record: the dataclass.
+        options: the parsed command line.
+        groups: keys of the settings table.
+    Returns:
+        Field name -> value; fields that are not set are left out.
+    """
     rows = [row for group in groups for row in rows_of(group) if row.option]
     return collect(record, rows, lambda row: getattr(options, row.name))
 
 
 def _arguments(row: Setting) -> dict:
-    """The arguments of `add_argument`."""
+    """Build the arguments of `add_argument` for a setting."""
     more = {name: value for name, value in row.option_more.items() if name not in ("least", "most")}
     out = {"dest": row.name, "help": row.help, "default": [] if row.kind is tuple else row.default}
     if row.kind is bool:
@@ -40,13 +53,23 @@ def _arguments(row: Setting) -> dict:
 
 
 def _reader(row: Setting):
-    """What turns an option's text into the setting's value."""
+    """Build the function that parses an option's text into the setting's value."""
     least, most = (row.option_more.get(name, getattr(row, name)) for name in ("least", "most"))
     return row.kind if least is None else partial(read_number, row=row, least=least, most=most)
 
 
 def read_number(text: str, row: Setting, least: float, most: float) -> float:
-    """The number that an option's text says; ArgumentTypeError where it is none or outside the limits."""
+    """Parse a number of an option and check its limits.
+
+    Args:
+        text: the option's text.
+        row: the setting.
+        least, most: the limits, both included.
+    Returns:
+        The number, of the setting's type.
+    Raises:
+        ArgumentTypeError: if the text is not a number within the limits.
+    """
     with contextlib.suppress(ValueError):
         value = row.kind(text)
         if least <= value <= most:

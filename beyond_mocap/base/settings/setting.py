@@ -1,4 +1,4 @@
-"""One setting: its name, kind, unit, default, limits and sentences, for code, command line and panels alike."""
+"""One setting: its name, type, unit, default, limits and texts, shared by code, command line and panels."""
 
 from __future__ import annotations
 
@@ -11,48 +11,54 @@ from ..errors import InputError
 BETWEEN = "between {least} and {most}"
 WHOLE = "a whole number from {least} to {most}"
 LATER = {"later": True}
-"""Marks fields that came after files were saved with fingerprints of the others."""
+"""Metadata of fields that were added after files had stored fingerprints of the other fields."""
 POSITIVE: dict[str, Any] = {"least": 1e-9, "most": 1e6, "unit": "metres", "expected": "a positive number"}
 
-# Choices that settings of several features share: identifier, title, sentence[, icon, number].
+# Choices shared by settings of several features: identifier, title, tooltip[, icon, number].
 PARTS = (
     ("foot", "Foot", "From ankle to toe", "MOD_DYNAMICPAINT", 0), ("head", "Head", "The middle of the head", "USER", 1),
-    ("chest", "Chest", "The uppermost joint of the spine", "OUTLINER_OB_ARMATURE", 2),
+    ("chest", "Chest", "The uppermost spine joint", "OUTLINER_OB_ARMATURE", 2),
     ("hand", "Hand", "The palm", "VIEW_PAN", 3),
-    ("tool", "Tool", "What the hand holds, such as a racquet", "MOD_BEVEL", 4),
+    ("tool", "Tool", "An object in the hand, such as a racquet", "MOD_BEVEL", 4),
 )
-SIDES = (("right", "Right", "The right one"), ("left", "Left", "The left one"))
-EITHER = (("either", "Either", "Whichever suits"), *SIDES)
+SIDES = (("right", "Right", "The right side"), ("left", "Left", "The left side"))
+EITHER = (("either", "Either", "The side that fits better"), *SIDES)
 BALLS = (
     ("football", "Football", "Size 5: measured drag, lift and bounce"),
-    ("volleyball", "Volleyball", "Lighter, and slower in the air"), ("tennis", "Tennis Ball", "Small and fast"),
-    ("paper", "As in the Paper", "Air takes 0.2 of the speed in a second, the bounce leaves 0.7, no spin"),
+    ("volleyball", "Volleyball", "Lighter, with more drag in the air"), ("tennis", "Tennis Ball", "Small and fast"),
+    ("paper", "As in the Paper", "Drag takes 0.2 of the speed per second, a bounce keeps 0.7, without spin"),
 )
 HOLDS = (
-    ("KEEP", "As It Is", "The ball stays where it is beside the bone as it is taken"),
-    ("TOUCH", "Touching", "The ball comes to touch the part: the palm, the foot, the brow"),
+    ("KEEP", "Keep Offset", "The ball keeps its current offset from the bone"),
+    ("TOUCH", "Touching", "The ball moves into contact with the body part: palm, foot or forehead"),
 )
 
 
 @dataclass(frozen=True, kw_only=True)
 class Setting:
-    """One row of the table.
+    """One row of the settings table.
 
-    Args:
-        name: of the field that code reads, unique in its group; kind: type of its value, None: that of the default;
-            tuple: several texts.
-        default: in code and, where option_more and panel_more have none, for users; None: not set.
-        least, most: limits; where the default is outside, it stands for "not set". unit: as a word. expected: what an
-            error says a number should be.
-        choices: identifiers, or (identifier, title, sentence[, icon, number]) where panels list them.
-        option: flags on the command line with blanks between, "" for none; help: its sentence; metavar: what stands for
-            its value there, None: the unit where that is one word; option_more: further arguments of `add_argument`;
-            `default`, `least`, `most` where they differ there.
-        tooltip: of the property in Blender, "" for none; title: None for the name; identifier: "" for the name;
-            precision: decimals; panel_more: further arguments of bpy's; `default`, `min`, `max` where they differ.
-        in_preset: whether presets store it. tuning: the method under whose Fine Tuning the panel lists it, "any": under
-            every one's; "" for none.
-        blank: the choice that is "" in code; convert: from what a user said to the value that code reads.
+    Attributes:
+        name: name of the field that code reads, unique in its group.
+        default: default in code and, unless `option_more` or `panel_more` has another, for users; None: not set.
+        kind: type of the value; None: that of the default; tuple: several texts.
+        least, most: limits, both included; a default outside them stands for "not set".
+        unit: the unit as a word.
+        expected: the text of errors for what a number should be, with {least}, {most} and {unit}.
+        choices: identifiers, or (identifier, title, tooltip[, icon, number]) where panels list them.
+        option: flags on the command line separated by blanks; "" for none.
+        help: help text of the option.
+        metavar: placeholder of the option's value; None: the unit if that is one word.
+        option_more: further arguments of `add_argument`, and `default`, `least`, `most` where they differ there.
+        title: label of the property; None for the name.
+        tooltip: tooltip of the property in Blender; "" for none.
+        identifier: identifier of the property; "" for the name.
+        precision: decimals in a panel.
+        panel_more: further arguments of the bpy property, and `default`, `min`, `max` where they differ there.
+        in_preset: whether presets store it.
+        tuning: the method under whose Fine Tuning the panel lists it; "any": under each; "" for none.
+        blank: the choice that is "" in code.
+        convert: converts the user's value to the value that code reads.
         feature: set by the table.
     """
 
@@ -90,12 +96,24 @@ class Setting:
         return tuple(choice if isinstance(choice, str) else choice[0] for choice in self.choices)
 
     def limits_text(self, least: float, most: float) -> str:
-        """What is expected of a number from least to most."""
+        """Describe the expected range of a number.
+
+        Args:
+            least, most: the limits, both included.
+        Returns:
+            Text such as "0 to 2 metres".
+        """
         least, most = (str(limit) if isinstance(limit, int) else f"{limit:g}" for limit in (least, most))
         return self.expected.format(least=least, most=most, unit=self.unit).strip()
 
     def value(self, said):
-        """What code reads where a user has said `said`; None where that stands for "not set"."""
+        """Convert a user's value to the value that code reads.
+
+        Args:
+            user_value: the value of the option or property.
+        Returns:
+            The value; None where the user's value stands for "not set".
+        """
         if self.kind is tuple and isinstance(said, str):
             said = [text.strip() for text in said.split(";") if text.strip()]
         if self.default is None and said == self.panel_more.get("default"):
@@ -107,9 +125,16 @@ class Setting:
 
 
 def add_fields(rows: Iterable[Setting]) -> Callable[[type], type]:
-    """Make a class decorator, to stand under `dataclass`: a field for each of `rows` that the class does not spell out.
+    """Build a class decorator, applied before `dataclass`, that adds a field for each setting.
 
-    The fields are marked as later ones: what was saved before there was the setting stays up to date."""
+    Fields that the class spells out stay as they are. The added ones are marked `LATER`: files that were saved before
+    the setting existed stay up to date.
+
+    Args:
+        rows: the settings.
+    Returns:
+        The decorator.
+    """
 
     def add(cls: type) -> type:
         for row in rows:
@@ -122,8 +147,16 @@ def add_fields(rows: Iterable[Setting]) -> Callable[[type], type]:
 
 
 def check_limits(record: Any, rows: Iterable[Setting]) -> None:
-    """Raises InputError where a number of the dataclass `record` is outside the limits that `rows` have for it; where
-    the default is outside them too, the record checks for itself."""
+    """Check the numbers of a dataclass against the limits of its settings.
+
+    Where the default is outside the limits too, the dataclass has to check for itself.
+
+    Args:
+        record: the dataclass object.
+        rows: the settings.
+    Raises:
+        InputError: if a number is outside its limits.
+    """
     names = {one.name for one in fields(record)}
     for row in rows:
         if row.name in names and row.least is not None and row.least <= row.default:
@@ -133,8 +166,15 @@ def check_limits(record: Any, rows: Iterable[Setting]) -> None:
 
 
 def collect(record: type, rows: Iterable[Setting], said: Callable[[Setting], object]) -> dict[str, Any]:
-    """The values of those fields of the dataclass `record` that `rows` have; `said` finds what the user said.
-    What is not set is left out."""
+    """Collect the values of the settings that are fields of a dataclass.
+
+    Args:
+        record: the dataclass.
+        rows: the settings.
+        read_value: returns the user's value of a setting.
+    Returns:
+        Field name -> value; settings that are not set are left out.
+    """
     names = {one.name for one in fields(record)}
     found = {row.name: row.value(said(row)) for row in rows if row.name in names}
     return {name: value for name, value in found.items() if value is not None}

@@ -1,1 +1,1 @@
-"""BVH files in and out."""
+"""Read and write BVH files."""

@@ -1,12 +1,13 @@
-"""BVH in and out (Faustino §4.2.1, App. B): the border where a file's units, axes and Euler angles end.
+"""Read and write BVH (Faustino §4.2.1, App. B), and convert units, axes and Euler angles.
 
-Inside stands a `Motion`: metres, Z up, the hips as root, quaternions. What a file had beyond that (channel orders, a
-root above the hips) is kept in a `BvhForm`, so that a motion can be written back in the form it came in. Frames are
-rigid: BVH's (X, Y, Z) with Y up is our (X, -Z, Y), rotations are conjugated by that quarter turn, so rest poses stay
-unrotated. Which way is up and how long the unit is, the format does not say; the body in it does (`guess_scale`).
+The core uses a `Motion`: metres, Z up, the hips as root, quaternions. What a file has beyond that (channel orders, a
+root above the hips) is stored in a `BvhForm`, so that a motion can be written in the form of its source. Frames are
+rigid: BVH's (X, Y, Z) with Y up is (X, -Z, Y) here, and rotations are conjugated by that quarter turn, so rest poses
+stay unrotated. The format does not define the up axis and the unit; they are estimated from the body
+(`estimate_scale`).
 
-    clip = bvh.read("walk.bvh")
-    bvh.write("mirrored.bvh", mirror(clip.motion), clip.form)
+    clip = read_bvh("walk.bvh")
+    write_bvh("mirrored.bvh", mirror(clip.motion), clip.form)
 """
 
 from __future__ import annotations
@@ -28,23 +29,29 @@ from . import bvh_text
 from .bvh_text import POSITIONS, ROTATIONS, BvhText
 from .bvh_write import BvhForm, RootAbove, document
 
-_STILL_METRES = 1e-3  # what moves less is written as still
-_STILL_ROTATION = np.cos(np.radians(0.1) / 2)  # w of a turn by a tenth of a degree
-_LARGEST_METRES = 1e6  # larger numbers are a wrong unit or a broken file
+_STILL_METRES = 1e-3  # smaller motion counts as none
+_STILL_ROTATION = np.cos(np.radians(0.1) / 2)  # w of a rotation by a tenth of a degree
+_LARGEST_METRES = 1e6  # larger positions are in a wrong unit or damaged
 _NTSC = [rate * 1000 / 1001 for rate in (24, 30, 48, 60, 120, 240)]  # frames per second
-# a file axis -> our axis and the sign of a turn about it; a file with Y up is laid back by a quarter turn about X
+# file axis -> core axis and sign of a rotation about it; Y up becomes Z up by a quarter turn about X
 TURNS = {"Y": {"X": (0, 1.0), "Y": (2, 1.0), "Z": (1, -1.0)}, "Z": {"X": (0, 1.0), "Y": (1, 1.0), "Z": (2, 1.0)}}
 _HIP_HEIGHT = (0.75, 1.15)  # metres, adults standing
-_LEG_LENGTH = 0.88  # m, an adult's of 1.80 m
+_LEG_LENGTH = 0.88  # m, of an adult of 1.80 m
 # centimetres, metres, inches, CMU's (1 inch / 0.45 in hundredths of it), millimetres, feet, decimetres
 _USUAL_UNITS = (0.01, 1.0, 0.0254, 0.05644, 0.001, 0.3048, 0.1)
-_UPRIGHT = np.cos(np.radians(35.0))  # height of a unit vector from the feet to the head of a body that stands
-_SAMPLES = 64  # frames that are looked at
+_UPRIGHT = np.cos(np.radians(35.0))  # smallest height of the unit vector from feet to head of an upright body
+_SAMPLES = 64  # frames used for the estimate
 
 
 @dataclass(frozen=True)
 class BvhClip:
-    """A file's motion, the form it had, and what the reader decided or changed, one line each."""
+    """A file's motion, its form, and what the reader assumed or changed.
+
+    Attributes:
+        motion: the motion.
+        form: what writing it back needs.
+        notes: one line each.
+    """
 
     motion: Motion
     form: BvhForm
@@ -52,12 +59,22 @@ class BvhClip:
 
 
 def read(path, unit: float | None = None) -> BvhClip:
-    """The clip in the BVH file at `path`.
+    """Read the clip of a BVH file.
 
-    unit: metres per file unit; None guesses it from the hip height and tells it in the notes. Position channels of any
-    joint replace its OFFSET, as Bandai-Namco's and LAFAN1's files mean them; below the hips their mean is the bone, and
-    the notes say where they moved by more than 1 mm. Joints above the hips are folded into the hips. Rates within 0.1 %
-    of a whole number or an NTSC rate are taken to be that. Raises InputError for anything that is no sound BVH file."""
+    Position channels of any joint replace its OFFSET, as Bandai-Namco's and LAFAN1's files mean them; below the hips
+    their
+    mean becomes the bone, and the notes list joints that move by more than 1 mm. Joints above the hips are folded into
+    the
+    hips. Frame rates within 0.1 % of a whole number or an NTSC rate are rounded to it.
+
+    Args:
+        path: the file.
+        unit: metres per file unit; None estimates it from the hip height and says so in the notes.
+    Returns:
+        The clip.
+    Raises:
+        InputError: if it is not a valid BVH file.
+    """
     if unit is not None and not (np.isfinite(unit) and unit > 0):
         raise InputError("unit", str(unit), "metres per file unit, above 0", "0.01 for centimetres")
     text = bvh_text.parse(path)
@@ -76,16 +93,26 @@ def read(path, unit: float | None = None) -> BvhClip:
 
 
 def write(path, motion: Motion, form: BvhForm | None = None) -> tuple[str, ...]:
-    """Write `motion` to `path` in centimetres with Y up; returns notes on what did not fit `form`.
+    """Write a motion as BVH in centimetres with Y up.
 
-    `form` keeps channel orders and the joints above the hips; without it the root has six channels (XYZ positions, ZXY
-    rotations) and other joints three. A joint whose motion needs a channel that its form lacks gets all of that kind. A
-    root above the hips that stood still is put back as it was; one that moved is put on the ground below the hips
-    (where the hips cannot move in it: where they are) and turned with the body's facing. The file is written beside and
-    then renamed, so a half-written one is never seen. Raises InputError where the folder cannot be written."""
+    A joint that needs a channel missing in its form gets all channels of that kind. A root above the hips that did not
+    move keeps its place; one that moved is placed on the ground below the hips (or at them, if they have no positions
+    of
+    their own) with the body's heading. The file is written to a temporary place and renamed.
+
+    Args:
+        path: the file.
+        motion: the motion.
+        form: channel orders and joints above the hips; None gives the root six channels (XYZ positions, ZXY rotations)
+            and other joints three.
+    Returns:
+        Notes on what did not fit `form`.
+    Raises:
+        InputError: if the folder is not writable.
+    """
     target = Path(path)
     if not target.name:
-        raise InputError(path, "no file name", "a BVH file to write")
+        raise InputError(path, "has no file name", "a BVH file to write")
     pieces, notes = document(motion, form or BvhForm())
     with beside(target) as part, open(part, "w", encoding="utf-8", newline="\n") as file:
         file.writelines(pieces)
@@ -93,10 +120,15 @@ def write(path, motion: Motion, form: BvhForm | None = None) -> tuple[str, ...]:
 
 
 class BvhRows:
-    """How single rows of numbers of one hierarchy become poses, for rows that come one by one.
+    """Convert single rows of numbers of one hierarchy to poses, for rows that arrive one by one.
 
-    text: the hierarchy with a first row, by which unit and axes are guessed (`unit`: metres per unit, where it is
-    known). skeleton: the body's, as of the first row. InputError as `read`."""
+    Attributes:
+        text: the hierarchy with a first row, from which unit and axes are estimated.
+        scale: unit and up axis.
+        hips: index of the root joint in the file.
+        body_joints: indices of the joints from the hips down.
+        skeleton: the body's skeleton, from the first row.
+    """
 
     def __init__(self, text: BvhText, unit: float | None = None):
         self.text = text
@@ -107,7 +139,13 @@ class BvhRows:
         self.skeleton = _skeleton(channels, self.kept)[0]
 
     def poses(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Root positions (T, 3) m and local rotations (T, J, 4) of rows (T, C) of numbers in the file's order."""
+        """Convert rows to poses.
+
+        Args:
+            values: (T, C) numbers in the file's order.
+        Returns:
+            Root positions (T, 3) m and local rotations (T, J, 4).
+        """
         channels = _Channels(replace(self.text, values=np.asarray(values, dtype=float)), self.scale)
         root, rotation, _ = _folded(channels, self.hips)
         rotations = np.stack([rotation.T] + [channels.rotation(joint) for joint in self.kept[1:]])
@@ -115,18 +153,18 @@ class BvhRows:
 
 
 class _Channels:
-    """A file's numbers joint by joint, in our axes and metres."""
+    """A file's numbers joint by joint, in core axes and metres."""
 
     def __init__(self, text: BvhText, scale: Scale):
         self.text, self.scale = text, scale
         self.first = np.concatenate([[0], np.cumsum([len(c) for c in text.channels])])
 
     def columns(self, joint: int, kind: tuple[str, ...]) -> list[tuple[str, int]]:
-        """Axis letters and columns of the joint's channels of one kind, in their order."""
+        """Find axis letters and columns of a joint's channels of one kind, in their order."""
         return [(c[0], self.first[joint] + i) for i, c in enumerate(self.text.channels[joint]) if c in kind]
 
     def position(self, joint: int) -> np.ndarray:
-        """The joint relative to its parent: (T, 3) where it has position channels, else (1, 3)."""
+        """Compute the joint's position relative to its parent: (T, 3) m with position channels, else (1, 3)."""
         here = self.text.offsets[joint][None]
         columns = self.columns(joint, POSITIONS)
         if columns:
@@ -136,12 +174,12 @@ class _Channels:
         return to_ours(here, self.scale.up) * self.scale.unit
 
     def rotation(self, joint: int) -> np.ndarray:
-        """The joint's rotation relative to its parent, components first: (4, T)."""
+        """Compute the joint's rotation relative to its parent, components first: (4, T)."""
         return rotation_of(self.text.values, self.columns(joint, ROTATIONS), self.scale.up)
 
 
 def _top_of_body(text: BvhText, body: Humanoid | None) -> int:
-    """The joint that becomes the root: the hips where both legs hang on them, else the file's root."""
+    """Find the joint that becomes the root: the hips if both legs are below them, else the file's root."""
     if body is None:
         return 0
     hanging = set(below(text.parents, body.hips))
@@ -149,12 +187,13 @@ def _top_of_body(text: BvhText, body: Humanoid | None) -> int:
 
 
 def _folded(channels: _Channels, hips: int) -> tuple[np.ndarray, np.ndarray, tuple[RootAbove, ...]]:
-    """The hips in the world, (T, 3) metres and (T, 4), and what stood above them."""
+    """Compute the hips in the world frame, (T, 3) m and (T, 4), and list the joints above them."""
     frames, parents = len(channels.text.values), channels.text.parents
     position = np.broadcast_to(channels.position(hips), (frames, 3))
     rotation = channels.rotation(hips).T
     fixed = None if channels.columns(hips, POSITIONS) else position[0]
     above, joint = [], parents[hips]
+    # Walk up to the file's root and accumulate the transforms.
     while joint >= 0:
         place, turn = channels.position(joint), channels.rotation(joint).T
         position, rotation = quaternion.rotate(turn, position) + place, quaternion.multiply(turn, rotation)
@@ -168,12 +207,12 @@ def _folded(channels: _Channels, hips: int) -> tuple[np.ndarray, np.ndarray, tup
 
 
 def _strays(positions: np.ndarray) -> float:
-    """The largest distance in metres of (T, 3) positions from their mean."""
+    """Measure the largest distance in metres of (T, 3) positions from their mean."""
     return float(np.linalg.norm(positions - positions.mean(axis=0), axis=1).max())
 
 
 def _skeleton(channels: _Channels, kept: list[int]) -> tuple[Skeleton, dict[str, float]]:
-    """The kept joints with their mean offsets, and how far (metres) joints strayed from them where over 1 mm."""
+    """Build the skeleton with mean offsets; also return the distance (m) by which joints leave them, above 1 mm."""
     text, offsets, drift = channels.text, [np.zeros(3)], {}
     for joint in kept[1:]:
         places = channels.position(joint)
@@ -190,15 +229,15 @@ def _skeleton(channels: _Channels, kept: list[int]) -> tuple[Skeleton, dict[str,
 
 
 def _check_size(text: BvhText, root: np.ndarray, skeleton: Skeleton) -> None:
-    """InputError where the body or its way is larger than the Earth's surface allows."""
+    """Raise InputError if a position is beyond 1000 km."""
     too_far = np.flatnonzero(~(np.abs(root).max(axis=1) < _LARGEST_METRES))
     where = f"{text.path}:{text.first_row + too_far[0]}" if len(too_far) else text.path
     if len(too_far) or not np.abs(skeleton.offsets).max() < _LARGEST_METRES:
-        raise InputError(where, "a position beyond 1000 km", "a person's motion", "give the unit, or export again")
+        raise InputError(where, "a position beyond 1000 km", "a person's motion", "set the unit, or export again")
 
 
 def _headings(channels: _Channels, above: tuple[RootAbove, ...], motion: Motion) -> tuple[RootAbove, ...]:
-    """`above` with the mean angle from the body's facing to each joint that moves."""
+    """Add the mean angle from the body's heading to each moving joint above the hips."""
     if not any(joint.moves for joint in above):
         return above
     frames = np.unique(np.linspace(0, len(motion) - 1, 256).astype(int))
@@ -213,31 +252,38 @@ def _headings(channels: _Channels, above: tuple[RootAbove, ...], motion: Motion)
 
 
 def _rate(frame_time: float) -> float:
-    """Frames per second, snapped to a whole number or an NTSC rate within 0.1 %."""
+    """Compute frames per second, rounded to a whole number or an NTSC rate within 0.1 %."""
     rate = 1.0 / frame_time
     nearest = min([max(round(rate), 1), *_NTSC], key=lambda r: abs(r - rate))
     return float(nearest) if abs(nearest - rate) <= 1e-3 * nearest else rate
 
 
 def _notes(text: BvhText, kept: list[int], above: tuple[RootAbove, ...], drift: dict[str, float]) -> list[str]:
-    """What was changed on the way in, one line per kind."""
-    notes = [f"joint {old!r} stands twice, the second is called {new!r}" for old, new in text.renamed]
+    """List what reading changed, one line per kind."""
+    notes = [f"joint {old!r} is repeated, the second is renamed {new!r}" for old, new in text.renamed]
     for joint in above:
-        how = "moving" if joint.moves else "standing still"
+        how = "moving" if joint.moves else "static"
         notes.append(f"{joint.name} ({how}) folded into {text.names[kept[0]]}")
     left_out = sorted(set(text.names) - {text.names[j] for j in kept} - {joint.name for joint in above})
     if left_out:
-        notes.append(f"left out, not part of the body: {', '.join(left_out)}")
+        notes.append(f"ignored, not part of the body: {', '.join(left_out)}")
     if drift:
         worst = sorted(drift, key=drift.get, reverse=True)
         moved = ", ".join(f"{name} {drift[name] * 1000:.0f} mm" for name in worst[:5])
-        notes.append(f"{len(drift)} joints changed their distance, taken as its mean: {moved}")
+        notes.append(f"{len(drift)} joints change their distance, replaced by its mean: {moved}")
     return notes
 
 
 @dataclass(frozen=True)
 class Scale:
-    """What was decided, told in `notes`. unit: metres per file unit. up: "Y" or "Z". body: None for no humanoid."""
+    """Unit and axes of a file.
+
+    Attributes:
+        unit: metres per file unit.
+        up: "Y" or "Z".
+        body: the humanoid joints, None for other skeletons.
+        notes: what was estimated, one line each.
+    """
 
     unit: float
     up: str
@@ -246,26 +292,43 @@ class Scale:
 
 
 def to_ours(vectors: np.ndarray, up: str) -> np.ndarray:
-    """Vectors (..., 3) of a file with `up` in our axes: (..., 3)."""
+    """Convert vectors from a file's axes to the core's.
+
+    Args:
+        vectors: (..., 3) in the file's axes.
+        up: the file's up axis, "Y" or "Z".
+    Returns:
+        (..., 3), Z up.
+    """
     return vectors[..., (0, 2, 1)] * (1.0, -1.0, 1.0) if up == "Y" else vectors
 
 
 def rotation_of(values: np.ndarray, columns: list[tuple[str, int]], up: str) -> np.ndarray:
-    """A joint's rotations in our axes, components first (4, T), from `columns`: letters and columns of `values` (T, C).
+    """Compute a joint's rotations in core axes from its rotation channels.
 
-    Intrinsic, in the channels' order, degrees (Faustino §4.2.1 eq. 30-31). The turns are multiplied in closed form:
-    each has two components only."""
+    Intrinsic, in the channels' order, degrees. The rotations are multiplied in closed form: each has two non-zero
+    components only.
+
+    Args:
+        values: (T, C) the file's numbers.
+        columns: axis letter and column of each rotation channel.
+        up: the file's up axis, "Y" or "Z".
+    Returns:
+        (4, T), components first.
+    Source: Faustino 2024, section 4.2.1, equations (30) and (31).
+    """
     out = np.zeros((4, len(values)))
     out[0] = 1.0
-    columns = [(letter, column) for letter, column in columns if values[:, column].any()]  # many never move
+    columns = [(letter, column) for letter, column in columns if values[:, column].any()]  # many channels are all zero
     if not columns:
         return out
     numbers = [column for _, column in columns]
-    neighbours = values[:, min(numbers) : max(numbers) + 1].T  # a slice: picking columns one by one is much slower
+    neighbours = values[:, min(numbers) : max(numbers) + 1].T  # a slice: selecting single columns is much slower
     half = neighbours[np.array(numbers) - min(numbers)] * (np.pi / 360.0)
     cosines, sines = np.cos(half), np.sin(half)
     for (letter, _), c, s in zip(columns, cosines, sines):
         axis, sign = TURNS[up][letter]
+        # Quaternion product with (c, s on axis k): the axes i, j follow k cyclically.
         s = s * sign
         k, i, j = 1 + axis, 1 + (axis + 1) % 3, 1 + (axis + 2) % 3
         w, vk, vi, vj = out[0], out[k], out[i], out[j]
@@ -274,27 +337,36 @@ def rotation_of(values: np.ndarray, columns: list[tuple[str, int]], up: str) -> 
 
 
 def guess_scale(text: BvhText, unit: float | None) -> Scale:
-    """The file's up axis, and its unit where `unit` is None.
+    """Estimate a file's up axis, and its unit if it is not set.
 
     Up is the axis, Y or Z, along which feet to head point (within 35 degrees) in more of 64 frames spread over the
-    clip; the rest pose has a say where most of the clip is lain down. The unit is the usual one that puts the hips 0.75
-    to 1.15 m above the feet, else the one that makes legs 0.88 m long. Without legs: centimetres, Y up."""
+    clip;
+    the rest pose counts too, for clips mostly lying down. The unit is the usual one that puts the hips 0.75 to 1.15 m
+    above
+    the feet, else the one with 0.88 m long legs. Without legs: centimetres, Y up.
+
+    Args:
+        text: the file's content.
+        unit: metres per file unit, or None.
+    Returns:
+        Unit and axes.
+    """
     rest = Skeleton(text.names, text.parents, to_ours(text.offsets, "Y"))
     try:
         body = identify(rest)
     except InputError:
-        told = "given" if unit else "no legs found, centimetres assumed"
+        told = "set" if unit else "no legs found, centimetres assumed"
         return Scale(unit or 0.01, "Y", None, (f"unit {unit or 0.01:g} m ({told}), Y up assumed",))
     skeleton, positions = _sampled(text, rest)
     up = _up(body, positions, pose_kinematics(rest, np.zeros(3), quaternion.identity(len(rest)))[0])
     height = _hip_height(skeleton, body, positions[..., 2] if up == "Y" else -positions[..., 1])
     found = unit or _unit(height, leg_length(skeleton))
-    told = "given" if unit else "guessed"
+    told = "set" if unit else "estimated"
     return Scale(found, up, body, (f"unit {found:.6g} m ({told}): hips {height * found:.2f} m high; {up} up",))
 
 
 def _sampled(text: BvhText, rest: Skeleton) -> tuple[Skeleton, np.ndarray]:
-    """The skeleton with its posed offsets, and places (N, J, 3) in some frames, as if Y were up; file units."""
+    """Sample poses: the skeleton with its posed offsets, and positions (N, J, 3) as if Y were up; file units."""
     rows = text.values[np.unique(np.linspace(0, len(text.values) - 1, _SAMPLES).astype(int))]
     offsets, rotations, first = np.array(text.offsets), np.empty((len(rest), 4, len(rows))), 0
     for joint, channels in enumerate(text.channels):
@@ -310,7 +382,7 @@ def _sampled(text: BvhText, rest: Skeleton) -> tuple[Skeleton, np.ndarray]:
 
 
 def _up(body: Humanoid, posed: np.ndarray, rest: np.ndarray) -> str:
-    """ "Y" or "Z" from posed (N, J, 3) and rest (J, 3) positions that were turned as if Y were up."""
+    """Detect the up axis, "Y" or "Z", from posed (N, J, 3) and rest (J, 3) positions converted as if Y were up."""
     top = body.head_or_neck
     feet = [body.left.foot, body.right.foot]
     votes = {"Y": 0.0, "Z": 0.0}
@@ -322,7 +394,7 @@ def _up(body: Humanoid, posed: np.ndarray, rest: np.ndarray) -> str:
 
 
 def _hip_height(skeleton: Skeleton, body: Humanoid, heights: np.ndarray) -> float:
-    """How high the hips stand over the lower foot at most, from heights (N, J), file units; at least the leg."""
+    """Measure the hips' height above the lower foot from heights (N, J), file units; at least the leg's length."""
     feet = [body.left.foot, body.right.foot, body.left.toe_or_foot, body.right.toe_or_foot]
     posed = np.percentile(heights[:, body.hips] - heights[:, feet].min(axis=1), 95)
     return float(max(posed, leg_length(skeleton)))

@@ -1,8 +1,8 @@
-"""The text of a BVH file, as it stands: hierarchy and numbers in the file's own units and axes, nothing converted.
+"""Parse the text of a BVH file: hierarchy and numbers in the file's own units and axes, without conversion.
 
-BVH has no standard; this is the form that Meredith and Maddock (2001, "Motion Capture File Formats Explained")
-describe, read leniently where files differ (letter case, blanks, line ends, joint names with blanks), strictly where a
-body would come out wrong.
+BVH has no standard. This parser follows Meredith and Maddock (2001, "Motion Capture File Formats Explained"). It is
+lenient where files differ (letter case, blanks, line ends, joint names with blanks) and strict where a body would be
+wrong.
 """
 
 from __future__ import annotations
@@ -21,18 +21,28 @@ from ..content import content
 POSITIONS = ("Xposition", "Yposition", "Zposition")
 ROTATIONS = ("Xrotation", "Yrotation", "Zrotation")
 _CHANNELS = {name.lower(): name for name in POSITIONS + ROTATIONS}
-_LARGEST_ANGLE = 1e7  # degrees: damaged, whatever it was
+_LARGEST_ANGLE = 1e7  # degrees; larger values are damaged
 _EXPORT_AGAIN = "export the file again"
-_DAMAGED = f"the file is cut off or damaged; {_EXPORT_AGAIN}"
+_DAMAGED = f"the file is truncated or damaged; {_EXPORT_AGAIN}"
 
 
 @dataclass(frozen=True, kw_only=True)
 class BvhText:
-    """A file's content. J joints, parents before children; file units, file axes, degrees.
+    """A file's content: J joints, parents before children; file units, file axes, degrees.
 
-    names: J unique names. parents: J indices, -1 for joint 0. offsets: (J, 3). channels: J tuples of channel names.
-    end_parents (E,), end_offsets (E, 3): End Sites. frame_time: seconds. values: (T, C), joints' channels in file
-    order. first_row: line of the first frame. renamed: names that stood twice, with what they became."""
+    Attributes:
+        path: the file, for errors.
+        names: J unique names.
+        parents: J indices, -1 for joint 0.
+        offsets: (J, 3).
+        channels: J tuples of channel names.
+        end_parents: E indices, the parents of the End Sites.
+        end_offsets: (E, 3), the End Sites.
+        frame_time: seconds.
+        values: (T, C), the joints' channels in file order.
+        first_row: line of the first frame.
+        renamed: repeated names with their new names.
+    """
 
     path: Path
     names: tuple[str, ...]
@@ -48,41 +58,58 @@ class BvhText:
 
 
 def parse(path) -> BvhText:
-    """Read the file at `path`; InputError (file:line) where it is missing, truncated, damaged or no BVH file."""
+    """Read and parse a BVH file.
+
+    Args:
+        path: the file.
+    Returns:
+        Its content.
+    Raises:
+        InputError: with the line, if it is missing, truncated, damaged or not BVH.
+    """
     path = Path(path)
     return parse_data(path, _content(path))
 
 
 def parse_data(path: Path, data: bytes) -> BvhText:
-    """The same of bytes with plain line ends that came from elsewhere; `path` is what errors call them."""
+    """Parse the bytes of a BVH file.
+
+    Args:
+        path: the file's name for errors.
+        data: the bytes, with unified line ends.
+    Returns:
+        Its content.
+    Raises:
+        InputError: with the line, if it is truncated, damaged or not BVH.
+    """
     motion = re.search(rb"^[ \t]*MOTION\b[^\n]*\n?", data, re.M | re.I)
     if motion is None:
-        raise InputError(path, "no MOTION section", "HIERARCHY, then MOTION", f"the file is cut off; {_EXPORT_AGAIN}")
+        raise InputError(path, "no MOTION section", "HIERARCHY, then MOTION", f"the file is truncated; {_EXPORT_AGAIN}")
     joints = _Hierarchy(path).read(_decoded(data[: motion.start()]))
     line = data.count(b"\n", 0, motion.end()) + 1
     frames, frame_time, body, line = _motion_head(path, data, motion.end(), line)
     columns = sum(len(c) for c in joints.channels)
     if columns == 0:
         raise InputError(path, "no joint has channels", "a CHANNELS line per joint", _EXPORT_AGAIN)
-    values = _rows(path, data[body - 1 :], columns, line)  # from the line's end before: blanks around
+    values = _rows(path, data[body - 1 :], columns, line)  # start at the previous line's end
     if len(values) != frames:
         raise InputError(
-            f"{path}:{line}", f"{len(values)} rows of motion", f"{frames} as Frames says",
-            f"the file is {'cut off' if len(values) < frames else 'damaged'}; {_EXPORT_AGAIN}",
+            f"{path}:{line}", f"{len(values)} rows of motion", f"{frames}, the number after Frames:",
+            f"the file is {'truncated' if len(values) < frames else 'damaged'}; {_EXPORT_AGAIN}",
         )
     _check_angles(path, joints, values, line)
     return joints.finish(frame_time, values, line)
 
 
 def _content(path: Path) -> bytes:
-    """The file's bytes, line ends unified; InputError where it cannot be read or is no text."""
+    """Read the file's bytes with unified line ends; InputError if it cannot be read or is not BVH."""
     data = content(path, "a BVH file")
     if not data or data.isspace():
-        raise InputError(path, "empty file", "a BVH file", _EXPORT_AGAIN)
+        raise InputError(path, "the file is empty", "a BVH file", _EXPORT_AGAIN)
     if data.startswith(b"\xef\xbb\xbf"):
         data = data[3:]
     if b"\0" in data or not re.match(rb"\s*HIERARCHY\b", data, re.I):
-        raise InputError(f"{path}:1", f"starts with {data[:12]!r}", "HIERARCHY, as BVH files do", "choose a BVH file")
+        raise InputError(f"{path}:1", f"starts with {data[:12]!r}", "HIERARCHY at the start", "choose a BVH file")
     return data.replace(b"\r\n", b"\n").replace(b"\r", b"\n") if b"\r" in data else data
 
 
@@ -94,7 +121,8 @@ def _decoded(data: bytes) -> str:
 
 
 class _Hierarchy:
-    """Reads the hierarchy token by token, with a stack instead of recursion: files may nest thousands deep."""
+    """Parses the hierarchy token by token, with a stack instead of recursion: files may nest thousands of levels deep.
+    """
 
     def __init__(self, path: Path):
         self.path = path
@@ -108,14 +136,14 @@ class _Hierarchy:
         self.stack: list[int | None] = []  # open joints; None for an End Site
 
     def read(self, text: str) -> "_Hierarchy":
-        """All joints of the HIERARCHY section."""
+        """Parse all joints of the HIERARCHY section."""
         lines = text.split("\n")
         for self.line, line in enumerate(lines, 1):
             words = line.replace("{", " { ").replace("}", " } ").split()
             while words:
                 words = self._take(words)
         if self.stack:
-            raise self._error(f"{len(self.stack)} brackets not closed", "a } for each {", "the hierarchy is cut off")
+            raise self._error(f"{len(self.stack)} brackets not closed", "a } for each {", "the hierarchy is truncated")
         if not self.names:
             raise self._error("no ROOT", "ROOT and a joint's name", _EXPORT_AGAIN)
         for joint, offset in enumerate(self.offsets):
@@ -124,7 +152,7 @@ class _Hierarchy:
         return self
 
     def finish(self, frame_time: float, values: np.ndarray, first_row: int) -> BvhText:
-        """The joints together with the motion's numbers."""
+        """Combine the joints with the motion's numbers."""
         ends = [(joint, offset) for joint, offset in self.ends if offset is not None]
         return BvhText(
             path=self.path, names=tuple(self.names), parents=tuple(self.parents), offsets=np.array(self.offsets),
@@ -137,7 +165,7 @@ class _Hierarchy:
         return InputError(f"{self.path}:{self.line}", found, expected, next_step)
 
     def _take(self, words: list[str]) -> list[str]:
-        """Use the words of one statement, return the rest of the line."""
+        """Parse one statement; return the rest of the line."""
         keyword = words[0].upper()
         if keyword in ("HIERARCHY", "{"):
             return words[1:]
@@ -145,7 +173,7 @@ class _Hierarchy:
             return self._open(keyword, words)
         if keyword == "}":
             if not self.stack:
-                raise self._error("a } too many", "a { for each }")
+                raise self._error("one } too many", "a { for each }")
             self.stack.pop()
             return words[1:]
         if keyword == "OFFSET":
@@ -155,6 +183,7 @@ class _Hierarchy:
         raise self._error(f"{words[0]!r}", "ROOT, JOINT, End Site, OFFSET, CHANNELS or a bracket")
 
     def _open(self, keyword: str, words: list[str]) -> list[str]:
+        """Open a joint or End Site; return the rest of the line."""
         stop = words.index("{") if "{" in words else len(words)
         name = " ".join(words[1:stop])
         if (keyword == "ROOT") == bool(self.names) or (self.stack == [] and self.names):
@@ -196,22 +225,23 @@ class _Hierarchy:
         return words[4:]
 
     def _take_channels(self, words: list[str]) -> list[str]:
+        """Parse the channels of the open joint; return the rest of the line."""
         count = int(words[1]) if len(words) > 1 and re.fullmatch("[0-6]", words[1]) else None
         names = [_CHANNELS.get(word.lower()) for word in words[2 : 2 + (count or 0)]]
         if count is None or len(names) < count or None in names:
-            raise self._error(f"{' '.join(words)[:90]!r}", "CHANNELS, how many (0 to 6), and Xposition ... Zrotation")
+            raise self._error(f"{' '.join(words)[:90]!r}", "CHANNELS, a number (0 to 6), and Xposition ... Zrotation")
         if len(set(names)) < count:
-            raise self._error("one channel twice", "each channel once per joint")
+            raise self._error("a channel is repeated", "each channel once per joint")
         if not self.stack or self.stack[-1] is None:
             raise self._error("CHANNELS outside of a joint", "a joint first")
         if self.channels[self.stack[-1]]:
-            raise self._error("CHANNELS a second time", "one CHANNELS line per joint")
+            raise self._error("CHANNELS is repeated", "one CHANNELS line per joint")
         self.channels[self.stack[-1]] = tuple(names)
         return words[2 + count :]
 
 
 def _number(word: str) -> float | None:
-    """The word as a finite number, else None."""
+    """Parse a word as a finite number, else None."""
     try:
         value = float(word) if "_" not in word else math.nan
     except ValueError:
@@ -220,9 +250,9 @@ def _number(word: str) -> float | None:
 
 
 def _motion_head(path: Path, data: bytes, start: int, line: int) -> tuple[int, float, int, int]:
-    """Frames, seconds per frame, where the rows start (byte, line) from the two lines after MOTION."""
+    """Parse the two lines after MOTION: frames, seconds per frame, and where the rows start (byte, line)."""
     frames_text, start, line = _labelled(path, data, start, line=line, label=rb"Frames\s*:",
-                                         expected="Frames: and how many")
+                                         expected="Frames: and their number")
     frames = int(frames_text) if re.fullmatch(r"\d{1,12}", frames_text) else 0
     if frames < 1:
         raise InputError(f"{path}:{line - 1}", f"Frames: {frames_text[:40]}", "a whole number above 0", _EXPORT_AGAIN)
@@ -238,7 +268,7 @@ def _motion_head(path: Path, data: bytes, start: int, line: int) -> tuple[int, f
 
 
 def _labelled(path: Path, data: bytes, start: int, line: int, label: bytes, expected: str) -> tuple[str, int, int]:
-    """The value behind `label` on the next line that is not blank, and where the line after it starts."""
+    """Parse the value after `label` on the next line that is not blank; also return where the line after it starts."""
     while True:
         stop = data.find(b"\n", start)
         stop = len(data) if stop < 0 else stop
@@ -253,11 +283,11 @@ def _labelled(path: Path, data: bytes, start: int, line: int, label: bytes, expe
 
 
 def _rows(path: Path, text: bytes, columns: int, line: int) -> np.ndarray:
-    """The motion's numbers (T, columns); InputError with the first bad line."""
+    """Parse the motion's numbers (T, columns); InputError with the first invalid line."""
     if not text or text.isspace():
         raise InputError(f"{path}:{line}", "no rows of motion", f"rows of {columns} numbers", _DAMAGED)
     try:
-        values = np.loadtxt(io.BytesIO(text), comments=None, ndmin=2) + 0.0  # a zero has no minus
+        values = np.loadtxt(io.BytesIO(text), comments=None, ndmin=2) + 0.0  # adding 0 removes the sign of -0.0
         if values.shape[1] == columns and -1e300 < values.min() and values.max() < 1e300:
             return values
     except ValueError:
@@ -276,12 +306,12 @@ def _check_angles(path: Path, joints: _Hierarchy, values: np.ndarray, line: int)
 
 
 def _row_error(path: Path, text: bytes, columns: int, line: int) -> InputError:
-    """The first bad row; `text` begins with the end of the line before `line`."""
+    """Build the error of the first invalid row; `text` begins with the end of the line before `line`."""
     for at, row in enumerate(_decoded(text).split("\n"), line - 1):
         words = row.split()
         bad = next((word for word in words if _number(word) is None or abs(float(word)) >= 1e300), None)
         if bad is not None:
-            return InputError(f"{path}:{at}", f"{bad[:30]!r}", "a number of ordinary size", _EXPORT_AGAIN)
+            return InputError(f"{path}:{at}", f"{bad[:30]!r}", "a number of normal size", _EXPORT_AGAIN)
         if words and len(words) != columns:
             expected = f"{columns}, one per channel of the hierarchy"
             return InputError(f"{path}:{at}", f"{len(words)} numbers", expected, _DAMAGED)

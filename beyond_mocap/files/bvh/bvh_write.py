@@ -1,5 +1,7 @@
-"""A motion as the text of a BVH file, in the form it came in (`BvhForm`): hierarchy in file order, Euler angles,
-centimetres, Y up."""
+"""Format a motion as the text of a BVH file in the form of its source (`BvhForm`).
+
+Hierarchy in file order, Euler angles, centimetres, Y up.
+"""
 
 from __future__ import annotations
 
@@ -22,12 +24,18 @@ _SAME_ANGLE = np.degrees(1e-6)
 
 @dataclass(frozen=True, kw_only=True)
 class RootAbove:
-    """A joint that stood above the hips, from the file's root down.
+    """A joint above the hips, from the file's root down.
 
-    moves: whether it travelled with the body (LAFAN1's SimulationBone) instead of standing still (Bandai's joint_Root).
-    position: (3,) metres, rotation: (4,), relative to the joint above it; constant, of the first frame where it moves.
-    heading: radians from the body's facing to this joint's, where it moves. carries: (3,) metres, the hips' place in
-    it, where it stands right above hips that have no position channels of their own."""
+    Attributes:
+        name: the joint's name.
+        channels: its channel names in order.
+        is_moving: whether it moves with the body (LAFAN1's SimulationBone) rather than being static (Bandai's
+            joint_Root).
+        position: (3,) m relative to the joint above it; that of the first frame if it moves.
+        rotation: (4,) relative to the joint above it; that of the first frame if it moves.
+        heading: radians from the body's heading to this joint's, if it moves.
+        hip_offset: (3,) m, the hips' position in it, if it is right above hips without position channels.
+    """
 
     name: str
     channels: tuple[str, ...]
@@ -40,10 +48,14 @@ class RootAbove:
 
 @dataclass(frozen=True)
 class BvhForm:
-    """What writing back needs beyond the motion.
+    """What writing a motion back needs beyond the motion.
 
-    channels: each joint's channel names in order. above: joints above the hips. unit: metres per file unit, and up: "Y"
-    or "Z", as read (files are always written in centimetres with Y up)."""
+    Attributes:
+        channels: joint name -> channel names in order.
+        above: joints above the hips.
+        unit: metres per file unit, as read (files are always written in centimetres).
+        up: "Y" or "Z", as read (files are always written with Y up).
+    """
 
     channels: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     above: tuple[RootAbove, ...] = ()
@@ -53,10 +65,17 @@ class BvhForm:
 
 @dataclass(frozen=True, kw_only=True)
 class _Joint:
-    """A joint as it is to stand in the file, centimetres and degrees, Y up.
+    """A joint as it is written, centimetres and degrees, Y up.
 
-    depth: how many stand above it. offset: (3,). channels: names in order. columns: (T, channels). ends: (E, 3) tips.
-    added: channels that its form lacked."""
+    Attributes:
+        name: the joint's name.
+        depth: number of joints above it.
+        offset: (3,) cm.
+        channels: names in order.
+        columns: (T, channels).
+        ends: (E, 3) cm, End Sites.
+        added: channels that its form lacks.
+    """
 
     name: str
     depth: int
@@ -68,7 +87,14 @@ class _Joint:
 
 
 def document(motion: Motion, form: BvhForm) -> tuple[Iterator[str], tuple[str, ...]]:
-    """The file's text in pieces, and a note per joint that needed more channels than `form` gives it."""
+    """Format a motion as BVH.
+
+    Args:
+        motion: the motion.
+        form: channel orders and joints above the hips.
+    Returns:
+        The file's text in pieces, and a note for each joint that needs more channels than `form` gives it.
+    """
     joints = _above(motion, form.above)
     root, rotation = _hips_below(motion, form.above)
     for i, depth in _depth_first(motion.skeleton):
@@ -78,15 +104,25 @@ def document(motion: Motion, form: BvhForm) -> tuple[Iterator[str], tuple[str, .
         ends = motion.skeleton.end_offsets[[p == i for p in motion.skeleton.end_parents]]
         turn = rotation if i == 0 else motion.rotations[:, i]
         joints.append(_joint(name, len(form.above) + depth, declared, place=place, turn=turn, ends=ends))
-    notes = tuple(f"{j.name}: {', '.join(j.added)} added, the motion needs it" for j in joints if j.added)
+    notes = tuple(f"{j.name}: {', '.join(j.added)} added, because the motion needs it" for j in joints if j.added)
     return _text(joints, motion.fps), notes
 
 
 def euler_degrees(rotations: np.ndarray, letters: str) -> np.ndarray:
-    """Angles (T, 3) in degrees of rotations (T, 4) in the order of `letters`, completed to a permutation of XYZ.
+    """Compute Euler angles in the order of `letters`, completed to a permutation of XYZ.
 
-    Three letters: the middle angle within +-90 degrees. Fewer: of the two triples that make a rotation, (a, b, c) and
-    (a + 180, 180 - b, c + 180), the one whose angles beyond `letters` are nearer to zero and can be left out."""
+    With three letters, the middle angle is within +-90 degrees. With fewer, two triples give the rotation, (a, b, c)
+    and
+    (a + 180, 180 - b, c + 180); the one whose angles beyond `letters` are nearer to zero is used, so that they can be
+    left
+    out.
+
+    Args:
+        rotations: (T, 4).
+        letters: axes in order, such as "ZXY" or "Z".
+    Returns:
+        (T, 3) degrees.
+    """
     order = letters + "".join(axis for axis in "ZXY" if axis not in letters)
     angles = np.degrees(quaternion.to_euler(rotations, order))
     if len(letters) == 3:
@@ -98,16 +134,16 @@ def euler_degrees(rotations: np.ndarray, letters: str) -> np.ndarray:
 
 
 def _to_file(vectors: np.ndarray) -> np.ndarray:
-    """Our vectors (..., 3), metres, Z up, as the file has them: centimetres, Y up."""
+    """Convert core vectors (..., 3), metres, Z up, to the file's centimetres, Y up."""
     return vectors[..., (0, 2, 1)] * (_CENTIMETRES, _CENTIMETRES, -_CENTIMETRES)
 
 
 def _joint(name: str, depth: int, declared: tuple[str, ...], place: np.ndarray, turn: np.ndarray, ends) -> _Joint:
-    """One joint: place (T or 1, 3) metres and turn (T, 4), relative to its parent, in our axes."""
+    """Build one joint from place (T or 1, 3) metres and turn (T, 4), relative to its parent, in core axes."""
     places = _to_file(place)
     lacking = [c for c, spread in zip(POSITIONS, np.ptp(places, axis=0)) if c not in declared and spread > _SAME_PLACE]
     letters = "".join(c[0] for c in declared if c in ROTATIONS)
-    # our axes -> the file's: the same quarter turn as for vectors, on the quaternion's vector part
+    # core axes -> the file's: the same quarter turn as for vectors, on the quaternion's vector part
     angles = euler_degrees(turn[:, (0, 1, 3, 2)] * (1.0, 1.0, 1.0, -1.0), letters)
     if np.abs(angles[:, len(letters) :]).max(initial=0.0) > _SAME_ANGLE:
         lacking += [axis + "rotation" for axis in "ZXY" if axis not in letters]
@@ -125,7 +161,7 @@ def _joint(name: str, depth: int, declared: tuple[str, ...], place: np.ndarray, 
 
 
 def _depth_first(skeleton: Skeleton) -> Iterator[tuple[int, int]]:
-    """Joints in the order BVH nests them, with their depth; a skeleton that was read keeps its order."""
+    """Iterate over joints in the order BVH nests them, with their depth; a skeleton that was read keeps its order."""
     children: list[list[int]] = [[] for _ in skeleton.names]
     for joint, parent in enumerate(skeleton.parents):
         if parent >= 0:
@@ -138,9 +174,10 @@ def _depth_first(skeleton: Skeleton) -> Iterator[tuple[int, int]]:
 
 
 def _chain(motion: Motion, above: tuple[RootAbove, ...]) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Positions (T, 3) and rotations (T, 4) in the world of the joints above the hips, and of what they stand in first.
+    """Compute positions (T, 3) and rotations (T, 4) in the world frame of the joints above the hips, after the world's
+    own.
 
-    The topmost one that moved is put below the hips, turned to the body's facing; the others keep their places on it.
+    The topmost moving joint is placed below the hips with the body's heading; the others keep their places on it.
     """
     frames = len(motion)
     worlds = [(np.zeros((frames, 3)), quaternion.identity(frames))]
@@ -159,13 +196,13 @@ def _chain(motion: Motion, above: tuple[RootAbove, ...]) -> list[tuple[np.ndarra
 
 
 def _relative(world, parent) -> tuple[np.ndarray, np.ndarray]:
-    """A place and turn in the world, (T, 3) and (T, 4), as seen from a parent's."""
+    """Convert a position and rotation in the world frame, (T, 3) and (T, 4), to a parent's frame."""
     back = quaternion.inverse(parent[1])
     return quaternion.rotate(back, world[0] - parent[0]), quaternion.multiply(back, world[1])
 
 
 def _above(motion: Motion, above: tuple[RootAbove, ...]) -> list[_Joint]:
-    """The joints that stood above the hips, put back."""
+    """Build the joints above the hips."""
     worlds, out = _chain(motion, above) if above else [], []
     for depth, (joint, parent, world) in enumerate(zip(above, worlds, worlds[1:])):
         place, turn = _relative(world, parent)
@@ -175,13 +212,13 @@ def _above(motion: Motion, above: tuple[RootAbove, ...]) -> list[_Joint]:
 
 
 def _hips_below(motion: Motion, above: tuple[RootAbove, ...]) -> tuple[np.ndarray, np.ndarray]:
-    """The hips' positions (T, 3) and rotations (T, 4) relative to the joints above them."""
+    """Compute the hips' positions (T, 3) and rotations (T, 4) relative to the joints above them."""
     hips = (motion.root_positions, motion.rotations[:, 0])
     return _relative(hips, _chain(motion, above)[-1]) if above else hips
 
 
 def _text(joints: list[_Joint], fps: float) -> Iterator[str]:
-    """The file, piece by piece."""
+    """Iterate over the pieces of the file."""
     yield "HIERARCHY\n"
     for joint, depth_after in zip(joints, [j.depth for j in joints[1:]] + [0]):
         yield from _joint_text(joint)
@@ -195,7 +232,7 @@ def _text(joints: list[_Joint], fps: float) -> Iterator[str]:
 
 
 def _joint_text(joint: _Joint) -> Iterator[str]:
-    """A joint's lines, its bracket left open."""
+    """Iterate over a joint's lines; its bracket stays open."""
     tabs = "\t" * joint.depth
     yield f"{tabs}{'JOINT' if joint.depth else 'ROOT'} {joint.name}\n{tabs}{{\n{tabs}\t{_offset(joint.offset)}"
     yield f"{tabs}\tCHANNELS {' '.join([str(len(joint.channels)), *joint.channels])}\n"

@@ -1,1 +1,1 @@
-"""Positional tracking: the contract's own CSV and providers' files."""
+"""Read positional tracking data: the project's own CSV and providers' files."""

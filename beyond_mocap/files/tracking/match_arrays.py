@@ -1,4 +1,4 @@
-"""kloppy's dataset as arrays in our own coordinates: everybody's samples, the ball's, and one clock for all periods."""
+"""Convert kloppy's dataset to arrays in core coordinates: all players, the ball, and one clock for all periods."""
 
 from __future__ import annotations
 
@@ -9,21 +9,40 @@ import numpy as np
 from ...motion.track.match_data import REFEREE
 
 USUAL_PITCH = (105.0, 68.0)
-_PERIOD_BREAK = 10.0  # seconds put between the periods of a match
+_PERIOD_BREAK = 10.0  # seconds inserted between the periods of a match
 
 
 def records_of(dataset) -> list:
-    """The frames in which there is anybody, or a ball."""
+    """List the frames with a player or a ball.
+
+    Args:
+        dataset: kloppy's dataset.
+    Returns:
+        kloppy's frames.
+    """
     return [frame for frame in dataset.records if frame.players_data or frame.ball_coordinates is not None]
 
 
 def tracked_players(records) -> list:
-    """kloppy's players who are in some frame, the away team's first, by shirt number."""
+    """List the players of any frame, the away team's first, by shirt number.
+
+    Args:
+        records: kloppy's frames.
+    Returns:
+        kloppy's players.
+    """
     return sorted({player for frame in records for player in frame.players_data}, key=_shirt)
 
 
 def player_samples(records, players) -> np.ndarray:
-    """(P, N, 2) in the provider's coordinates, NaN where a player is not there."""
+    """Build the players' samples.
+
+    Args:
+        records: N of kloppy's frames.
+        players: P of kloppy's players.
+    Returns:
+        (P, N, 2) in the provider's coordinates, NaN where a player is absent.
+    """
     row = {player.player_id: index for index, player in enumerate(players)}
     out = np.full((len(players), len(records), 2), np.nan)
     for index, frame in enumerate(records):
@@ -34,7 +53,13 @@ def player_samples(records, players) -> np.ndarray:
 
 
 def ball_samples(records) -> np.ndarray:
-    """(N, 3) in the provider's coordinates, NaN where unknown; many feeds have no height."""
+    """Build the ball's samples; many feeds have no height.
+
+    Args:
+        records: N of kloppy's frames.
+    Returns:
+        (N, 3) in the provider's coordinates, NaN where unknown.
+    """
     out = np.full((len(records), 3), np.nan)
     for index, frame in enumerate(records):
         point = frame.ball_coordinates
@@ -45,8 +70,15 @@ def ball_samples(records) -> np.ndarray:
 
 
 def clock(records) -> tuple[np.ndarray, list[tuple[float, float, int, float]]]:
-    """Seconds of every frame (N,) on one clock for all periods; and of each period its start and end on it, its number
-    and the seconds that had passed at its first frame."""
+    """Build one clock for all periods.
+
+    Args:
+        records: N of kloppy's frames.
+    Returns:
+        (N,) seconds of every frame; and for each period its start and end on that clock, its number, and the seconds
+        that
+        had passed at its first frame.
+    """
     period = np.array([frame.period.id for frame in records])
     seconds = np.array([frame.timestamp.total_seconds() for frame in records])
     times, spans = np.empty(len(records)), []
@@ -63,22 +95,35 @@ def _shirt(player) -> tuple[str, int, str]:
 
 
 def described(player) -> tuple[str, str, str, str, str]:
-    """Id, team, name, number and position of one of kloppy's players."""
+    """Describe one of kloppy's players.
+
+    Args:
+        player: the player.
+    Returns:
+        Id, team, name, number and position.
+    """
     id_, shirt = str(player.player_id), str(-1 if player.jersey_no is None else int(player.jersey_no))
     ground = str(player.team.ground)
     return id_, ground if ground in ("home", "away") else REFEREE, player.name or id_, shirt, _position(player)
 
 
 def _position(player) -> str:
-    """The position as words: "left center back"."""
+    """Format the position in words: "left center back"."""
     position = getattr(player, "starting_position", None)
     said = re.sub(r"\s+", " ", str(position or "")).strip().lower()
     return "" if said in ("unknown", "none") or "." in said else said
 
 
 def pitch_of(dataset, pitch: tuple[float, float] | None, in_feed: bool) -> tuple[float, float, bool]:
-    """Length, width in metres, and whether they are a default because neither the feed nor `pitch` has them.
-    in_feed: whether the provider has them."""
+    """Find the pitch's size.
+
+    Args:
+        dataset: kloppy's dataset.
+        pitch: length and width in metres set by the user, or None.
+        in_feed: whether the provider's files contain the size.
+    Returns:
+        Length and width in metres, and whether they are a default because neither the feed nor the user gives them.
+    """
     size = dataset.metadata.pitch_dimensions
     length, width = size.pitch_length, size.pitch_width
     kloppys_guess = size.unit.name == "NORMED" and (length, width) == USUAL_PITCH
@@ -88,16 +133,32 @@ def pitch_of(dataset, pitch: tuple[float, float] | None, in_feed: bool) -> tuple
 
 
 def height_unit(dataset) -> float:
-    """Metres per unit of height; feeds that scale the pitch to 0..1 have none, or metres."""
+    """Find the unit of heights; feeds that scale the pitch to 0..1 have no heights, or metres.
+
+    Args:
+        dataset: kloppy's dataset.
+    Returns:
+        Metres per unit.
+    """
     return 0.01 if dataset.metadata.coordinate_system.pitch_dimensions.unit.name == "CENTIMETERS" else 1.0
 
 
 def to_metres(system, length: float, width: float, upward: bool):
-    """The map from a provider's plane coordinates (..., 2) to metres from the pitch's centre, y to the left of +x.
+    """Build the map from a provider's plane coordinates to metres.
 
     kloppy's own transformations pass through its standard pitch and bend positions between the lines; this one is
-    linear. upward: y grows upward whatever the system says. kloppy turns the y of Metrica's CSV over while reading and
-    still calls it downward; Metrica says (and the same match in TRACAB's form agrees) that the file's own y does."""
+    linear.
+
+    Args:
+        system: kloppy's coordinate system.
+        length, width: m, of the pitch.
+        upward: whether y grows upward whatever the system says. kloppy flips the y of Metrica's CSV while reading but
+            still calls it downward; Metrica's documentation (and the same match in TRACAB's format) shows that the
+            file's
+            own y is.
+    Returns:
+        A function of (..., 2) coordinates: metres from the pitch's centre, y to the left of +x.
+    """
     size = system.pitch_dimensions
     x, y = size.x_dim, size.y_dim
     scale = {"METERS": (1.0, 1.0), "CENTIMETERS": (0.01, 0.01)}.get(size.unit.name)

@@ -1,5 +1,8 @@
-"""What is wrong with the files of a match: refused where they do not belong together, told where they end too early,
-put right where feeds do what is no part of it: balls at sentinels, players parked beside the pitch, turned halves."""
+"""Check and repair the files of a match.
+
+Files that do not belong together raise InputErrors, truncated files give warnings. Repairs remove what feeds add: balls
+at sentinel positions, players parked beside the pitch, rotated or mirrored halves.
+"""
 
 from __future__ import annotations
 
@@ -17,34 +20,40 @@ from ...base.time_series import runs
 from ...motion.track import FASTEST, at_sentinel
 from .feed import Feed
 
-_BESIDE = 12.0  # m beyond the lines, where nobody plays
-_BALL_BESIDE = 25.0  # m beyond the lines, where feeds park a ball that is not there
-_HIGHEST = 60.0  # m
-_FROZEN = 30.0  # s at one place to the last digit: a sample kept for somebody who is not there
-_APART = 5.0  # m between the teams' mean places along the pitch that tell their ends
-_SAMPLED = 25  # every how manieth sample is enough for means over a half
-_LEAST = 60.0  # s of frames that a half must have for its means to tell anything
-_LIKE = 0.5  # correlation of the players' places across the pitch from which halves are told apart
+_BESIDE = 12.0  # m beyond the lines, where no player is
+_BALL_BESIDE = 25.0  # m beyond the lines, where feeds park an absent ball
+_HIGHEST = 60.0  # m, height of a ball at most
+_FROZEN = 30.0  # s at exactly one position: a repeated sample of an absent player
+_APART = 5.0  # m between the teams' mean positions along the pitch that identify their ends
+_SAMPLED = 25  # use every 25th sample for means over a half
+_LEAST = 60.0  # s of frames that a half needs for its means to be used
+_LIKE = 0.5  # correlation of the players' positions across the pitch that identifies a mirrored half
 _SIDES = ("left", "right")
-_WRONG_SIDE = 5.0  # m by which the left have to stand to the right of the right
-_FEWEST = 6  # players in both halves that tell of it
+_WRONG_SIDE = 5.0  # m by which left players must be to the right of right players
+_FEWEST = 6  # players in both halves at least
 
 MOST_PLAYERS = 60
-"""Two squads of 26 and the referees have fewer; more is two matches in one file."""
+"""Two squads of 26 and the referees have fewer; more are two matches in one file."""
 
-_STRANGERS = 0.3  # share of the players whom the metadata does not know, from which it is another match's
-_COMPARED = 200  # rows of two teams' files that must tell of one ball
-_LATE = 5.0  # seconds by which a half may begin late or end early untold
-_ONE_MATCH = "take the files of one match"
+_STRANGERS = 0.3  # share of players missing in the metadata above which it is of another match
+_COMPARED = 200  # rows of two teams' files whose balls are compared
+_LATE = 5.0  # seconds by which a half may start late or end early without a warning
+_ONE_MATCH = "choose the files of one match"
 
 
 def check_same_match(feed: Feed) -> None:
-    """InputError where the files name two matches: by its number, or by two teams' files with two balls."""
+    """Check that the files belong to one match, by its number, or by the ball in two teams' files.
+
+    Args:
+        feed: the files.
+    Raises:
+        InputError: if they do not.
+    """
     if feed.by_teams:
         balls = [_balls(path) for path in feed.tracking]
         differing = sum(one != other for one, other in zip(*balls))
         if differing > 0.1 * min(map(len, balls)):
-            found = f"another ball in {differing} of {min(map(len, balls))} rows than in {feed.tracking[1].name}"
+            found = f"the ball differs in {differing} of {min(map(len, balls))} rows from {feed.tracking[1].name}"
             raise InputError(feed.path, found, "two teams of one match", _ONE_MATCH)
     elif feed.provider.number_in_tracking and feed.provider.number_in_metadata:
         _check_same_number(feed)
@@ -60,29 +69,44 @@ def _check_same_number(feed: Feed) -> None:
 
 
 def _balls(path: Path) -> list[tuple[str, ...]]:
-    """Frame number and ball of the first rows of a team's CSV."""
+    """Read frame number and ball of the first rows of a team's CSV."""
     with open(path, encoding="utf-8", errors="replace") as file:
         rows = [line.strip().split(",") for line in islice(file, 3, 3 + _COMPARED)]
     return [(*row[:2], *(cell for cell in row[-2:])) for row in rows]
 
 
 def check_rows(feed: Feed) -> list[str]:
-    """A line where two teams' files have not as many rows: frames are those that both have."""
+    """Compare the number of rows of two teams' files; only frames in both are used.
+
+    Args:
+        feed: the files.
+    Returns:
+        A warning if they differ.
+    """
     if not feed.by_teams:
         return []
     rows = [sum(bool(line.strip()) for line in path.read_bytes().splitlines()) for path in feed.tracking]
     if rows[0] == rows[1]:
         return []
     told = " and ".join(f"{path.name} {count}" for path, count in zip(feed.tracking, rows))
-    return [f"the teams' files have not as many rows ({told}): only what both have is read"]
+    return [f"the teams' files differ in their number of rows ({told}): only common rows are read"]
 
 
 def check_players(players, dataset, feed: Feed) -> list[str]:
-    """Lines on players whom the metadata does not know. players: kloppy's, those who are tracked. InputError for more
-    than MOST_PLAYERS of them, and where so many are unknown that the metadata is another match's."""
+    """Check the tracked players against the metadata.
+
+    Args:
+        players: kloppy's tracked players.
+        dataset: kloppy's dataset.
+        feed: the files.
+    Returns:
+        A line on players missing in the metadata.
+    Raises:
+        InputError: for more than MOST_PLAYERS players, or so many missing ones that the metadata is of another match.
+    """
     if len(players) > MOST_PLAYERS:
         found = f"{len(players)} players"
-        raise InputError(feed.path, found, f"at most {MOST_PLAYERS}, as one match has", "cut the file to one match")
+        raise InputError(feed.path, found, f"at most {MOST_PLAYERS} in one match", "reduce the file to one match")
     roster = [player for team in dataset.metadata.teams for player in team.players if player.name]
     strangers = [player for player in players if not player.name] if roster else []
     tracked = {player.player_id for player in players}
@@ -98,11 +122,21 @@ def check_players(players, dataset, feed: Feed) -> list[str]:
 
 
 def check_periods(records, dataset, feed: Feed) -> list[str]:
-    """Lines on halves that are missing or cut. InputError where the metadata's halves have none of the frames."""
+    """Check the periods against the metadata.
+
+    Args:
+        records: kloppy's frames.
+        dataset: kloppy's dataset.
+        feed: the files.
+    Returns:
+        A line for each period that is missing or truncated.
+    Raises:
+        InputError: if the metadata's periods contain none of the frames.
+    """
     if len(records) < 2:
-        found = f"{len(records)} frames with anybody in them"
+        found = f"{len(records)} frames with players"
         if feed.meta:
-            found += f" within the halves that {feed.meta[0].name} names"
+            found += f" within the periods in {feed.meta[0].name}"
             raise InputError(feed.path, found, "a match", _ONE_MATCH)
         raise InputError(feed.path, found, "a match", "export it again")
     lines = []
@@ -110,7 +144,7 @@ def check_periods(records, dataset, feed: Feed) -> list[str]:
         clock = [frame.timestamp.total_seconds() for frame in records if frame.period.id == period.id]
         try:
             lasts = (period.end_timestamp - period.start_timestamp).total_seconds()
-        except TypeError:  # a half that has not ended
+        except TypeError:  # a period that has not ended
             continue
         if not clock:
             lines.append(f"period {period.id} is in the metadata but has no frames")
@@ -121,7 +155,11 @@ def check_periods(records, dataset, feed: Feed) -> list[str]:
 
 @contextlib.contextmanager
 def whole_lines(feed: Feed) -> Iterator[Feed]:
-    """The feed with copies of its tracking files that end with their last whole line, all after as many lines."""
+    """Context manager: the feed with copies of its tracking files cut to whole lines, and to the same number of lines.
+
+    Args:
+        feed: the files.
+    """
     with tempfile.TemporaryDirectory() as folder:
         texts = [path.read_bytes() for path in feed.tracking]
         lines = [text[: text.rfind(b"\n") + 1].splitlines(keepends=True) for text in texts]
@@ -134,7 +172,14 @@ def whole_lines(feed: Feed) -> Iterator[Feed]:
 
 
 def mended_ball(ball: np.ndarray, length: float, width: float) -> tuple[np.ndarray, list[str]]:
-    """The ball (N, 3) m with NaN where it stands at a sentinel or no ball can be, and lines that tell."""
+    """Repair the ball's samples.
+
+    Args:
+        ball: (N, 3) m.
+        length, width: m, of the pitch.
+    Returns:
+        (N, 3) m, NaN at sentinel positions and where no ball can be, and messages.
+    """
     with np.errstate(invalid="ignore"):
         wrong = at_sentinel(ball)
         wrong |= (np.abs(ball[:, :2]) > np.array([length, width]) / 2.0 + _BALL_BESIDE).any(axis=1)
@@ -143,37 +188,47 @@ def mended_ball(ball: np.ndarray, length: float, width: float) -> tuple[np.ndarr
     out[high, 2] = np.nan
     known = np.isfinite(out[:, :2]).all(axis=1)
     counts = np.count_nonzero(wrong), np.count_nonzero(high)
-    lines = [f"{counts[0]} samples with the ball at no place of a ball taken as unknown"] * bool(counts[0])
-    lines += [f"{counts[1]} heights of the ball above {_HIGHEST:g} m taken as unknown"] * bool(counts[1])
+    lines = [f"{counts[0]} samples with an impossible position of the ball, set to unknown"] * bool(counts[0])
+    lines += [f"{counts[1]} heights of the ball above {_HIGHEST:g} m, set to unknown"] * bool(counts[1])
     heights = np.isfinite(out[known, 2]).mean() if known.any() else 0.0
     told = f"the ball is known in {known.mean():.0%} of the samples, its height in {heights:.0%} of these"
     return out, [*lines, told]
 
 
 def mended_players(times, positions, length: float, width: float, ids) -> tuple[np.ndarray, list[str]]:
-    """Positions (P, N, 2) m with NaN where a player is parked: far beside the pitch, or unmoved to the last digit for
-    half a minute; and lines that tell. times: (N,) s; ids: P names."""
+    """Repair the players' samples.
+
+    Args:
+        times: (N,) s.
+        positions: (P, N, 2) m.
+        length, width: m, of the pitch.
+        ids: P names.
+    Returns:
+        (P, N, 2) m, NaN where a player is parked: far beside the pitch, or at exactly one position for half a minute;
+        and
+        messages.
+    """
     out = np.array(positions)
     lines, jumps = [], 0
     with np.errstate(invalid="ignore"):
         beside = (np.abs(out) > np.array([length, width]) / 2.0 + _BESIDE).any(axis=2)
     for index, name in enumerate(ids):
         frozen = _frozen(times, out[index]) & ~beside[index]
-        for what, flags in (("beside the pitch", beside[index]), ("at one place to the last digit", frozen)):
+        for what, flags in (("beside the pitch", beside[index]), ("at exactly one position", frozen)):
             if flags.any():
                 out[index, flags] = np.nan
                 seconds = np.count_nonzero(flags) * float(np.median(np.diff(times)))
-                lines.append(f"{name}: {seconds:.0f} s {what}, taken as away")
+                lines.append(f"{name}: {seconds:.0f} s {what}, set to absent")
         with np.errstate(invalid="ignore"):
             speed = np.linalg.norm(np.diff(out[index], axis=0), axis=1) / np.maximum(np.diff(times), 1e-6)
             jumps += np.count_nonzero(speed > FASTEST)
     if jumps:
-        lines.append(f"{jumps} steps of players faster than {FASTEST:g} m/s, mended where their tracks are cleaned")
+        lines.append(f"{jumps} steps of players faster than {FASTEST:g} m/s, repaired when their tracks are cleaned")
     return out, lines
 
 
 def _frozen(times: np.ndarray, path: np.ndarray) -> np.ndarray:
-    """(N,) bool: within a run of _FROZEN seconds and more at exactly one place; path (N, 2)."""
+    """Find runs of _FROZEN seconds and more at exactly one position of a path (N, 2): (N,) bool."""
     still = (np.diff(path, axis=0) == 0.0).all(axis=1)
     out = np.zeros(len(path), bool)
     for first, end in runs(still):
@@ -183,12 +238,22 @@ def _frozen(times: np.ndarray, path: np.ndarray) -> np.ndarray:
 
 
 def mended_sides(times, positions, ball, periods, teams) -> tuple[np.ndarray, np.ndarray, list[str]]:
-    """Positions (P, N, 2) and ball (N, 3) m with every second half turned and mirrored to fit the first one, and lines.
+    """Repair rotated and mirrored second halves.
 
-    Teams change ends at half time: where they do not, the feed has turned one half for attack to go one way, and the
-    second one is turned back. A player keeps to his side of the team: where left backs become right backs, the half is
-    mirrored and its y changes sign. teams: P of "home", "away", "referee"; periods: (start, end) s, in order; the third
-    and fourth, of extra time, are a pair too."""
+    Teams change ends at half time. If they do not, the feed rotated one half so that attacks go one way, and the second
+    half is rotated back. Players keep their side of the team: if left backs become right backs, the half is mirrored
+    and
+    its y changes sign. The third and fourth periods, of extra time, are a pair too.
+
+    Args:
+        times: (N,) s.
+        positions: (P, N, 2) m.
+        ball: (N, 3) m.
+        periods: (start, end) s, in order.
+        teams: P of "home", "away", "referee".
+    Returns:
+        Positions and ball, consistent with the first half, and messages.
+    """
     positions, ball, lines = np.array(positions), np.array(ball), []
     teams = np.array(teams)
     for first in range(0, len(periods) - 1, 2):
@@ -199,10 +264,12 @@ def mended_sides(times, positions, ball, periods, teams) -> tuple[np.ndarray, np
         if 0.0 in ends or min(part.stop - part.start for part in parts) * interval < _LEAST:
             continue
         signs = np.ones(2)
+        # The home team at the same end twice: change the sign of x in the second half.
         if ends[0] == ends[1]:
             signs[0] = -1.0
             ends[1] = -ends[1]
         places = [_across(positions[:, part]) * end for part, end in zip(parts, ends)]
+        # Players on opposite sides of their team: change the sign of y too.
         alike = _correlation(*places)
         if alike < -_LIKE:
             signs[1] = -1.0
@@ -214,14 +281,21 @@ def mended_sides(times, positions, ball, periods, teams) -> tuple[np.ndarray, np
 
 
 _TOLD = {
-    (True, True): "period {period}: the teams had not changed ends, so the half is turned round",
-    (True, False): "period {period}: the half was mirrored end to end, and is turned back",
-    (False, True): "period {period}: the half was mirrored side to side, and is turned back",
+    (True, True): "period {period}: the teams do not change ends, so the half is rotated by 180 degrees",
+    (True, False): "period {period}: the half is mirrored end to end, so it is mirrored back",
+    (False, True): "period {period}: the half is mirrored side to side, so it is mirrored back",
 }
 
 
 def home_end(positions: np.ndarray, teams: np.ndarray) -> float:
-    """Which end the home team keeps: -1 where x is negative, 1 the other, 0 where it cannot be told."""
+    """Find the end that the home team defends.
+
+    Args:
+        positions: (P, N, 2) m.
+        teams: P of "home", "away", "referee".
+    Returns:
+        -1 for negative x, 1 for positive, 0 if it is unclear.
+    """
     middles = []
     for ground in ("home", "away"):
         own = positions[teams == ground, ::_SAMPLED, 0]
@@ -234,14 +308,14 @@ def home_end(positions: np.ndarray, teams: np.ndarray) -> float:
 
 
 def _across(positions: np.ndarray) -> np.ndarray:
-    """(P,) each player's mean y, NaN where he is not there."""
+    """Compute each player's mean y, (P,), NaN for absent players."""
     seen = positions[:, ::_SAMPLED, 1]
     count = np.isfinite(seen).sum(axis=1)
     return np.where(count > 0, np.nansum(seen, axis=1) / np.maximum(count, 1), np.nan)
 
 
 def _correlation(one: np.ndarray, other: np.ndarray) -> float:
-    """Of the players who are in both; 0 where they are too few, or all in the middle."""
+    """Compute the correlation over the players in both; 0 if they are too few or all near the middle."""
     both = np.isfinite(one) & np.isfinite(other)
     a, b = one[both], other[both]
     size = np.sqrt((a**2).sum() * (b**2).sum())
@@ -249,8 +323,19 @@ def _correlation(one: np.ndarray, other: np.ndarray) -> float:
 
 
 def side_lines(times, positions, periods, teams, called) -> list[str]:
-    """A line where players whom the lineup calls left stand to the right of those it calls right, over the first half,
-    looking where their team attacks. positions (P, N, 2) m put right; called: P position words."""
+    """Check that players that the lineup calls left are to the left of those it calls right, in the first half.
+
+    Left and right are relative to their team's attack.
+
+    Args:
+        times: (N,) s.
+        positions: (P, N, 2) m, repaired.
+        periods: (start, end) s, in order.
+        teams: P of "home", "away", "referee".
+        position_names: P positions in words.
+    Returns:
+        A warning if they are exchanged.
+    """
     part = slice(*np.searchsorted(times, [periods[0][0] - 1e-6, periods[0][1] + 1e-6]))
     end = home_end(positions[:, part], np.array(teams))
     if not end or (part.stop - part.start) * float(np.median(np.diff(times))) < _LEAST:
@@ -260,4 +345,4 @@ def side_lines(times, positions, periods, teams, called) -> list[str]:
     sides = {side: [y for y, said in zip(across, called) if side in said.split() and np.isfinite(y)] for side in _SIDES}
     if min(map(len, sides.values())) < 2 or np.mean(sides["left"]) - np.mean(sides["right"]) > -_WRONG_SIDE:
         return []
-    return ["players called left stand on the right: the file may be mirrored side to side, or the lineup"]
+    return ["left players are on the right: the file or the lineup may be mirrored side to side"]

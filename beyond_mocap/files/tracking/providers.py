@@ -1,6 +1,6 @@
-"""The providers of tracking, one record each, and the files of a match that belong together.
+"""The providers of tracking data, one record each, and the files of a match that belong together.
 
-All that is special to a provider stands in its record, and in the functions that only this record names.
+Everything specific to a provider is in its record and in the functions that only this record names.
 """
 
 from __future__ import annotations
@@ -20,7 +20,15 @@ _META_NAMES = ("{}_meta.xml", "{}_meta.json", "{}_metadata.xml", "{}_metadata.js
 
 
 def find_feed(path: str | os.PathLike, meta: str | os.PathLike | None, provider: str | None) -> tuple[Feed, list[str]]:
-    """The files that belong together, and what was guessed of them; arguments and errors as for `read_match`."""
+    """Find the files of a match.
+
+    Args:
+        path, meta, provider: see `read_match`.
+    Returns:
+        The files, and notes on what was assumed.
+    Raises:
+        InputError: see `read_match`.
+    """
     path, notes = _check_file(path), []
     if provider and provider.lower() not in PROVIDERS:
         raise InputError("provider", f"{provider.lower()!r}", f"one of {', '.join(PROVIDERS)}")
@@ -30,8 +38,16 @@ def find_feed(path: str | os.PathLike, meta: str | os.PathLike | None, provider:
 
 
 def load_tracking(feed: Feed, pitch: tuple[float, float]):
-    """kloppy's dataset in the provider's own coordinates; pitch: length and width, m, for a feed without them.
-    InputError where kloppy is not installed or cannot read the files."""
+    """Load tracking data with kloppy, in the provider's own coordinates.
+
+    Args:
+        feed: the files.
+        pitch: length and width in metres for a feed without them.
+    Returns:
+        kloppy's dataset.
+    Raises:
+        InputError: if kloppy is not installed or cannot read the files.
+    """
     record, files, half = feed.provider, list(map(str, feed.tracking)), len(feed.tracking) // 2
     meta, more, *_ = [*map(str, feed.meta), None, None]
     known = {"raw": files[0], "all": files, "first": files[:half], "second": files[half:], "meta": meta, "more": more,
@@ -56,32 +72,34 @@ def _check_file(path: str | os.PathLike) -> Path:
 def _guess_provider(path: Path, notes: list[str]) -> TrackingProvider:
     record = find_provider(path, PROVIDERS)
     if record is not None:
-        notes.append(f"{path.name} read as {record.name}")
+        notes.append(f"{path.name} is read as {record.name}")
         return record
     if not read_head(path).strip():
-        raise InputError(path, "an empty file", "positions", "export it again")
+        raise InputError(path, "the file is empty", "positions", "export it again")
     expected = f"a CSV file with time_s,x_m,y_m, or one of {', '.join(PROVIDERS)}"
-    raise InputError(path, "a form that is not known", expected, "name the columns so, or the provider")
+    raise InputError(path, "unknown format", expected, "rename the columns, or choose the provider")
 
 
 def _find_metadata(path: Path, record: TrackingProvider, notes: list[str]) -> Path:
-    """The metadata file that the tracking file's name leads to."""
+    """Find the metadata file by the tracking file's name."""
     names = [path.name.replace(a, b) for a, b in record.renamed if a in path.name]
     names += [form.format(path.stem) for form in _META_NAMES]
     for name in names:
         beside = path.with_name(name)
         if beside.is_file() and beside != path:
-            notes.append(f"{name} taken as its {'second' if beside.suffix == path.suffix else 'metadata'} file")
+            notes.append(f"{name} is used as its {'second' if beside.suffix == path.suffix else 'metadata'} file")
             return beside
     raise InputError(
-        path, f"no metadata file beside it for {record.name}", names[0],
-        "put it there, or name it (--meta, in Blender Metadata)",
+        path, f"the metadata file for {record.name} is missing", names[0],
+        "add it there, or choose the metadata file",
     )
 
 
 def _find_beside(meta: Path, word: str, path: Path, notes: list[str]) -> Path:
-    """The one other file that a provider needs, with `word` in its own or its folder's name; of several the one that
-    shares the numbers in the metadata's or the tracking file's name."""
+    """Find the one other file that a provider needs, with `word` in its own or its folder's name.
+
+    Among several, the one that shares a number with the metadata's or the tracking file's name is used.
+    """
     folders = {meta.parent, path.parent, *(one for one in meta.parent.parent.glob("*") if word in one.name.lower())}
     found = sorted(
         one for folder in folders if folder.is_dir() for one in folder.glob("*.json")
@@ -93,9 +111,9 @@ def _find_beside(meta: Path, word: str, path: Path, notes: list[str]) -> Path:
     if len(chosen) != 1:
         raise InputError(
             meta, f"{len(chosen)} files with '{word}' in their names beside it", "one that belongs to this match",
-            "put it there, and others away",
+            "add it there, and move the others away",
         )
-    notes.append(f"{chosen[0].name} taken as its {word} file")
+    notes.append(f"{chosen[0].name} is used as its {word} file")
     return chosen[0]
 
 
@@ -108,18 +126,18 @@ _find_sportec_number = partial(_find_number, rb'MatchId="([^"]{1,60})"')
 
 
 def _find_metrica(path: Path, meta: Path, notes: list[str]) -> Files:
-    """CSV, a file for each team, or EPTS, text with XML."""
+    """Find Metrica's files: CSV, one for each team, or EPTS, text with XML."""
     if path.suffix.lower() != ".csv":
         return (path,), (meta,)
     return ((meta, path) if "away" in path.name.lower() else (path, meta)), ()
 
 
 def _find_secondspectrum(path: Path, meta: Path, notes: list[str]) -> Files:
-    """A JSON beside the XML brings names."""
+    """Find Second Spectrum's files; a JSON beside the XML contains names."""
     names = meta.with_suffix(".json")
     if meta.suffix.lower() != ".xml" or not names.is_file():
         return (path,), (meta,)
-    notes.append(f"{names.name} taken for the names of the players")
+    notes.append(f"{names.name} is used for the players' names")
     return (path,), (meta, names)
 
 
@@ -135,15 +153,15 @@ def _find_pff_number(metadata: bytes) -> str | None:
 
 
 def _find_signality(path: Path, meta: Path, notes: list[str]) -> Files:
-    """A file for each half, where the name has p1 or p2 in it, and the venue."""
+    """Find Signality's files: one for each half, with p1 or p2 in the name, and the venue."""
     names = [re.sub(r"(?i)(?<![a-z0-9])(p)[1-5](?![0-9])", rf"\g<1>{number}", path.name) for number in range(1, 6)]
     found = tuple(dict.fromkeys(path.with_name(name) for name in names if path.with_name(name).is_file()))
-    notes += [f"{', '.join(one.name for one in found)} taken as one match"] * (len(found) > 1)
+    notes += [f"{', '.join(one.name for one in found)} are used as one match"] * (len(found) > 1)
     return found or (path,), (meta, _find_beside(meta, "venue", path, notes))
 
 
 def _find_hawkeye(path: Path, meta: Path | None, notes: list[str]) -> Files:
-    """All files of a folder, one a minute: the players', then as many of the ball."""
+    """Find all of HawkEye's files in a folder, one per minute: the players', then the same number of the ball."""
     def minute(file: Path) -> list[int]:
         return [int(number) for number in re.findall(r"\d+", file.name)]
 
@@ -152,11 +170,11 @@ def _find_hawkeye(path: Path, meta: Path | None, notes: list[str]) -> Files:
     if not players or [minute(file) for file in players] != [minute(file) for file in balls]:
         found = f"{len(players)} files of players and {len(balls)} of the ball"
         raise InputError(path.parent, found, "one .samples.ball for every .samples.centroids", "complete the folder")
-    notes.append(f"{len(players)} files of players and of the ball in {path.parent.name or path.parent} taken")
+    notes.append(f"{len(players)} files of players and of the ball in {path.parent.name or path.parent} are used")
     return (*players, *balls), (meta,) if meta else ()
 
 
-# in the order of the choices that saved scenes number: a new one goes to the end
+# saved scenes store the position in this order: add new providers at the end
 PROVIDERS: dict[str, TrackingProvider] = {record.name: record for record in (
     TrackingProvider(
         name="tracab", title="TRACAB", files="`.dat` or `.json`, metadata `.xml` or `.json`; referees too",
@@ -201,7 +219,7 @@ PROVIDERS: dict[str, TrackingProvider] = {record.name: record for record in (
     ),
     TrackingProvider(
         name="signality", title="Signality",
-        files="`..p1...json` (the other half's is found by its name), metadata, and the file with `venue` in its "
+        files="`..p1...json` (the other half is found by its name), metadata, and the file with `venue` in its "
               "name; referees",
         patterns=(rb'(?s)\s*\[\s*\{.{0,400}"utc_time"',), find_files=_find_signality,
         arguments={"meta_data": "meta", "raw_data_feeds": "all", "venue_information": "more"},
@@ -209,7 +227,7 @@ PROVIDERS: dict[str, TrackingProvider] = {record.name: record for record in (
     ),
     TrackingProvider(
         name="hawkeye", title="HawkEye",
-        files="any file of a folder: all its `.samples.centroids` and `.samples.ball` are taken; metadata if there is "
+        files="any file of a folder: all its `.samples.centroids` and `.samples.ball` are used; metadata if there is "
               "any",
         patterns=(rb'(?s)\s*\{\s*"details"\s*:.{0,4000}"heId"',), find_files=_find_hawkeye, needs_metadata=False,
         arguments={"player_centroid_feeds": "first", "ball_feeds": "second", "meta_data": "meta",

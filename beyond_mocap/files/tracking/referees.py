@@ -1,4 +1,4 @@
-"""What kloppy leaves out of tracking, read here for the providers that have it: referees, and the colours of shirts."""
+"""Read what kloppy ignores in tracking data: referees, and the colours of shirts."""
 
 from __future__ import annotations
 
@@ -16,12 +16,18 @@ _COLOUR = re.compile(r"#?([0-9a-fA-F]{6})")
 _JSON_COLOUR = r'"{side}_?[tT]eam_?[kK]it"\s*:\s*\{{[^{{}}]*?"(?:primaryColor|jersey_color)"\s*:\s*"([^"]+)"'
 _XML_TEAM = re.compile(r"<Team\b[^>]*>")
 _XML_SHIRT = re.compile(r'PlayerShirtMainColor="([^"]+)"')
-_LARGEST = 16 * 1024 * 1024  # bytes of metadata
+_LARGEST = 16 * 1024 * 1024  # bytes of metadata at most
 
 
 def referee_samples(feed: Feed, frames: np.ndarray) -> tuple[list[str], np.ndarray, list[str]]:
-    """Ids of the R referees in a feed, where they are (R, N, 2) in the provider's coordinates, NaN where they are not
-    known, and lines: samples that cannot be read end them. frames: (N,) the numbers of kloppy's frames."""
+    """Read the referees' samples of a feed.
+
+    Args:
+        feed: the files.
+        frames: (N,) the numbers of kloppy's frames.
+    Returns:
+        R ids; (R, N, 2) in the provider's coordinates, NaN where unknown; and a message if unreadable samples end them.
+    """
     if feed.provider.read_referees is None:
         return [], np.empty((0, len(frames), 2)), []
     row = {int(frame): index for index, frame in enumerate(frames)}
@@ -31,19 +37,29 @@ def referee_samples(feed: Feed, frames: np.ndarray) -> tuple[list[str], np.ndarr
         for frame, who, x, y in feed.provider.read_referees(feed):
             if frame in row:
                 found.setdefault(who, np.full((len(frames), 2), np.nan))[row[frame]] = x, y
-    except (ValueError, TypeError, LookupError, AttributeError, SyntaxError) as error:  # SyntaxError: of XML
+    except (ValueError, TypeError, LookupError, AttributeError, SyntaxError) as error:  # SyntaxError: from XML
         lines = [f"referees are read up to frame {frame} only ({type(error).__name__}: {str(error)[:60]})"]
     names = sorted(found)
     return names, np.stack([found[name] for name in names]) if names else np.empty((0, len(frames), 2)), lines
 
 
 def described_referee(id_: str) -> tuple[str, str, str, str, str]:
-    """Id, team, name, number and position, as `match_arrays.described` has them."""
+    """Describe a referee like `match_arrays.describe_player`.
+
+    Args:
+        id_: the id.
+    Returns:
+        Id, team, name, number and position.
+    """
     return id_, REFEREE, id_.replace("_", " "), "-1", ""
 
 
 def read_tracab_referees(feed: Feed) -> Samples:
-    """Those of TRACAB's two forms, lines and JSON."""
+    """Iterate over the referees' samples in TRACAB's two formats, lines and JSON.
+
+    Args:
+        feed: the files.
+    """
     return _tracab_json(feed) if feed.path.suffix.lower() == ".json" else _tracab_lines(feed)
 
 
@@ -64,7 +80,11 @@ def _tracab_json(feed: Feed) -> Samples:
 
 
 def read_sportec_referees(feed: Feed) -> Samples:
-    """Those of Sportec's positions."""
+    """Iterate over the referees' samples in Sportec's positions.
+
+    Args:
+        feed: the files.
+    """
     from xml.etree.ElementTree import iterparse
 
     who = ""
@@ -80,7 +100,11 @@ def read_sportec_referees(feed: Feed) -> Samples:
 
 
 def read_signality_referees(feed: Feed) -> Samples:
-    """Those of Signality's halves, whose frames are counted through."""
+    """Iterate over the referees' samples in Signality's halves, whose frames are numbered continuously.
+
+    Args:
+        feed: the files.
+    """
     before = 0
     for path in feed.tracking:
         frames = json.loads(path.read_bytes())
@@ -92,7 +116,13 @@ def read_signality_referees(feed: Feed) -> Samples:
 
 
 def read_team_colours(feed: Feed) -> dict[str, str]:
-    """ "home" and "away" -> "#RRGGBB", "" where the metadata has none."""
+    """Read the teams' shirt colours from the metadata.
+
+    Args:
+        feed: the files.
+    Returns:
+        "home" and "away" -> "#RRGGBB", "" if unknown.
+    """
     found = {"home": "", "away": ""}
     if not feed.meta or feed.meta[0].stat().st_size > _LARGEST:
         return found
@@ -109,6 +139,6 @@ def read_team_colours(feed: Feed) -> dict[str, str]:
 
 
 def _colour(said: str) -> str:
-    """ "#RRGGBB" in capitals, "" where it is no colour."""
+    """Parse a colour to "#RRGGBB" in capitals, "" if it is none."""
     match = _COLOUR.fullmatch(said.strip())
     return f"#{match[1].upper()}" if match else ""

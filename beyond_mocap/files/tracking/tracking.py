@@ -1,6 +1,6 @@
-"""Positional tracking in: the contract's own CSV by itself, providers' files through kloppy, converted to arrays once.
+"""Read positional tracking data: the project's own CSV, and providers' files through kloppy, converted to arrays once.
 
-Inside: metres from the pitch's centre, x along its length, y to the left of +x, seconds.
+In the core: metres from the pitch's centre, x along its length, y to the left of +x, seconds.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from .providers import find_feed, load_tracking
 from .referees import described_referee, read_team_colours, referee_samples
 
 RATES = (5.0, 100.0)
-"""Samples per second that a track may have."""
+"""Smallest and largest sampling rate of a track, samples per second."""
 
 _BALL = ("ball_x_m", "ball_y_m", "ball_z_m")
 _CACHE_VERSION = 3
@@ -44,11 +44,22 @@ _ARRAYS = ("times", "positions", "ball", "players", "pitch", "periods", "teams",
 
 
 def read_track_csv(path: str | os.PathLike) -> Track:
-    """One player and the ball from `time_s,x_m,y_m[,ball_x_m,ball_y_m,ball_z_m]`, others ignored, as the file has it.
+    """Read a player and the ball from `time_s,x_m,y_m[,ball_x_m,ball_y_m,ball_z_m]`, unchanged; other columns are
+    ignored.
 
-    Empty cells (or nan) are unknown. Rows stay in the file's order, repeated times and gaps included:
-    `motion.track.clean` puts that right and tells. InputError, with the line, for missing columns, cells that are no
-    number or beyond 10 km, fewer than two samples with a position, and rates outside 5 to 100 Hz."""
+    Empty cells (or nan) are unknown. Rows keep the file's order, with repeated times and gaps: `motion.track.clean`
+    repairs
+    them and reports it.
+
+    Args:
+        path: the file.
+    Returns:
+        The track.
+    Raises:
+        InputError: with the line, for missing columns, cells that are not numbers or beyond 10 km, fewer than two
+            samples
+            with a position, and rates outside 5 to 100 Hz.
+    """
     rows = list(read_rows(path, ("time_s", "x_m", "y_m")))
     names = rows[0][1] if rows else {}
     player = _cells(rows, ("time_s", "x_m", "y_m"))
@@ -62,7 +73,7 @@ def read_track_csv(path: str | os.PathLike) -> Track:
 
 
 def _cells(rows, names) -> np.ndarray:
-    """(N, k) numbers of some columns, NaN for blank cells."""
+    """Parse some columns to (N, k) numbers, NaN for blank cells."""
     cells = [[number(row[name], name, place, blank=True) for name in names] for place, row in rows]
     return np.array(cells, dtype=float).reshape(len(rows), len(names))
 
@@ -70,7 +81,7 @@ def _cells(rows, names) -> np.ndarray:
 def _check_rate(track: Track, path) -> None:
     known = np.isfinite(track.times) & track.measured
     if len(np.unique(track.times[known])) < 2:
-        found = f"{np.count_nonzero(known)} samples with a time of their own and a position"
+        found = f"{np.count_nonzero(known)} samples with a distinct time and a position"
         raise InputError(path, found, "at least two", "export it again")
     rate = 1.0 / track.interval
     if not RATES[0] - 0.01 <= rate <= RATES[1] + 0.5:
@@ -81,14 +92,19 @@ def read_match(
     path: str | os.PathLike, meta: str | os.PathLike | None = None, provider: str | None = None,
     cache_dir: str | os.PathLike | None = None, pitch: tuple[float, float] | None = None,
 ) -> Match:
-    """A provider's tracking file as arrays; the second time from a cache of them.
+    """Read a provider's tracking data as arrays; a second time from a cache.
 
-    meta: the provider's metadata, for Metrica's CSV the other team's file; where None, a file beside `path` whose name
-    fits is taken, as are further files that a provider has (rosters, other halves). provider: one of
-    `providers.PROVIDERS`; where None, guessed from the content. cache_dir: where arrays are kept, keyed by the content
-    of all files; by default the user's cache folder. pitch: length and width in metres for feeds that have none
-    (Metrica's CSV, Stats Perform), by default 105 x 68. What was guessed is in the match's notes, and all that was put
-    right in its report. InputError where files are missing, not of that form or not of one match, and without kloppy.
+    Args:
+        path: the tracking file.
+        meta: the provider's metadata, for Metrica's CSV the other team's file; None searches beside `path`, also for
+            further files that a provider has (rosters, other halves).
+        provider: key of `providers.PROVIDERS`; None detects it from the content.
+        cache_dir: folder of the cache, keyed by the content of all files; None for the user's cache folder.
+        pitch: length and width in metres for feeds without them (Metrica's CSV, Stats Perform); None for 105 x 68.
+    Returns:
+        The match; its notes list what was assumed, its report all repairs.
+    Raises:
+        InputError: if files are missing, invalid or not of one match, or without kloppy.
     """
     feed, notes = find_feed(path, meta, provider)
     cache = _cache_folder(cache_dir) / f"{_key(feed, pitch)}.npz"
@@ -100,7 +116,7 @@ def read_match(
 
 
 def _read(feed: Feed, pitch: tuple[float, float] | None) -> dict[str, np.ndarray]:
-    """The match's arrays from its files; of a file that ends within a line, those before."""
+    """Read the match's arrays from its files; a file that ends within a line is read up to that line."""
     check_same_match(feed)
     size = pitch or match_arrays.USUAL_PITCH
     try:
@@ -115,12 +131,12 @@ def _read(feed: Feed, pitch: tuple[float, float] | None) -> dict[str, np.ndarray
                 dataset = None
         if dataset is None:
             raise
-    told = "the file ends within a line: all before it is kept"
+    told = "the file ends within a line: it is read up to that line"
     return _arrays(dataset, feed, pitch, [told])
 
 
 def _arrays(dataset, feed: Feed, pitch: tuple[float, float] | None, lines=()) -> dict[str, np.ndarray]:
-    """The match as named arrays, everything that the cache keeps."""
+    """Build the named arrays of a match, which the cache stores."""
     records = match_arrays.records_of(dataset)
     lines = [*lines, *check_rows(feed), *check_periods(records, dataset, feed)]
     players = match_arrays.tracked_players(records)
@@ -147,7 +163,7 @@ def _arrays(dataset, feed: Feed, pitch: tuple[float, float] | None, lines=()) ->
 
 
 def _teams(dataset, feed: Feed) -> list[tuple[str, str, str]]:
-    """Ground, name and colour of the home and the away team."""
+    """List ground, name and colour of the home and the away team."""
     colours = read_team_colours(feed)
     names = {str(team.ground): str(team.name or "") for team in dataset.metadata.teams}
     return [(ground, names.get(ground, ""), colours[ground]) for ground in ("home", "away")]
@@ -155,7 +171,7 @@ def _teams(dataset, feed: Feed) -> list[tuple[str, str, str]]:
 
 def _match(arrays: dict[str, np.ndarray], feed: Feed, notes: list[str]) -> Match:
     length, width, guessed, fps = arrays["pitch"].tolist()
-    notes = [*notes, f"no pitch size in the feed, {length:g} x {width:g} m taken"] if guessed else notes
+    notes = [*notes, f"no pitch size in the feed, {length:g} x {width:g} m assumed"] if guessed else notes
     players = tuple(
         MatchPlayer(id_, team, name, int(shirt), position)
         for id_, team, name, shirt, position in arrays["players"].tolist()
@@ -179,7 +195,7 @@ def _cache_folder(folder: str | os.PathLike | None) -> Path:
 
 
 def _key(feed: Feed, pitch: tuple[float, float] | None) -> str:
-    """Names the arrays of these contents, whatever the files are called."""
+    """Compute a key from the files' contents, independent of their names."""
     digest = hashlib.sha256(f"{_CACHE_VERSION} {feed.provider.name} {pitch}".encode())
     for file in (*feed.tracking, *feed.meta):
         with open(file, "rb") as stream:
@@ -188,11 +204,11 @@ def _key(feed: Feed, pitch: tuple[float, float] | None) -> str:
 
 
 def _cached(cache: Path) -> dict[str, np.ndarray] | None:
-    """The kept arrays; None where there are none, or none that can be read whole."""
+    """Load the arrays from the cache; None if they are missing or damaged."""
     try:
         with np.load(cache, allow_pickle=False) as kept:
             arrays = {name: kept[name] for name in _ARRAYS}
-    except Exception:  # a damaged file can fail in any of zipfile's, zlib's and numpy's own ways
+    except Exception:  # zipfile, zlib and numpy raise many kinds of errors for damaged files
         return None
     count, who = arrays["times"].size, arrays["players"].size // 5
     shapes = {"times": (count,), "positions": (who, count, 2), "ball": (count, 3), "pitch": (4,), "players": (who, 5)}
@@ -201,11 +217,11 @@ def _cached(cache: Path) -> dict[str, np.ndarray] | None:
 
 
 def _keep(cache: Path, arrays: dict[str, np.ndarray], notes: list[str]) -> None:
-    """Writes the cache whole; a folder that cannot be written costs the next run its time, and is told."""
+    """Save the arrays to the cache; if the folder is not writable, add a note."""
     content = io.BytesIO()
     np.savez(content, **arrays)
     try:
         cache.parent.mkdir(parents=True, exist_ok=True)
         atomic_write(cache, content.getvalue())
     except (OSError, InputError):
-        notes.append(f"{cache.parent} cannot be written, so nothing is kept for the next time")
+        notes.append(f"{cache.parent} is not writable, so nothing is cached for the next time")

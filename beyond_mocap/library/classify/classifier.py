@@ -1,6 +1,7 @@
-"""A classifier of acts: what it knows of each (how it looks, how sure that makes, where its moment lies, which words go
-with it), what it proposes for a recording beside what the rules do, and its file: one `.npz` of plain arrays and a
-header in JSON, never pickled, checked when it is read."""
+"""A classifier of acts: for each act its kernel, confidence, key frame and labels; its proposals for a recording,
+combined
+with the rules; and its file: one `.npz` of plain arrays with a JSON header, never pickled, checked when it is read.
+"""
 
 from __future__ import annotations
 
@@ -26,15 +27,15 @@ from .kernel import Kernel, compute_confidence
 from .signals import LENGTH, RATE, STRIKES, Signals, Space, signals, windows
 
 LEAST = 0.2
-"""Moments that are less sure than this are not proposed at all."""
+"""Moments of lower confidence are not proposed."""
 
-_APART = 0.35  # seconds between two moments, whatever they are: of two nearer ones the surer counts
-_SHORTEST = 0.3  # seconds of a stretch
+_APART = 0.35  # seconds between two moments of any acts: of two nearer ones the one of higher confidence counts
+_SHORTEST = 0.3  # least duration of a stretch, seconds
 NEAR = 0.15  # seconds within which a rule's moment and a candidate are the same
 _CANDIDATES_APART = 10  # samples between two candidates
 _STEADY = 9  # samples over which a stretch's score is averaged
-_NOTHING = 0.01  # seconds: leads that are shorter are how somebody sets keys
-_AROUND = 0.12  # seconds around a candidate in which its strike is looked for
+_NOTHING = 0.01  # seconds: shorter leads are within the accuracy of annotation
+_AROUND = 0.12  # seconds around a candidate in which its strike is searched
 
 _FILE_VERSION = 1
 FILE_NAME = "learned_words.npz"
@@ -46,10 +47,20 @@ _NEXT = "learn from annotated clips again"
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Act:
-    """word: what is done; moment: whether it has key moments, else it is a stretch. kernel: its looks; weights (3,): of
-    its confidence (`kernel.compute_confidence`). silent: what counts as the rules' confidence where they say nothing.
-    shown: by how many moments or seconds it was learned. strike: index of STRIKES whose peak tells the key frame, -1
-    for the score's own; lead: seconds from that peak to the key. before, after: seconds of a row around its key."""
+    """What is learned of one act.
+
+    Attributes:
+        word: the act's label.
+        moment: whether it has key moments, else it is a stretch.
+        kernel: similarity of windows to the act.
+        weights: (3,) of its confidence (`kernel.compute_confidence`).
+        silence: the value that replaces the rules' confidence where they propose nothing.
+        example_amount: number of moments, or seconds, that it was learned from.
+        strike: index of STRIKES whose peak gives the key frame, -1 for the score's own peak.
+        lead: seconds from that peak to the key.
+        before, after: seconds of a row around its key.
+        details: the labels beside the act.
+    """
 
     word: str
     moment: bool
@@ -64,13 +75,23 @@ class Act:
     details: Details
 
     def told(self) -> str:
-        """What it is and what it was learned from, for a person."""
+        """Describe the act and what it was learned from."""
         return f"{self.word}: {self.shown:.0f} moments" if self.moment else f"{self.word}: {self.shown:.1f} s"
 
 
 def candidates(kernel: Kernel, rows: np.ndarray, seconds: np.ndarray, ruled: Sequence[Proposal], word: str):
-    """Samples (C,) at which an act may have its moment, and their scores (C,): peaks of the score, and where the rules
-    see one that has no peak near. rows (N, K): windows in their space; seconds (N,) of the samples."""
+    """Find the samples at which an act may have its moment: peaks of the score, and moments of the rules without a peak
+    near.
+
+    Args:
+        kernel: of the act.
+        rows: (N, K) windows in their space.
+        seconds: (N,) of the samples.
+        ruled: what the rules propose, in seconds.
+        word: the act's label.
+    Returns:
+        Samples (C,) and their scores (C,).
+    """
     score = smoothed(kernel.scores(rows))
     at = find_peaks(np.pad(score, 1, constant_values=-9.0), distance=_CANDIDATES_APART)[0] - 1
     for time in rule_moments(ruled, word):
@@ -80,23 +101,23 @@ def candidates(kernel: Kernel, rows: np.ndarray, seconds: np.ndarray, ruled: Seq
 
 
 def smoothed(score: np.ndarray) -> np.ndarray:
-    """(N,) the score without what lasts a single sample."""
+    """Smooth a score (N,) so that single samples do not count."""
     padded = np.pad(score, 1, mode="edge")
     return 0.25 * padded[:-2] + 0.5 * padded[1:-1] + 0.25 * padded[2:]
 
 
 def steady(score: np.ndarray) -> np.ndarray:
-    """(N,) a stretch's score over a third of a second."""
+    """Average a stretch's score (N,) over a third of a second."""
     return uniform_filter1d(score, _STEADY, mode="nearest") if len(score) else score
 
 
 def rule_moments(ruled: Sequence[Proposal], word: str) -> list[float]:
-    """Seconds of the key moments that the rules see of an act; `ruled` has seconds for frames (`in_seconds`)."""
+    """List the seconds of the rules' key moments of an act; `ruled` in seconds (`convert_to_seconds`)."""
     return [one.annotation.key for one in ruled if one.annotation.key is not None and word in one.annotation.words]
 
 
 def rule_at(ruled: Sequence[Proposal], word: str, moment: bool, time: float) -> Proposal | None:
-    """What the rules say of an act at a time in seconds: the surest; None where they say nothing."""
+    """Find the rules' proposal of an act at a time in seconds, of highest confidence; None where there is none."""
     there = [one for one in ruled if word in one.annotation.words and (one.annotation.key is not None) == moment]
     if moment:
         there = [one for one in there if abs(one.annotation.key - time) <= NEAR]
@@ -106,13 +127,13 @@ def rule_at(ruled: Sequence[Proposal], word: str, moment: bool, time: float) -> 
 
 
 def rule_sure(ruled: Sequence[Proposal], word: str, moment: bool, seconds: np.ndarray, silent: float) -> np.ndarray:
-    """(N,) confidence of the rules at each of the times, `silent` where they say nothing."""
+    """Collect the rules' confidences (N,) at each of the times, `silent` where they propose nothing."""
     found = (rule_at(ruled, word, moment, time) for time in seconds)
     return np.array([silent if one is None else one.confidence for one in found])
 
 
 def struck(signals: Signals, strike: int, time: float) -> float:
-    """Seconds of the strike's peak within a few frames of a time; the time itself where there is none."""
+    """Find the second of the strike's peak within a few frames of a time; the time itself where there is none."""
     fps = signals.fps
     first = max(0, int(np.ceil((time - _AROUND) * fps)))
     part = signals.strikes[first : int((time + _AROUND) * fps) + 1, strike]
@@ -122,8 +143,13 @@ def struck(signals: Signals, strike: int, time: float) -> float:
 
 
 def strike_of(signals: Sequence[tuple[Signals, float]]) -> tuple[int, float]:
-    """Which strike peaks most steadily near the key moments of an act (its signals, its second), and the seconds by
-    which the key comes after it; -1 where none is steady to two samples."""
+    """Select the strike that peaks most consistently near the key moments of an act.
+
+    Args:
+        signals: of each key moment its signals and its second.
+    Returns:
+        The strike's index and the seconds from its peak to the key; -1 where none is consistent to two samples.
+    """
     best = (2.0 / RATE, -1, 0.0)
     for strike in range(len(STRIKES)):
         late = np.array([time - struck(one, strike, time) for one, time in signals])
@@ -135,26 +161,41 @@ def strike_of(signals: Sequence[tuple[Signals, float]]) -> tuple[int, float]:
 
 
 def in_space(signals: Signals, space: Space) -> np.ndarray:
-    """(N, K) the windows of signals."""
+    """Project the windows of signals: (N, K)."""
     return space.within(windows(signals))
 
 
 @dataclass(frozen=True, eq=False)
 class Classifier:
-    """space: what windows are reduced to; acts: all that it knows; clips: number of clips that it has learned from."""
+    """A trained classifier.
+
+    Attributes:
+        space: of the windows.
+        acts: all that it knows.
+        clips: number of clips that it has learned from.
+    """
 
     space: Space
     acts: tuple[Act, ...]
     clips: int
 
     def told(self) -> tuple[str, ...]:
-        """What it has learned, a line each, for a person."""
+        """Describe what it has learned, one line each."""
         first = f"learned from {self.clips} {'clip' if self.clips == 1 else 'clips'}"
         return (first, *(act.told() for act in self.acts))
 
     def propose(self, motion: Motion, ruled: Sequence[Proposal]) -> tuple[Proposal, ...]:
-        """What a recording may show, by its first frame. ruled: what the rules say of it; of acts that the classifier
-        knows it decides, the rest of the rules stays. InputError where the skeleton has no legs."""
+        """Propose labels for a recording.
+
+        Args:
+            motion: T frames.
+            ruled: what the rules propose; the classifier decides about acts that it knows, the other rules' proposals
+                stay.
+        Returns:
+            The proposals by their first frame.
+        Raises:
+            InputError: if the skeleton has no legs.
+        """
         seen = signals(motion)
         rows, seconds = in_space(seen, self.space), seen.frames / seen.fps
         told = in_seconds(ruled, seen.fps)
@@ -168,7 +209,7 @@ class Classifier:
 
 
 def in_seconds(ruled: Sequence[Proposal], fps: float, mirrored: bool = False) -> tuple[Proposal, ...]:
-    """Proposals whose rows count seconds instead of frames; of the mirrored body where asked."""
+    """Convert proposals' rows from frames to seconds; of the mirrored body if requested."""
     out = []
     for one in ruled:
         row = one.annotation
@@ -179,7 +220,7 @@ def in_seconds(ruled: Sequence[Proposal], fps: float, mirrored: bool = False) ->
 
 
 def _moments(act: Act, seen: Signals, rows, seconds, told) -> list[Proposal]:
-    """The key moments of one act."""
+    """Propose the key moments of one act."""
     at, score = candidates(act.kernel, rows, seconds, told, act.word)
     sure = compute_confidence(act.weights, score, rule_sure(told, act.word, True, seconds[at], act.silent))
     likely = [(sample, float(how)) for sample, how in zip(at, sure) if how >= LEAST]
@@ -187,17 +228,17 @@ def _moments(act: Act, seen: Signals, rows, seconds, told) -> list[Proposal]:
 
 
 def _moment(act: Act, seen: Signals, rows, seconds, told, sample: int, sure: float) -> Proposal:
-    """One moment: its frame from the strike near the candidate, its words from the windows there."""
+    """Build one moment: its frame from the strike near the candidate, its labels from the windows there."""
     rule = rule_at(told, act.word, True, float(seconds[sample]))
     key = struck(seen, act.strike, float(seconds[sample])) + act.lead
     there = np.clip(np.round(key * RATE).astype(int) + np.arange(-1, 2), 0, len(rows) - 1)
     words = (act.word, *act.details.said(rows[there], rule))
     row = _row(seen, key - act.before, key + act.after, key, words)
-    return Proposal(row, sure, f"looks like it; {rule.why}" if rule else "looks like it", LEARNED)
+    return Proposal(row, sure, f"similar to the examples; {rule.why}" if rule else "similar to the examples", LEARNED)
 
 
 def _stretches(act: Act, seen: Signals, rows, seconds, told) -> list[Proposal]:
-    """The stretches of one act."""
+    """Propose the stretches of one act."""
     score = steady(act.kernel.scores(rows))
     rule = rule_sure(told, act.word, False, seconds, act.silent)
     sure = compute_confidence(act.weights, score, rule)
@@ -208,12 +249,12 @@ def _stretches(act: Act, seen: Signals, rows, seconds, told) -> list[Proposal]:
             said = act.details.said(rows[start:stop], heard)
             words = (act.word, *(word for word in said if word not in LOCOMOTION))
             row = _row(seen, seconds[start], seconds[stop - 1], None, words)
-            out.append(Proposal(row, float(sure[start:stop].mean()), "looks like it", LEARNED))
+            out.append(Proposal(row, float(sure[start:stop].mean()), "similar to the examples", LEARNED))
     return out
 
 
 def _row(seen: Signals, start: float, end: float, key: float | None, words) -> ClipAnnotation:
-    """A row in frames of the recording from seconds, cut to it."""
+    """Build a row in frames of the recording from seconds, cut to it."""
     last = seen.count - 1
     first, final = (int(np.clip(round(time * seen.fps), 0, last)) for time in (start, end))
     frame = None if key is None else int(np.clip(round(key * seen.fps), first, final))
@@ -221,7 +262,7 @@ def _row(seen: Signals, start: float, end: float, key: float | None, words) -> C
 
 
 def _surest(found: list[Proposal], fps: float) -> list[Proposal]:
-    """Of moments that are too near to each other the surest."""
+    """Select, of moments that are too near to each other, the ones of highest confidence."""
     kept: list[Proposal] = []
     for one in sorted(found, key=lambda one: -one.confidence):
         if all(abs(one.annotation.key - other.annotation.key) > _APART * fps for other in kept):
@@ -230,7 +271,7 @@ def _surest(found: list[Proposal], fps: float) -> list[Proposal]:
 
 
 def write_classifier(path: str | os.PathLike, known: Classifier) -> None:
-    """Writes a classifier whole; InputError where it cannot be written."""
+    """Write a classifier to one file, completely or not at all; InputError where it cannot be written."""
     arrays = {"mean": known.space.mean, "scale": known.space.scale, "basis": known.space.basis}
     for number, act in enumerate(known.acts):
         arrays[f"{number}.supports"], arrays[f"{number}.weights"] = act.kernel.supports, act.kernel.weights
@@ -245,11 +286,11 @@ def write_classifier(path: str | os.PathLike, known: Classifier) -> None:
 
 
 def read_classifier(path: str | os.PathLike) -> Classifier:
-    """The classifier in a file; InputError where it is missing, damaged, or of another version."""
+    """Read a classifier; InputError where the file is missing, damaged, or of another version."""
     path = Path(path)
     try:
         if path.stat().st_size > _LARGEST:
-            raise InputError(path, "more than 256 MiB", "a file of learned words", _NEXT)
+            raise InputError(path, "more than 256 MiB", "a file of learned labels", _NEXT)
         with np.load(path, allow_pickle=False) as stored:
             arrays = {name: stored[name] for name in stored.files}
         header = json.loads(arrays["header"].tobytes())
@@ -257,15 +298,15 @@ def read_classifier(path: str | os.PathLike) -> Classifier:
     except InputError:
         raise
     except FileNotFoundError:
-        raise InputError(path, "no such file", "a file of learned words", _NEXT) from None
-    except Exception:  # a damaged file can fail in any of zipfile's, numpy's and json's own ways
-        raise InputError(path, "a file that cannot be read", "a file of learned words", _NEXT) from None
+        raise InputError(path, "no such file", "a file of learned labels", _NEXT) from None
+    except Exception:  # a damaged file can raise any of zipfile's, numpy's and json's exceptions
+        raise InputError(path, "a file that cannot be read", "a file of learned labels", _NEXT) from None
     if version != _FILE_VERSION:
         raise InputError(path, f"version {version!r}", f"version {_FILE_VERSION}", _NEXT)
     try:
         return _restore_classifier(header, arrays)
     except (LookupError, TypeError, ValueError, AttributeError, OverflowError):
-        raise InputError(path, "numbers that do not belong together", "a file of learned words", _NEXT) from None
+        raise InputError(path, "inconsistent or invalid numbers", "a file of learned labels", _NEXT) from None
 
 
 def _describe_act(act: Act) -> dict:
@@ -278,7 +319,7 @@ def _describe_act(act: Act) -> dict:
 
 
 def _restore_classifier(header: dict, arrays: dict) -> Classifier:
-    """ValueError where a shape or number is out of order."""
+    """Restore a classifier from its file's parts; ValueError where a shape or number is invalid."""
     components = arrays["basis"].shape[1]
     mean, scale = _check_array(arrays, "mean", (LENGTH,)), _check_array(arrays, "scale", (LENGTH,))
     space = Space(mean, scale, _check_array(arrays, "basis", (LENGTH, components)))
@@ -289,6 +330,7 @@ def _restore_classifier(header: dict, arrays: dict) -> Classifier:
 
 
 def _restore_act(number: int, header: dict, arrays: dict, components: int) -> Act:
+    """Restore one act; ValueError where a part is invalid."""
     count = len(arrays[f"{number}.weights"])
     if not count or not _check_word(header["word"]):
         raise ValueError("act")

@@ -1,8 +1,10 @@
-"""The words beside an act: its side, height, surface, pace and way, and whatever else somebody has written with it.
+"""The labels beside an act: its side, height, surface, pace and direction, and any other label that annotators used
+with
+it.
 
-Of words that exclude each other one is chosen, or none: the rules' where they speak, unless a linear classifier on the
-moment's window does clearly better on clips that it has not seen. A few examples show few of the ways in which a kick
-can be kicked, and the rules know what those words mean. A group of words that no example uses is not said at all.
+Of labels that exclude each other one is chosen, or none: the rules' where they have one, unless a linear classifier on
+the moment's window is clearly better on clips that it has not seen. A few examples show few of the ways of kicking, and
+the rules know what those labels mean. A group of labels that no example uses is never proposed.
 """
 
 from __future__ import annotations
@@ -16,23 +18,35 @@ from ...annotation.labels import GROUPS, list_labels
 from ..word_sources import Proposal
 
 EXCLUSIVE = tuple(list_labels(group=group) for group in GROUPS)
-"""Words of which an act has one at most; any other word is there or not."""
+"""Groups of labels of which an act has one at most; any other label is present or not."""
 
-_SPREAD, _PENALTY = 9.0, 0.05  # of a window's components; C
-_FOLDS, _BETTER = 5, 0.1  # of the clips; share of the examples by which the classifier has to beat the rules
+_SPREAD, _PENALTY = 9.0, 0.05  # scale of a window's components; C of the logistic regression
+_FOLDS, _BETTER = 5, 0.1  # folds of the clips; share of the examples by which the classifier has to beat the rules
 
 
 @dataclass(frozen=True, eq=False)
 class Details:
-    """choices: for each group its words, "" for none of them. planes: for each group (C, K + 1), scores of its C
-    choices from a window's K components and 1. by_rule: for each group, whether the rules are asked first."""
+    """The learned labels beside an act.
+
+    Attributes:
+        choices: for each group its labels, "" for none of them.
+        planes: for each group (C, K + 1), scores of its C choices from a window's K components and 1.
+        rules_first: for each group, whether the rules have priority.
+    """
 
     choices: tuple[tuple[str, ...], ...]
     planes: tuple[np.ndarray, ...]
     by_rule: tuple[bool, ...]
 
     def said(self, rows: np.ndarray, rule: Proposal | None) -> tuple[str, ...]:
-        """The words for one act that is shown by these windows in their space (N, K); rule: what the rules say."""
+        """Choose the labels for one act.
+
+        Args:
+            rows: (N, K) its windows in their space.
+            rule: what the rules propose; None for nothing.
+        Returns:
+            The labels.
+        """
         mean = _told(rows).mean(axis=0)
         found = []
         for group, plane, asked in zip(self.choices, self.planes, self.by_rule):
@@ -44,8 +58,16 @@ class Details:
 def fit_details(
     rows: np.ndarray, words: Sequence[tuple[str, ...]], ruled: Sequence[Proposal | None], clip: np.ndarray
 ) -> Details:
-    """From windows in their space (N, K), the words beside the act that each shows, what the rules say there, and the
-    number of each one's clip (N,)."""
+    """Fit the labels beside an act.
+
+    Args:
+        rows: (N, K) windows in their space.
+        words: for each window the labels beside the act.
+        ruled: for each window what the rules propose.
+        clip: (N,) number of each window's clip.
+    Returns:
+        The details.
+    """
     told = _told(rows)
     choices, planes, by_rule = [], [], []
     for group in [*EXCLUSIVE, *((word,) for word in _others(words))]:
@@ -60,27 +82,28 @@ def fit_details(
 
 
 def value_of(words: Iterable[str], group: Sequence[str]) -> str:
-    """The first of `words` that is in a group, "" where none is: in "kick right low left" the foot is the right one."""
+    """Find the first of `words` in a group, "" if there is none: in "kick right low left" the foot is the right one."""
     return next((word for word in words if word in group), "")
 
 
 def _whole(kinds: tuple[str, ...]) -> tuple[str, ...]:
-    """All words that exclude those of a group, also those that no example has."""
+    """Find all labels that exclude those of a group, also those that no example has."""
     return next((group for group in EXCLUSIVE if set(group) & set(kinds)), kinds)
 
 
 def _others(words: Sequence[tuple[str, ...]]) -> list[str]:
+    """List the labels outside all groups."""
     known = {word for group in EXCLUSIVE for word in group}
     return sorted({word for one in words for word in one} - known)
 
 
 def _told(rows: np.ndarray) -> np.ndarray:
-    """(N, K + 1) windows, spread, and 1."""
+    """Scale windows and append 1: (N, K + 1)."""
     return np.append(rows * _SPREAD, np.ones((len(rows), 1)), axis=1)
 
 
 def _plane(told: np.ndarray, named: np.ndarray, kinds: tuple[str, ...]) -> np.ndarray:
-    """(C, K + 1) scores of each kind."""
+    """Fit the scores of each kind: (C, K + 1)."""
     from sklearn.linear_model import LogisticRegression
 
     if len(kinds) == 1:
@@ -91,7 +114,7 @@ def _plane(told: np.ndarray, named: np.ndarray, kinds: tuple[str, ...]) -> np.nd
 
 
 def _beaten(told: np.ndarray, named: np.ndarray, heard: np.ndarray, clip: np.ndarray) -> bool:
-    """Whether a plane names examples of clips that it has not seen better than the rules do."""
+    """Whether a plane labels examples of unseen clips better than the rules do."""
     right = []
     for fold in range(_FOLDS):
         out = clip % _FOLDS == fold

@@ -1,13 +1,13 @@
-"""How much a window looks like those of an act, and how sure that makes: a support vector machine with a Gaussian
-kernel, and its score and what the rules say as a probability (Platt 1999, with a prior).
+"""Similarity of a window to those of an act, and its confidence: a support vector machine with a Gaussian kernel, whose
+score is combined with the rules into a probability (Platt 1999, with a prior).
 
-The machine is fitted by scikit-learn; what it found is kept as plain arrays, so that proposing words needs neither the
-package nor its version. Far from everything it has seen a Gaussian kernel says nothing and only the shift would be
-left; there the score sinks to -1 instead, so that motions that it was never shown are not taken for an act.
+The machine is fitted by scikit-learn; its result is stored as plain arrays, so that proposing labels needs neither the
+package nor its version. Far from all training data a Gaussian kernel vanishes and only the shift would remain; there
+the score falls to -1 instead, so that unknown motions are not classified as an act.
 
-A few clips show few kicks, and those of one player only; a logistic curve fitted to them alone would be sure of
-everything. So it starts from a curve that held for other players (`PRIOR`), and the examples move it as far as their
-number allows: the maximum of the posterior under a normal prior. Each sample's target is Platt's, never quite 0 or 1.
+A few clips show few kicks, and those of one player only; a logistic curve fitted to them alone would be overconfident.
+So it starts from a curve that was valid for other players (`PRIOR`), and the examples change it as far as their number
+allows: the maximum of the posterior under a normal prior. Each sample's target is Platt's, never quite 0 or 1.
 """
 
 from __future__ import annotations
@@ -16,23 +16,32 @@ from dataclasses import dataclass
 
 import numpy as np
 
-_WIDTH, _PENALTY = 0.3, 3.0  # gamma times the windows' whole variance; C
+_WIDTH, _PENALTY = 0.3, 3.0  # gamma times the windows' total variance; C
 _AT_ONCE = 2048
-_KNOWN = 0.25  # kernel of the nearest support from which on a window is like what was seen
+_KNOWN = 0.25  # kernel value of the nearest support from which on a window counts as known
 LIMIT = 1.5
-"""Scores are cut off here: beyond it there is only more of the same."""
+"""Scores are clipped at this value: beyond it they carry no information."""
 
 PRIOR = {True: (5.0, 2.5, 1.3), False: (5.0, 0.0, 1.0)}
-"""Weights of score, rule (its confidence; where it is silent minus `weigh_silence`) and 1; of acts that the rules
-know, and of others."""
+"""Weights of score, rule (its confidence; minus `estimate_silence_weight` where it proposes nothing) and 1; for acts
+that the rules know, and for others."""
 
 _PRIOR_SPREAD = np.array([0.7, 0.7, 0.3])
 
 
 @dataclass(frozen=True, eq=False)
 class Kernel:
-    """f(z) = sum_i weights_i k_i + shift with k_i = exp(-gamma |z - supports_i|^2); with m = min(1, max_i k_i / 0.25)
-    the score is m f(z) + m - 1. supports (S, K) float32; weights (S,)."""
+    """A support vector machine with a Gaussian kernel.
+
+    f(z) = sum_i weights_i k_i + shift with k_i = exp(-gamma |z - supports_i|^2); with m = min(1, max_i k_i / 0.25) the
+    score
+    is m f(z) + m - 1.
+
+    Attributes:
+        supports: (S, K) float32.
+        weights: (S,).
+        shift, gamma: see above.
+    """
 
     supports: np.ndarray
     weights: np.ndarray
@@ -40,7 +49,7 @@ class Kernel:
     gamma: float
 
     def scores(self, rows: np.ndarray) -> np.ndarray:
-        """(N,) for windows in their space (N, K), about 1 of the act and -1 of anything else."""
+        """Compute the scores (N,) of windows in their space (N, K), about 1 for the act and -1 for anything else."""
         supports = self.supports.astype(float)
         squares = np.sum(supports**2, axis=1)
         out = []
@@ -54,7 +63,7 @@ class Kernel:
 
 
 def fit_kernel(rows: np.ndarray, is_act: np.ndarray) -> Kernel:
-    """From windows in their space (N, K) and whether each is the act (N,), both kinds weighed alike."""
+    """Fit a kernel to windows in their space (N, K) and whether each is the act (N,), both classes weighted equally."""
     from sklearn.svm import SVC
 
     gamma = _WIDTH / max(float(rows.var(axis=0).sum()), 1e-9)
@@ -64,19 +73,39 @@ def fit_kernel(rows: np.ndarray, is_act: np.ndarray) -> Kernel:
 
 
 def compute_confidence(weights: np.ndarray, score: np.ndarray, rule: np.ndarray) -> np.ndarray:
-    """(N,) probabilities from scores (N,) and the rules' confidences (N,)."""
+    """Compute probabilities (N,) from scores (N,) and the rules' confidences (N,)."""
     told = weights[0] * score + weights[1] * rule + weights[2]
     return 1.0 / (1.0 + np.exp(-np.clip(told, -40.0, 40.0)))
 
 
 def weigh_silence(found: int, shown: int) -> float:
-    """How much it says against an act that the rules see none: 1 where they have found all of the `shown` examples,
-    next to nothing where they have found none. Half of -log of their share of misses, Laplace's estimate."""
+    """Estimate how much it counts against an act that the rules propose none.
+
+    Half of -log of the rules' share of misses, by Laplace's estimate: 1 where they have found all examples, near 0
+    where
+    they have found none.
+
+    Args:
+        found: examples that the rules have found.
+        total: number of examples.
+    Returns:
+        The weight, at most 1.
+    """
     return float(min(1.0, -0.5 * np.log((shown - found + 1.0) / (shown + 2.0))))
 
 
 def fit_confidence(score: np.ndarray, rule: np.ndarray, is_act: np.ndarray, ruled: bool) -> np.ndarray:
-    """(3,) weights from candidates that the scores had not seen: score, rule, whether each is the act (N,)."""
+    """Fit the weights of the confidence to candidates that the scores had not seen.
+
+    Args:
+        score: (N,).
+        rule: (N,) confidence of the rules.
+        is_act: (N,) bool.
+        has_rules: whether the rules know the act.
+    Returns:
+        (3,) weights of score, rule and 1.
+    Source: Platt 1999.
+    """
     from scipy.optimize import minimize
 
     start = np.array(PRIOR[ruled])

@@ -1,8 +1,8 @@
-"""A recording as signals that no longer tell whose body it is: at one rate, in the facing frame, in lengths of a leg;
-and what one moment of them looks like, as one row of numbers.
+"""A recording as signals independent of its body: at one rate, in the heading frame, in leg lengths; and one moment of
+them as a row of numbers.
 
 Positions and velocities of twelve points that every humanoid has, the pelvis's height, speed and turning, and the
-trunk's lean. The mirrored body's signals come from these by exchanging sides, so that one example teaches both.
+trunk's lean. The mirrored body's signals follow by exchanging sides, so that one example teaches both.
 """
 
 from __future__ import annotations
@@ -22,29 +22,36 @@ RATE = 30.0
 """Signals per second."""
 
 MIDDLE, PAIRED = ("chest", "head"), ("hand", "elbow", "knee", "ankle", "toe")
-"""Points by name: those that have no side, and those of which there is a left and a right one."""
+"""Points by name: those without a side, and those with a left and a right one."""
 
-_SMOOTH = 0.015  # seconds: velocities are taken of places smoothed so
-_REACH = 0.12  # seconds by which velocities are weighed, so that they are lengths like the places (`library.features`)
+_SMOOTH = 0.015  # seconds over which positions are smoothed before taking velocities
+_REACH = 0.12  # seconds by which velocities are multiplied, to be lengths like the positions (`library.features`)
 STRIKES = ("foot", "hand", "head", "pelvis up", "pelvis down")
-"""What has a peak at the recording's own rate where something is struck, caught or cleared: the faster foot's and the
-faster hand's speed, the head's forward against the chest, the pelvis's height and its negative."""
+"""Signals with a peak, at the recording's own rate, where something is struck, caught or cleared: the faster foot's and
+the faster hand's speed, the head's forward speed against the chest, the pelvis's height and its negative."""
 
 OFFSETS = np.array([-18, -12, -8, -5, -3, -1, 0, 1, 3, 5, 8, 12, 18])
-"""Samples (1/30 s) around a moment that its window looks at: close ones near it, 0.6 s to both sides."""
+"""Samples (1/30 s) of a window around its moment: dense near it, up to 0.6 s to both sides."""
 
 LENGTH = 13 * 80
-"""Numbers of a window."""
+"""Numbers in a window."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Signals:
-    """What a recording shows.
+    """The signals of a recording.
 
-    fps: the recording's own rate; count: its frames. frames (N,): the fractional frames of N samples at RATE.
-    middle (N, 2, 6), paired (N, 2, 5, 6): of each point (MIDDLE; left and right PAIRED) place against the pelvis and
-    velocity times 0.12 s, x forward, y left, z up, in legs. trunk (N, 8): pelvis's height in legs, its velocity in
-    m/s (forward, left, up), turning in rad/s, the trunk's direction (3). strikes (count, 5): STRIKES in m/s and m."""
+    Attributes:
+        fps: the recording's own rate.
+        count: its frames.
+        frames: (N,) the fractional frames of N samples at RATE.
+        middle: (N, 2, 6) and
+        paired: (N, 2, 5, 6) of each point (MIDDLE; left and right PAIRED) the position relative to the pelvis and the
+            velocity times 0.12 s, x forward, y left, z up, in leg lengths.
+        trunk: (N, 8) pelvis's height in leg lengths, its velocity in m/s (forward, left, up), turning in rad/s, the
+            trunk's direction (3).
+        strikes: (count, 5) STRIKES in m/s and m.
+    """
 
     fps: float
     count: int
@@ -59,14 +66,14 @@ class Signals:
 
     @property
     def mirrored(self) -> "Signals":
-        """The same with left and right exchanged."""
+        """The same signals with left and right exchanged."""
         across, trunk = np.array([1.0, -1.0, 1.0, 1.0, -1.0, 1.0]), np.array([1, 1, -1, 1, -1, 1, -1, 1.0])
         middle, paired = self.middle * across, self.paired[:, ::-1] * across
         return replace(self, middle=middle, paired=paired, trunk=self.trunk * trunk)
 
 
 def signals(motion: Motion) -> Signals:
-    """The signals of a recording; InputError where its skeleton has no legs."""
+    """Build the signals of a recording; InputError where its skeleton has no legs."""
     body, leg = identify(motion.skeleton), leg_length(motion.skeleton)
     places, _ = forward_kinematics(motion)
     facing = np.unwrap(heading_from_positions(motion.skeleton, places))
@@ -90,14 +97,14 @@ def signals(motion: Motion) -> Signals:
 
 
 def _points_of(body: Humanoid, limb) -> list[int]:
-    """Joints of PAIRED on one side; what a body lacks stands where it would hang."""
+    """List the joints of PAIRED on one side; a missing joint is replaced by the one that would carry it."""
     upper = limb.upper_arm if limb.upper_arm is not None else body.chest
     elbow = limb.lower_arm if limb.lower_arm is not None else upper
     return [limb.hand if limb.hand is not None else elbow, elbow, limb.lower_leg, limb.foot, limb.toe_or_foot]
 
 
 def _trunk(motion, body: Humanoid, places, moving, facing, leg: float) -> np.ndarray:
-    """(T, 8) of `Signals.trunk`."""
+    """Compute `Signals.trunk` at the recording's rate: (T, 8)."""
     hips, top = body.hips, body.neck_or_chest
     height = (places[:, hips, 2] - contacts.ground_height(motion)) / leg
     pace = turned_about_up(moving[:, hips], -facing)
@@ -110,7 +117,7 @@ def _trunk(motion, body: Humanoid, places, moving, facing, leg: float) -> np.nda
 
 
 def _strikes(places, moving, body: Humanoid, head: int, facing) -> np.ndarray:
-    """(T, 5) of `Signals.strikes`."""
+    """Compute `Signals.strikes`: (T, 5)."""
     feet = [body.left.toe_or_foot, body.right.toe_or_foot]
     hands = [_points_of(body, limb)[0] for limb in (body.left, body.right)]
     speed = np.linalg.norm(moving[:, [*feet, *hands]], axis=-1).reshape(len(places), 2, 2).max(axis=2)
@@ -120,14 +127,14 @@ def _strikes(places, moving, body: Humanoid, head: int, facing) -> np.ndarray:
 
 
 def _velocity(places: np.ndarray, fps: float) -> np.ndarray:
-    """(T, J, 3) m/s of places (T, J, 3) m."""
+    """Compute the velocity (T, J, 3) m/s of positions (T, J, 3) m."""
     if len(places) < 2:
         return np.zeros_like(places)
     return np.gradient(gaussian_filter1d(places, max(_SMOOTH * fps, 0.5), axis=0, mode="nearest"), axis=0) * fps
 
 
 def windows(signals: Signals) -> np.ndarray:
-    """(N, LENGTH) one row a sample; before the first and after the last sample these are held."""
+    """Build the windows (N, LENGTH), one row a sample; beyond the ends the first and last sample repeat."""
     count = len(signals)
     flat = np.concatenate([part.reshape(count, -1) for part in (signals.middle, signals.paired, signals.trunk)], axis=1)
     around = np.clip(np.arange(count)[:, None] + OFFSETS, 0, count - 1)
@@ -136,7 +143,12 @@ def windows(signals: Signals) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class Space:
-    """Windows reduced to their principal components. mean, scale (LENGTH,): of each; basis (LENGTH, K)."""
+    """Windows reduced to their principal components.
+
+    Attributes:
+        mean, scale: (LENGTH,) of the windows.
+        basis: (LENGTH, K).
+    """
 
     mean: np.ndarray
     scale: np.ndarray
@@ -144,7 +156,7 @@ class Space:
 
     @classmethod
     def of(cls, rows: np.ndarray, components: int) -> "Space":
-        """The space of windows (N, LENGTH), in at most so many components."""
+        """Build the space of windows (N, LENGTH), with at most `components` components."""
         mean, scale = rows.mean(axis=0), np.maximum(rows.std(axis=0), 1e-6)
         unit = (rows - mean) / scale
         _, vectors = np.linalg.eigh(unit.T @ unit)
@@ -152,5 +164,5 @@ class Space:
         return cls(mean, scale, vectors[:, ::-1][:, :kept].astype(np.float32))
 
     def within(self, rows: np.ndarray) -> np.ndarray:
-        """(N, K) windows (N, LENGTH) in it, of unit variance in all."""
+        """Project windows (N, LENGTH) to the space: (N, K), of unit variance in all."""
         return (rows - self.mean) / self.scale @ self.basis / np.sqrt(self.basis.shape[0])

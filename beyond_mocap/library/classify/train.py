@@ -1,7 +1,7 @@
-"""Training: from a few annotated clips to a classifier of the acts that are said in them.
+"""Training: from a few annotated clips to a classifier of their acts.
 
-Every clip counts twice, as it is and mirrored. A clip is taken to be annotated throughout: where no row says an act,
-there is none. How sure a score makes is found from clips that were left out of its training, a fifth at a time.
+Every clip counts twice, as it is and mirrored. A clip is assumed to be annotated throughout: where no row names an act,
+there is none. The confidence of a score comes from clips that were left out of its training, a fifth at a time.
 """
 
 from __future__ import annotations
@@ -21,17 +21,27 @@ from .examples import Example, act_of
 from .kernel import Kernel, compute_confidence, fit_confidence, fit_kernel, weigh_silence
 from .signals import Space, windows
 
-_COMPONENTS, _FOLDS, _MOST = 80, 5, 4000  # of a window; of the clips; windows that are no act, for one act
-_KEY, _GUARD, _EDGE = 0.07, 0.2, 0.1  # seconds: an act's moment; where it is neither; the same of a stretch's ends
-_MARGIN = 0.1  # of F1 by which a stretch has to be told better than by the rules
-_EVERY = 5  # samples between two of a stretch that count for its confidence and words
-_WINDOWS = 60000  # that the space is made from at most: half a gigabyte
+# components of a window; folds of the clips; most windows of each class for one act
+_COMPONENTS, _FOLDS, _MOST = 80, 5, 4000
+# seconds around a key that show the act; around a key, and around a stretch's ends, that count as neither
+_KEY, _GUARD, _EDGE = 0.07, 0.2, 0.1
+_MARGIN = 0.1  # F1 by which a stretch's detection has to be better than the rules'
+_EVERY = 5  # step between the samples of a stretch that are used for its confidence and labels
+_WINDOWS = 60000  # windows from which the space is built, at most: half a gigabyte
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class _Side:
-    """A clip or its mirrored twin. example: the clip; rows (N, K): its windows; seconds (N,); said: its rows' words in
-    `example.rows`' order; ruled: what the rules say, in seconds; twin: whether it is mirrored."""
+    """A clip or its mirrored twin.
+
+    Attributes:
+        example: the clip.
+        rows: (N, K) its windows.
+        seconds: (N,) of the samples.
+        labels: its rows' labels in the order of `example.rows`.
+        rule_proposals: what the rules propose, in seconds.
+        is_mirrored: whether it is mirrored.
+    """
 
     example: Example
     rows: np.ndarray
@@ -42,9 +52,20 @@ class _Side:
 
 
 def trained(examples: Sequence[Example], progress=None, cancelled=None) -> Classifier:
-    """A classifier of all acts that at least two moments or one second of stretches show.
+    """Train a classifier of all acts with at least two moments or one second of stretches.
 
-    progress(fraction, text); cancelled(). The same examples give the same bits. InputError where no act has enough."""
+    The same examples give the same bits.
+
+    Args:
+        examples: annotated clips.
+        progress: called with a fraction and a text.
+        cancelled: called often; True stops the work.
+    Returns:
+        The classifier.
+    Raises:
+        InputError: if no act has enough examples.
+        Cancelled: if `cancelled` returns True.
+    """
     from threadpoolctl import threadpool_limits
 
     from ...base.errors import Cancelled
@@ -52,8 +73,8 @@ def trained(examples: Sequence[Example], progress=None, cancelled=None) -> Class
     wanted = _acts(examples)
     if not wanted:
         found = f"{len(examples)} clips with too few key moments"
-        raise InputError("examples", found, "two moments of an act at least", "annotate more clips, kicks for example")
-    with threadpool_limits(limits=1):  # with more, sums of products come out in another order
+        raise InputError("examples", found, "at least two moments of an act", "annotate more clips, for example kicks")
+    with threadpool_limits(limits=1):  # with more threads, sums of products have another order and other bits
         space = _space(examples)
         sides = [side for one in examples for side in _twins(one, space)]
         acts = []
@@ -66,21 +87,22 @@ def trained(examples: Sequence[Example], progress=None, cancelled=None) -> Class
     kept = tuple(act for act in acts if act is not None)
     if not kept:
         words = ", ".join(word for word, _ in wanted)
-        found = f"only {words}, which the rules find as well or which lies outside its clips"
+        found = f"only {words}, which the rules detect equally well or which lies outside its clips"
         raise InputError("examples", found, "other acts too", "annotate kicks")
     return Classifier(space, kept, len(examples))
 
 
 def _space(examples: Sequence[Example]) -> Space:
-    """The space of the windows of all clips, of evenly spaced ones where they are too many."""
+    """Build the space from the windows of all clips, evenly thinned where they are too many."""
     sides = [side for one in examples for side in (one.signals, one.signals.mirrored)]
     step = max(1, -(-sum(map(len, sides)) // _WINDOWS))
     return Space.of(np.concatenate([windows(side)[::step] for side in sides]), _COMPONENTS)
 
 
 def _acts(examples: Sequence[Example]) -> dict[tuple[str, bool], float]:
-    """(word, whether it has moments) of all acts that are shown often enough, with the number of their moments or the
-    seconds of their stretches."""
+    """Count the acts with enough examples: (label, whether it has moments) -> number of moments or seconds of
+    stretches.
+    """
     found: dict[tuple[str, bool], float] = {}
     for one in examples:
         for row in one.rows:
@@ -91,7 +113,7 @@ def _acts(examples: Sequence[Example]) -> dict[tuple[str, bool], float]:
 
 
 def _twins(example: Example, space: Space) -> list[_Side]:
-    """The clip and its mirrored twin."""
+    """Build the clip and its mirrored twin."""
     words = tuple(row.words for row in example.rows)
     ruled, fps = in_seconds(example.ruled, example.signals.fps), example.seconds()
     other = in_seconds(example.ruled, example.signals.fps, mirrored=True)
@@ -103,7 +125,7 @@ def _twins(example: Example, space: Space) -> list[_Side]:
 
 
 def _act(word: str, moment: bool, sides: list[_Side]) -> Act | None:
-    """One act, learned from all sides of all clips; None of stretches that the rules find better by themselves."""
+    """Train one act from all sides of all clips; None for stretches that the rules detect better on their own."""
     looks = _kernel(word, moment, sides)
     silent = _silent(word, moment, sides)
     score, rule, shown = _unseen(word, moment, sides, silent)
@@ -124,7 +146,7 @@ def _act(word: str, moment: bool, sides: list[_Side]) -> Act | None:
 
 
 def _labels(side: _Side, word: str, moment: bool) -> np.ndarray:
-    """(N,) 1 where a side shows the act, 0 where it does not, -1 where nobody can say."""
+    """Mark samples (N,): 1 where a side shows the act, 0 where it does not, -1 where that is unknown."""
     out, fps = np.zeros(len(side.seconds), int), side.example.signals.fps
     for row in side.example.rows:
         if moment and row.key is not None and word in row.words:
@@ -141,7 +163,7 @@ def _labels(side: _Side, word: str, moment: bool) -> np.ndarray:
 
 
 def _kernel(word: str, moment: bool, sides: list[_Side]) -> Kernel | None:
-    """The looks of an act; None where these sides show none."""
+    """Fit the kernel of an act; None where these sides show none."""
     if not sides:
         return None
     labels = np.concatenate([_labels(side, word, moment) for side in sides])
@@ -153,20 +175,20 @@ def _kernel(word: str, moment: bool, sides: list[_Side]) -> Kernel | None:
 
 
 def _thinned(which: np.ndarray) -> np.ndarray:
-    """Every other one, or as many fewer as leave _MOST."""
+    """Thin samples: every other one, or fewer so that _MOST remain."""
     step = max(2, -(-len(which) // _MOST)) if len(which) > 400 else 1
     return which[::step]
 
 
 def _better(weights: np.ndarray, score: np.ndarray, rule: np.ndarray, shown: np.ndarray) -> bool:
-    """Whether score and rules together tell an act better, by F1, than the rules do alone."""
+    """Whether score and rules together detect an act better, by F1, than the rules alone."""
     ours, theirs = compute_confidence(weights, score, rule) >= 0.5, rule > 0.0
     f1 = [2.0 * np.sum(said & shown) / max(np.sum(said) + np.sum(shown), 1) for said in (ours, theirs)]
     return bool(f1[0] > f1[1] + _MARGIN)
 
 
 def _silent(word: str, moment: bool, sides: list[_Side]) -> float:
-    """What the rules' silence counts for: as much as they have found of the examples."""
+    """Estimate the value of the rules' silence: the more examples they have found, the lower."""
     found = []
     for side in sides:
         for row in side.example.rows_of(word, moment):
@@ -176,7 +198,8 @@ def _silent(word: str, moment: bool, sides: list[_Side]) -> float:
 
 
 def _unseen(word: str, moment: bool, sides: list[_Side], silent: float) -> tuple[np.ndarray, ...]:
-    """Scores, the rules' confidences and the truth (C,) of all candidates, from kernels that never saw their clips."""
+    """Score all candidates with kernels that never saw their clips: scores, the rules' confidences and the truth (C,).
+    """
     names = list(dict.fromkeys(side.example.name for side in sides))
     parts: list[tuple[np.ndarray, ...]] = [(np.zeros(0), np.zeros(0), np.zeros(0, bool))]
     for fold in range(min(_FOLDS, len(names))):
@@ -189,7 +212,7 @@ def _unseen(word: str, moment: bool, sides: list[_Side], silent: float) -> tuple
 
 
 def _seen(looks: Kernel, side: _Side, word: str, moment: bool, silent: float) -> tuple[np.ndarray, ...]:
-    """Scores, the rules' confidences and the truth (C,) of one clip's candidates."""
+    """Score one clip's candidates: scores, the rules' confidences and the truth (C,)."""
     if moment:
         at, score = candidates(looks, side.rows, side.seconds, side.ruled, word)
         fps = side.example.signals.fps
@@ -207,7 +230,7 @@ def _seen(looks: Kernel, side: _Side, word: str, moment: bool, silent: float) ->
 
 
 def _details(word: str, moment: bool, sides: list[_Side]) -> Details:
-    """The words beside the act."""
+    """Collect examples of the labels beside the act and fit them."""
     rows, words, ruled, clips = [], [], [], []
     names = {name: number for number, name in enumerate(dict.fromkeys(side.example.name for side in sides))}
     for side in sides:

@@ -1,1 +1,1 @@
-"""The clean-up of a trial: swaps, jumps, unlabeled markers and gaps (Fredriksson §5.1)."""
+"""Clean a trial: label swaps, jumps, unlabeled markers and gaps (Fredriksson section 5.1)."""

@@ -1,6 +1,6 @@
-"""Which markers tell where another one is: for each marker, some that move with it, and its place in their frame.
+"""Which markers determine where another one is: for each marker its carriers, and its place in their frame.
 
-The clusters of a marker set are often too small for that (Plug-in Gait has two markers on a thigh), so the helpers are
+The clusters of a marker set are often too small for that (Plug-in Gait has two markers on a thigh), so the carriers are
 chosen by what the trial shows: pairs whose distance hardly varies, near ones of the same segment before others.
 """
 
@@ -15,23 +15,28 @@ import numpy as np
 from ..frames import RigidFit, rigid_fit, taken_back
 from .cluster_shape import Shape, distance_spread, mean_shape, median
 
-_MOST_HELPERS = 5
-# helpers must keep their distances from each other to this, m; where too few do, to the next
+_MOST_HELPERS = 5  # carriers of a marker at most
+# metres by which distances between carriers may vary; where too few do, the next value is used
 _TOLERANCES = (0.012, 0.025, 0.05, 0.1)
-_SKIN = 0.01  # the most that markers of one segment move against each other, m
-_FAR = 0.02  # what distance adds to how soft a pair is held to be, metres a metre
-# a frame made of helpers that deviate more than this is not trusted, m, or than this many times the usual
+_SKIN = 0.01  # metres by which markers of one segment move against each other at most
+_FAR = 0.02  # added softness of a pair for its distance, metres per metre
+# a frame whose carriers deviate more than this is not trusted: metres, or multiples of the usual deviation
 _DEFORMED, _TIMES_USUAL = 0.012, 3.0
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Carried:
-    """One marker seen from its helpers, over T frames.
+    """One marker relative to its carriers, over T frames.
 
-    helpers: indices of the markers that carry it, () where none do. shape: theirs. fit: their frame in the world.
-    trusted: (T,) bool, where that frame is sound and its helpers lie as usual. local: (T, 3) m, the marker in that
-    frame, NaN where it is not seen or the frame not trusted. place: (3,) m, its median. sigma: m, how far it usually is
-    from there."""
+    Attributes:
+        carriers: indices of the markers that carry it, () without.
+        shape: the carriers' shape.
+        fit: the carriers' frame in the world.
+        is_trusted: (T,) bool, where that frame is determined and its carriers lie as usual.
+        local: (T, 3) metres, the marker in that frame, NaN where not visible or the frame is not trusted.
+        place: (3,) metres, its median.
+        sigma: metres by which it usually deviates from there.
+    """
 
     helpers: tuple[int, ...]
     shape: Shape | None
@@ -43,23 +48,23 @@ class Carried:
 
     @property
     def away(self) -> np.ndarray:
-        """(T,) m: how far the marker is from where its helpers say; NaN where they cannot."""
+        """Distance (T,) metres of the marker from where its carriers predict it; NaN where they cannot."""
         return np.linalg.norm(self.local - self.place, axis=-1)
 
     @property
     def tolerance(self) -> float:
-        """Metres within which the marker may lie from where its helpers say."""
+        """Metres within which the marker may lie from where its carriers predict it."""
         return max(0.025, 4.0 * self.sigma)
 
     def predicted(self) -> np.ndarray:
-        """(T, 3) m: where the helpers say that the marker is; NaN where they cannot."""
+        """Predict the marker's place from its carriers, (T, 3) metres, world; NaN where they cannot."""
         if not self.helpers:
             return np.full_like(self.local, np.nan)
         world = np.einsum("tij,j->ti", self.fit.rotation, self.place) + self.fit.shift
         return np.where(self.trusted[:, None], world, np.nan)
 
     def brought(self, points: np.ndarray) -> np.ndarray:
-        """Points (T, 3) m of the world in the helpers' frame; NaN where it is not trusted."""
+        """Convert points (T, 3) metres of the world to the carriers' frame; NaN where it is not trusted."""
         if not self.helpers:
             return np.full_like(points, np.nan)
         local = taken_back(self.fit, points[:, None])[:, 0]
@@ -67,8 +72,17 @@ class Carried:
 
 
 def softness(positions: np.ndarray, clusters: Iterable[Sequence[int]] = ()) -> np.ndarray:
-    """(M, M) m: how much each pair's distance varies, a little more for those far apart, which may do so by chance;
-    within one of the `clusters` it counts half, and no more than skin moves: the rest is a fault of the labels."""
+    """Measure how much the distance of each pair of markers varies.
+
+    Distant pairs get a little more, since their distance may be constant by chance. Within one of the clusters it
+    counts half, and no more than skin moves: the rest is a labelling error.
+
+    Args:
+        positions: (T, M, 3) metres.
+        clusters: index lists of markers on one segment.
+    Returns:
+        (M, M) metres.
+    """
     distance, soft = distance_spread(positions)
     soft = soft + _FAR * distance
     for cluster in clusters:
@@ -80,10 +94,18 @@ def softness(positions: np.ndarray, clusters: Iterable[Sequence[int]] = ()) -> n
 def carriers(positions: np.ndarray, soft: np.ndarray, wanted: Iterable[int],
              known: Mapping[int, Carried] = MappingProxyType({}), changed: Iterable[int] = (),
              ask: Callable[[], None] = lambda: None) -> dict[int, Carried]:
-    """Marker -> how it is carried, for `wanted` markers of positions (T, M, 3) m.
+    """Find how markers are carried.
 
-    soft: (M, M) m from `softness`. known: an earlier look, of whose markers a few samples have `changed`: their shapes
-    still hold. ask: called for each marker; it may raise."""
+    Args:
+        positions: (T, M, 3) metres.
+        softness: (M, M) metres of `measure_softness`.
+        markers: the markers.
+        known: an earlier result; its shapes stay valid.
+        changed: markers of which some samples changed since.
+        check_cancelled: called for each marker; it may raise.
+    Returns:
+        Marker -> how it is carried.
+    """
     found, changed = {}, set(changed)
     for marker in wanted:
         ask()
@@ -98,7 +120,16 @@ def carriers(positions: np.ndarray, soft: np.ndarray, wanted: Iterable[int],
 
 
 def carried(positions: np.ndarray, marker: int, helpers: Sequence[int], shape: Shape | None = None) -> Carried:
-    """How these helpers carry this marker over the frames of positions (T, M, 3) m; `shape`: theirs, where known."""
+    """Measure how given carriers carry a marker.
+
+    Args:
+        positions: (T, M, 3) metres.
+        marker: index of the marker.
+        carriers: indices of its carriers.
+        shape: their shape, where known.
+    Returns:
+        The marker relative to its carriers; without carriers if there are fewer than three, or they never see it.
+    """
     frames = len(positions)
     nothing = np.full((frames, 3), np.nan)
     alone = Carried(helpers=(), shape=None, fit=None, trusted=np.zeros(frames, dtype=bool), local=nothing,
@@ -119,9 +150,16 @@ def carried(positions: np.ndarray, marker: int, helpers: Sequence[int], shape: S
 
 
 def helpers_of(marker: int, soft: np.ndarray, positions: np.ndarray, most: int = _MOST_HELPERS) -> tuple[int, ...]:
-    """Up to `most` markers that keep their distances from this one and from each other; () where fewer than three do.
+    """Choose markers that keep their distances from a marker and from each other, and are not on one line.
 
-    They are not on one line. soft: (M, M) m."""
+    Args:
+        marker: index of the marker.
+        softness: (M, M) metres.
+        positions: (T, M, 3) metres.
+        max_count: maximum number.
+    Returns:
+        Indices of the carriers; () where fewer than three qualify.
+    """
     order = [other for other in np.argsort(soft[marker], kind="stable").tolist() if other != marker]
     for tolerance in _TOLERANCES:
         chosen: list[int] = []
@@ -129,7 +167,7 @@ def helpers_of(marker: int, soft: np.ndarray, positions: np.ndarray, most: int =
             if soft[marker, other] > 2.0 * tolerance or len(chosen) == most:
                 break
             if len(chosen) >= 3 and soft[marker, other] > 2.0 * soft[marker, chosen[2]] + 0.002:
-                break  # a far softer one would turn the frame more than it steadies it
+                break  # a much softer one would rotate the frame more than it stabilises it
             if all(soft[other, one] <= tolerance for one in chosen):
                 chosen.append(other)
         if len(chosen) >= 3 and _spans_a_plane(positions[:, chosen]):
@@ -138,7 +176,9 @@ def helpers_of(marker: int, soft: np.ndarray, positions: np.ndarray, most: int =
 
 
 def _spans_a_plane(positions):
-    """Whether the cluster (T, N, 3) is wider than a tenth of its length, in its middle frame that sees all of it."""
+    """Return whether the cluster (T, N, 3) is wider than a tenth of its length, in the middle frame that shows all
+    of it.
+    """
     whole = np.flatnonzero(np.isfinite(positions[..., 0]).all(axis=1))
     if not len(whole):
         return False

@@ -1,8 +1,9 @@
-"""The clean-up of a trial: swaps mended, jumps taken out, unlabeled markers named, gaps filled (Fredriksson §5.1).
+"""Clean a trial: exchange swapped labels back, remove jumps, label unlabeled markers, fill gaps (Fredriksson section
+5.1).
 
-He did this by hand, for four of his seven subjects. Here each marker is seen from the markers that move with it
-(`carriers`), and only what contradicts them clearly is touched; a clean trial comes back as it was. The report says in
-lines for people what was done.
+The source did this by hand, for four of seven subjects. Here each marker is compared with the markers that carry it
+(`carriers`), and only clear contradictions are changed; a clean trial is returned as it was. The report describes what
+was done.
 """
 
 from __future__ import annotations
@@ -21,19 +22,26 @@ from .gaps import Longest, fill
 from .pieces import assign, leaps, take_out, unlabeled
 from .swaps import mend, there_and_back
 
-_STRAYED, _FOR = 1.5, 0.1  # a marker this much farther from its place than its tolerance for this long is told, s
-_NEAR_BREAK = 3  # within so many frames of a leap or a gap
+# A marker is reported whose deviation exceeds so many times its tolerance for so many seconds.
+_STRAYED, _FOR = 1.5, 0.1
+_NEAR_BREAK = 3  # frames from a leap or a gap within which such a stretch must begin or end
 
 
-_MOST_LINES = 6  # where more markers than this have something to tell, one line tells it for all
+_MOST_LINES = 6  # messages of one kind; with more, one message covers all markers
 
 
 @dataclass(frozen=True, kw_only=True)
 class Stretch:
-    """Something that was found between two moments.
+    """A finding between two moments.
 
-    labels: the markers concerned. start, end: seconds on the trial's clock, the first frame and the last. frames: how
-    many. how: what was done, in a word; "" where nothing could be. off: m, how far off its place it was."""
+    Attributes:
+        labels: the markers concerned.
+        start: seconds on the trial's clock, the first frame.
+        end: seconds, the last frame.
+        frames: number of frames.
+        how: what was done, in a word; "" where nothing could be done.
+        off: metres by which the marker was off its place.
+    """
 
     labels: tuple[str, ...]
     start: float
@@ -43,7 +51,7 @@ class Stretch:
     off: float = 0.0
 
     def when(self) -> str:
-        """`at 1.234 s` or `1.234 to 1.300 s`."""
+        """Format the time, as `at 1.234 s` or `1.234 to 1.300 s`."""
         return f"at {self.start:.3f} s" if self.frames == 1 else f"{self.start:.3f} to {self.end:.3f} s"
 
 
@@ -51,10 +59,16 @@ class Stretch:
 class CleanReport:
     """What was found and done.
 
-    seen: label -> share of the frames in which the recording sees it. gaps: what was filled; how is "cluster", "soft"
-    or "spline". left: gaps that stay. swaps: how is "mended" or ""; the labels stand in pairs. jumps: samples taken out
-    (filled again where a gap is). assigned: (unlabeled marker, label). strayed: markers that stay far from where their
-    cluster says. unnamed: unlabeled markers that remain, with the share of frames."""
+    Attributes:
+        seen: label -> share of the frames in which the recording shows it.
+        gaps: filled gaps; `how` is "cluster", "soft" or "spline".
+        left: gaps that stay open.
+        swaps: `how` is "mended" or ""; the labels are in pairs.
+        jumps: samples that were removed (filled again where a gap says so).
+        assigned: (unlabeled marker, label).
+        strayed: markers that stay far from where their carriers predict them.
+        unnamed: unlabeled markers that remain, with their share of frames.
+    """
 
     seen: Mapping[str, float] = field(default_factory=dict)
     gaps: tuple[Stretch, ...] = ()
@@ -67,27 +81,30 @@ class CleanReport:
 
     @property
     def lines(self) -> tuple[str, ...]:
-        """What people should know, the gravest first; each line knows its seconds (`errors.spans_of`)."""
+        """Messages for people, the most serious first; each has its seconds (`errors.line_spans`)."""
         return (*(_swapped(swap) for swap in self.swaps),
-                *(_timed(f"{one.labels[0]} taken for {one.labels[1]} {one.when()}", [one]) for one in self.assigned),
-                *_by_label(self.jumps, "jumping frames taken out"),
-                *_by_label(self.strayed, "frames far from where the markers around it say"),
-                *_by_label(self.left, "frames not seen and left open"),
-                *_summed(self.gaps, "frames not seen and filled"))
+                *(_timed(f"{one.labels[0]} labeled as {one.labels[1]} {one.when()}", [one]) for one in self.assigned),
+                *_by_label(self.jumps, "jumping frames removed"),
+                *_by_label(self.strayed, "frames far from where the surrounding markers place it"),
+                *_by_label(self.left, "occluded frames left open"),
+                *_summed(self.gaps, "occluded frames filled"))
 
     def as_dict(self) -> dict:
-        """The report as plain values, for JSON."""
+        """Return the report as plain values, for JSON."""
         return asdict(self) | {"lines": list(self.lines)}
 
 
 def _swapped(swap):
+    """Describe a swap of labels."""
     pairs = ", ".join(f"{a} and {b}" for a, b in zip(swap.labels[::2], swap.labels[1::2]))
-    done = "exchanged, mended" if swap.how else "seem exchanged, not mended: nothing around them tells"
+    done = "were exchanged, corrected" if swap.how else "seem exchanged, not corrected: no markers around confirm it"
     return _timed(f"{pairs} {done} {swap.when()}", [swap])
 
 
 def _by_label(stretches, what):
-    """One line for each label, and one for all that share all their stretches; one in all where these are many."""
+    """Describe stretches in one message for each label; labels with the same stretches share one, many labels share
+    a summary.
+    """
     own: dict[str, list] = {}
     for stretch in stretches:
         own.setdefault(stretch.labels[0], []).append(stretch)
@@ -106,7 +123,7 @@ def _by_label(stretches, what):
 
 
 def _summed(stretches, what):
-    """One line for all of them: how many frames, of which markers most."""
+    """Describe all stretches in one message: how many frames, and the markers with the most."""
     count: dict[str, int] = {}
     for stretch in stretches:
         count[stretch.labels[0]] = count.get(stretch.labels[0], 0) + stretch.frames
@@ -117,7 +134,7 @@ def _summed(stretches, what):
 
 
 def _named(labels):
-    """`LKNE`, `LKNE and LANK`, or `46 markers (LFHD, RFHD, LBHD, ...)`."""
+    """Format labels, as `LKNE`, `LKNE and LANK`, or `46 markers (LFHD, RFHD, LBHD, ...)`."""
     if len(labels) > 4:
         return f"{len(labels)} markers ({', '.join(labels[:3])}, ...)"
     return " and ".join([", ".join(labels[:-1]), labels[-1]] if len(labels) > 1 else labels)
@@ -129,8 +146,18 @@ def _timed(text, stretches):
 
 @dataclass(frozen=True, kw_only=True)
 class CleanSettings:
-    """What the clean-up does. longest_gap, longest_soft_gap, longest_spline: seconds up to which a gap is filled by
-    markers that carry the missing one firmly, softly, and by a curve alone; 0 fills none that way."""
+    """Options of the clean-up.
+
+    Attributes:
+        swaps: exchange swapped labels back.
+        jumps: remove jumps.
+        assign: label unlabeled markers.
+        longest_gap: seconds up to which a gap is filled by firm carriers; 0 for none.
+        longest_soft_gap: seconds up to which a gap is filled by soft carriers; 0 for none.
+        longest_spline: seconds up to which a gap is filled by a curve alone; 0 for none.
+    Raises:
+        InputError: if a duration is negative or infinite.
+    """
 
     swaps: bool = True
     jumps: bool = True
@@ -147,14 +174,26 @@ class CleanSettings:
 
 
 class Cleaned(NamedTuple):
-    """A cleaned trial (the same labels, without unlabeled markers that were all given away) and what was done."""
+    """A cleaned trial and the report.
+
+    Attributes:
+        trial: the same labels, without unlabeled markers that were all assigned.
+        report: what was found and done.
+    """
 
     trial: MarkerTrial
     report: CleanReport
 
     def for_pose(self, longest: float = 0.08) -> MarkerTrial:
-        """The trial without what was filled softly or by a curve over more than `longest` seconds: good to look at, no
-        evidence for a pose."""
+        """Return the trial for the pose solver, without long uncertain fillings.
+
+        Gaps filled softly or by a curve are good for display, but no evidence for a pose.
+
+        Args:
+            longest: seconds up to which such a filling stays.
+        Returns:
+            The trial.
+        """
         positions = np.array(self.trial.positions)
         for gap in self.report.gaps:
             if gap.how != "cluster" and gap.frames > longest * self.trial.fps:
@@ -165,7 +204,7 @@ class Cleaned(NamedTuple):
 
 @dataclass
 class _Work:
-    """A trial under the clean-up: its places as they are now, and what was found."""
+    """A trial in the clean-up: its present places, and the findings."""
 
     trial: MarkerTrial
     positions: np.ndarray
@@ -177,22 +216,23 @@ class _Work:
     soft: np.ndarray | None = None
 
     def look(self):
-        """See which markers carry which."""
+        """Find which markers carry which."""
         named = [i for i in range(len(self.trial.labels)) if i not in self.nameless and self.seen(i)]
         self.soft = softness(self.positions, self.clusters)
         self.soft[self.nameless], self.soft[:, self.nameless] = np.inf, np.inf
         self.carried = carriers(self.positions, self.soft, named, ask=self.ask)
 
     def look_again(self, changed: Sequence[int]):
-        """See it anew where a few samples of these markers have changed."""
+        """Update the carriers where a few samples of these markers have changed."""
         named = [i for i in self.carried if self.seen(i)]
         self.carried = carriers(self.positions, self.soft, named, known=self.carried, changed=changed, ask=self.ask)
 
     def seen(self, marker):
+        """Return whether a marker is visible in any frame."""
         return np.isfinite(self.positions[:, marker, 0]).any()
 
     def stretch(self, labels, first, end, how="", off=0.0, frames=None):
-        """The stretch of these markers' frames, in seconds."""
+        """Build the stretch of these markers' frames, in seconds."""
         clock = self.trial.start + np.array([first, end - 1]) / self.trial.fps
         names = tuple(self.trial.labels[i] for i in labels)
         return Stretch(labels=names, start=float(clock[0]), end=float(clock[1]), frames=frames or end - first, how=how,
@@ -202,10 +242,21 @@ class _Work:
 def clean(trial: MarkerTrial, clusters: Mapping[str, Sequence[str]] | None = None,
           settings: CleanSettings = CleanSettings(), progress: Callable[[float, str], None] | None = None,
           cancelled: Callable[[], bool] | None = None) -> Cleaned:
-    """A trial without swaps, jumps and the gaps that can be filled, and a report.
+    """Clean a trial: remove swaps and jumps, label unlabeled markers and fill gaps.
 
-    clusters: segment -> labels of its markers, where a marker set is known (labels that the trial lacks are skipped);
-    None: what moves together is found from the trial alone. Raises Cancelled."""
+    Args:
+        trial: the recorded markers.
+        clusters: segment -> labels of its markers, where a marker set is known (labels not in the trial are skipped);
+            None uses the trial alone to find what moves together.
+        settings: the options.
+        progress: called with the share that is done and a text.
+        cancelled: returns True when the user stops the job.
+    Returns:
+        The cleaned trial and the report.
+    Raises:
+        Cancelled: if the user stops the job.
+    Source: Fredriksson section 5.1.
+    """
     clusters = clusters or {}
     known = [label for labels in clusters.values() for label in labels]
     index = {label: i for i, label in enumerate(trial.labels)}
@@ -213,7 +264,7 @@ def clean(trial: MarkerTrial, clusters: Mapping[str, Sequence[str]] | None = Non
                  [[index[label] for label in labels if label in index] for labels in clusters.values()],
                  unlabeled(trial.labels, known), lambda: _go_on(cancelled))
     work.found = {name: () for name in ("swaps", "jumps", "assigned", "strayed", "gaps", "left")}
-    steps = [("who carries whom", _Work.look)]
+    steps = [("finding carriers", _Work.look)]
     steps += [("swaps", _swaps)] if settings.swaps else []
     steps += [("jumps", _jumps)] if settings.jumps else []
     steps += [("unlabeled markers", _names)] if settings.assign and work.nameless else []
@@ -235,6 +286,7 @@ def _go_on(cancelled):
 
 
 def _swaps(work):
+    """Exchange swapped labels back: first pairs that leap twice, then those that deform clusters."""
     work.positions, found = there_and_back(work.positions, work.carried)
     _note_swaps(work, found)
     leaping = leaps(work.positions, work.carried, work.trial.fps)
@@ -253,7 +305,7 @@ def _note_swaps(work, found):
 
 
 def _opposite(work):
-    """Pairs of left and right markers, and for each segment all of its pairs together."""
+    """List pairs of left and right markers, and for each segment all of its pairs together."""
     index = {label: i for i, label in enumerate(work.trial.labels)}
     pairs = {}
     for label, i in index.items():
@@ -281,6 +333,7 @@ def _names(work):
 
 
 def _gaps(work, settings):
+    """Report markers that stray, fill the gaps, and record which are filled and which stay open."""
     longest = Longest(settings.longest_gap, settings.longest_soft_gap, settings.longest_spline)
     work.found["strayed"] = tuple(_strayed(work))
     work.positions, found = fill(work.positions, work.soft, work.trial.fps, longest=longest, known=work.carried,
@@ -292,8 +345,10 @@ def _gaps(work, settings):
 
 
 def _strayed(work):
-    """Markers that lie far from where their helpers say after a leap or a gap, or until one: put on anew, or labelled
-    wrongly. Where they go smoothly it is the body that moves."""
+    """Find markers far from where their carriers predict them, after or until a leap or a gap.
+
+    They were attached again, or labeled wrongly. A marker that goes there smoothly follows the body.
+    """
     leaping = leaps(work.positions, work.carried, work.trial.fps)
     broken = np.pad(leaping | np.isnan(work.positions[..., 0]), ((_NEAR_BREAK, _NEAR_BREAK), (0, 0)))
     for marker, one in work.carried.items():
@@ -307,7 +362,7 @@ def _strayed(work):
 
 
 def _told(work):
-    """The cleaned trial and its report."""
+    """Build the cleaned trial and its report."""
     trial, seen = work.trial, work.trial.seen
     share = {label: float(seen[:, i].mean()) if len(trial) else 0.0 for i, label in enumerate(trial.labels)}
     keeps = [i for i in range(len(trial.labels)) if i not in work.nameless or work.seen(i)]

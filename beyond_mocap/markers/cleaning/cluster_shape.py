@@ -1,7 +1,8 @@
-"""The shape of a cluster of markers over a whole trial, how much it deforms, and which markers are clusters at all;
-with the medians and quantiles that leave out NaN, for many markers at once.
+"""The shape of a cluster of markers over a whole trial, its deformation, and the variation of distances between
+markers.
 
-numpy's own (`nanmedian`, `nanpercentile`) go through Python for each column: a hundred times as slow on trials.
+Also medians and quantiles that ignore NaN, for many markers at once: numpy's own (`nanmedian`, `nanpercentile`) go
+through Python for each column and are a hundred times as slow on trials.
 """
 
 from __future__ import annotations
@@ -12,16 +13,19 @@ import numpy as np
 
 from ..frames import placed, rigid_fit, taken_back
 
-_ROUNDS = 3
-_MOST_FRAMES = 100
+_ROUNDS = 3  # iterations of shape and weights
+_MOST_FRAMES = 100  # frames of a trial that are used
 
 
 class Shape(NamedTuple):
-    """What stays of a cluster when its movement is taken away.
+    """The shape of a cluster without its movement.
 
-    places: (N, 3) m in the cluster's own frame (about its middle, turned as in the frame it was begun with), NaN for a
-    marker that is never seen with the others. sigma: (N,) m, how far each marker usually is from its place (robust root
-    mean square). usual: m, the median over frames of the deformation (the fit's rms)."""
+    Attributes:
+        places: (N, 3) metres in the cluster's own frame (about its middle, rotated as in the frame it started from),
+            NaN for a marker that is never visible together with the others.
+        sigma: (N,) metres by which each marker usually deviates from its place (robust root mean square).
+        usual_deformation: metres, the median over frames of the fit's rms.
+    """
 
     places: np.ndarray
     sigma: np.ndarray
@@ -29,10 +33,16 @@ class Shape(NamedTuple):
 
 
 def mean_shape(positions: np.ndarray) -> Shape:
-    """The robust mean shape of one cluster (T, N, 3) m, unseen markers NaN: generalized Procrustes.
+    """Compute the robust mean shape of one cluster: generalized Procrustes analysis.
 
-    Every frame is laid on the shape by its best rigid motion, and the shape becomes the mean of what lies there; frames
-    and samples far off (swaps, ghosts) count ever less (Geman-McClure weights at three times the usual distance)."""
+    Every frame is fitted to the shape by a rigid motion, and the shape becomes the mean of the fitted frames. Frames
+    and samples far off (swaps, ghosts) get ever less weight (Geman-McClure weights at three times the usual distance).
+
+    Args:
+        positions: (T, N, 3) metres, NaN where not visible.
+    Returns:
+        The shape.
+    """
     positions = np.asarray(positions, dtype=float)
     chosen = positions[_spread_frames(np.isfinite(positions[..., 0]).sum(axis=1))]
     places = chosen[_middle_frame(chosen)]
@@ -43,6 +53,7 @@ def mean_shape(positions: np.ndarray) -> Shape:
         fit = rigid_fit(places, chosen, weights)
         back = taken_back(fit, chosen)
         away = np.linalg.norm(back - places, axis=-1)
+        # Geman-McClure weights; a marker without a place in the shape yet gets a tiny one, to enter it
         scale = 3.0 * max(median(away), 1e-4)
         weights = np.where(np.isfinite(away), 1.0 / (1.0 + (away / scale) ** 2) ** 2, np.isfinite(back[..., 0]) * 1e-3)
         weights = np.where(fit.sound[:, None], weights, 0.0)
@@ -55,10 +66,17 @@ def mean_shape(positions: np.ndarray) -> Shape:
 
 
 def distance_spread(positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(median distance, how much it varies, as a standard deviation) of each pair of markers (T, M, 3): (M, M) m each.
+    """Measure the median distance of each pair of markers, and how much it varies.
 
-    From the range that holds nine tenths of the frames, so that short swaps and ghosts count nothing; pairs hardly ever
-    seen together: inf; the diagonal: 0."""
+    The spread is computed from the range that contains nine tenths of the frames, so that short swaps and ghosts have
+    no effect.
+
+    Args:
+        positions: (T, M, 3) metres.
+    Returns:
+        Median distances (M, M) metres, and spreads (M, M) metres as standard deviations: inf for pairs that are hardly
+        ever visible together, 0 on the diagonal.
+    """
     seen = np.isfinite(positions[..., 0])
     chosen = positions[_spread_frames(seen.sum(axis=1))]
     count = chosen.shape[1]
@@ -67,6 +85,7 @@ def distance_spread(positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         distance = np.linalg.norm(chosen - chosen[:, marker : marker + 1], axis=-1)
         together = np.isfinite(distance).sum(axis=0) >= min(10, len(chosen))
         low, half, high = (quantile(distance[:, together], share) for share in (0.05, 0.5, 0.95))
+        # 90 % of a normal distribution lie within 3.29 standard deviations
         spread[marker, together] = (high - low) / 3.29
         middle[marker, together] = half
     spread = np.fmin(spread, spread.T)
@@ -75,7 +94,7 @@ def distance_spread(positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _spread_frames(seen_count):
-    """At most some hundred frames evenly over the trial, of those that see the most markers."""
+    """Select at most a hundred frames evenly over the trial, of those that show the most markers."""
     full = np.flatnonzero(seen_count >= max(3, 0.8 * seen_count.max(initial=0)))
     if not len(full):
         full = np.arange(len(seen_count))
@@ -83,7 +102,7 @@ def _spread_frames(seen_count):
 
 
 def _middle_frame(positions):
-    """The frame whose distances between markers lie nearest to their medians over the trial."""
+    """Find the frame whose distances between markers lie nearest to their medians over the trial."""
     distance = np.linalg.norm(positions[:, :, None] - positions[:, None], axis=-1)
     away = np.abs(distance - medians(distance))
     missing = np.isnan(away).sum(axis=(1, 2))
@@ -91,8 +110,15 @@ def _middle_frame(positions):
 
 
 def quantile(values: np.ndarray, share: float, axis: int = 0) -> np.ndarray:
-    """The value that `share` (0 to 1) of what is there along `axis` stays below, straight between samples; NaN where
-    nothing is."""
+    """Compute quantiles that ignore NaN, with linear interpolation.
+
+    Args:
+        values: the values.
+        share: 0 to 1.
+        axis: along which the quantile is taken.
+    Returns:
+        The quantiles; NaN where all values are NaN.
+    """
     ordered = np.moveaxis(np.sort(values, axis=axis), axis, 0)  # NaN comes last
     if not len(ordered):
         return np.full(ordered.shape[1:], np.nan)
@@ -104,10 +130,10 @@ def quantile(values: np.ndarray, share: float, axis: int = 0) -> np.ndarray:
 
 
 def medians(values: np.ndarray, axis: int = 0) -> np.ndarray:
-    """The median of what is there along `axis`; 0 where nothing is."""
+    """Compute the median along `axis`, ignoring NaN; 0 where all values are NaN."""
     return np.nan_to_num(quantile(values, 0.5, axis))
 
 
 def median(values: np.ndarray) -> float:
-    """The median of all that is there; 0 where nothing is."""
+    """Compute the median of all values, ignoring NaN; 0 where all are NaN."""
     return float(medians(np.ravel(values)))

@@ -1,4 +1,6 @@
-"""Gaps filled: by the markers that carry the missing one, and by a smooth curve where none do and the gap is short."""
+"""Fill gaps: by the markers that carry the missing one, or by a smooth curve where there are none and the gap is
+short.
+"""
 
 from __future__ import annotations
 
@@ -12,18 +14,24 @@ from ...base.time_series import runs
 from .carriers import Carried, carried, helpers_of
 from .cluster_shape import Shape, mean_shape, quantile
 
-# a marker that strays this far from its place among its helpers rides on them softly, m: as a rule; in a twentieth of
-# the frames
+# Metres by which a marker deviates from its place among its carriers, from which on they carry it softly: the usual
+# deviation, and its 95 % quantile.
 _SOFT, _SOFT_AT_TIMES = 0.015, 0.03
-_EDGE = 0.03  # over how much time the slope at a gap's edge is read, s
-_NEAR, _TRIES = 0.02, 24  # a curve is taken if over stretches as long it would have been this near, m; tried on so many
+_EDGE = 0.03  # s over which the slope at a gap's edge is measured
+# A curve is used if it deviates by at most so many metres over other stretches of that length; so many are tried.
+_NEAR, _TRIES = 0.02, 24
 
 
 class Gap(NamedTuple):
-    """A stretch of one marker without sight: frames from `first` up to, not with, `end`; `how` it was filled.
+    """A stretch in which one marker is not visible.
 
-    how: "cluster" (it rides on markers that move with it), "soft" (on markers that it moves against a little), "spline"
-    (a smooth curve), or "" (not filled)."""
+    Attributes:
+        marker: index of the marker.
+        first: first frame.
+        end: the frame after the last.
+        how: "cluster" (filled by markers that move with it), "soft" (by markers that it moves against a little),
+            "spline" (by a smooth curve), or "" (not filled).
+    """
 
     marker: int
     first: int
@@ -32,12 +40,18 @@ class Gap(NamedTuple):
 
     @property
     def frames(self) -> int:
-        """How many."""
+        """Number of frames."""
         return self.end - self.first
 
 
 class Longest(NamedTuple):
-    """The longest gap that is filled in each way, seconds."""
+    """The longest gap that is filled by each method, in seconds.
+
+    Attributes:
+        cluster: by firm carriers.
+        soft: by soft carriers.
+        spline: by a curve.
+    """
 
     cluster: float = 2.0
     soft: float = 0.25
@@ -45,7 +59,14 @@ class Longest(NamedTuple):
 
 
 def gaps_of(positions: np.ndarray, markers: Iterable[int]) -> list[Gap]:
-    """The gaps of these markers of positions (T, M, 3) m, of those that are seen at all; by marker and time."""
+    """Find the gaps of markers that are visible at all.
+
+    Args:
+        positions: (T, M, 3) metres.
+        markers: indices of the markers.
+    Returns:
+        The gaps, by marker and time.
+    """
     seen = np.isfinite(positions[..., 0])
     return [Gap(marker, first, end, "") for marker in markers if seen[:, marker].any()
             for first, end in runs(~seen[:, marker])]
@@ -53,11 +74,20 @@ def gaps_of(positions: np.ndarray, markers: Iterable[int]) -> list[Gap]:
 
 def fill(positions: np.ndarray, soft: np.ndarray, fps: float, longest: Longest, known: Mapping[int, Carried],
          ask: Callable[[], None] = lambda: None) -> tuple[np.ndarray, list[Gap]]:
-    """(positions (T, M, 3) m with gaps filled, the gaps and how): nothing that was seen is moved, and nothing jumps.
+    """Fill gaps; no visible marker is moved, and no trajectory jumps.
 
-    soft: (M, M) m, how much each pair's distance varies. known: the markers whose gaps are filled, and what carries
-    them as a rule. ask: called for each gap; it may raise. Every gap is filled from what was seen alone, never from
-    another gap's filling."""
+    Every gap is filled from visible markers alone, never from another gap's filling.
+
+    Args:
+        positions: (T, M, 3) metres.
+        softness: (M, M) metres, how much each pair's distance varies.
+        fps: frames per second.
+        limits: the longest gaps that are filled.
+        known: the markers whose gaps are filled, and how they are usually carried.
+        check_cancelled: called for each gap; it may raise.
+    Returns:
+        The filled positions, and the gaps with the method used.
+    """
     out, told = positions.copy(), []
     shapes: dict[tuple[int, ...], Shape] = {one.helpers: one.shape for one in known.values() if one.helpers}
     for gap in gaps_of(positions, known):
@@ -72,7 +102,9 @@ def fill(positions: np.ndarray, soft: np.ndarray, fps: float, longest: Longest, 
 
 
 def _carried_over(positions, gap, soft, one, shapes):
-    """How the gap's marker is carried by markers seen all through the gap and at its edges; None where it is not."""
+    """Measure how the gap's marker is carried by markers visible throughout the gap and at its edges; None if it is
+    not.
+    """
     low, high = max(gap.first - 1, 0), min(gap.end + 1, len(positions))
     there = np.isfinite(positions[low:high, :, 0]).all(axis=0)
     there[gap.marker] = False
@@ -82,7 +114,7 @@ def _carried_over(positions, gap, soft, one, shapes):
 
 
 def _firmly(one, gap, longest):
-    """("cluster", path (n, 3)) of a marker that keeps its place among those that carry it, or None."""
+    """Fill by firm carriers: ("cluster", path (n, 3)), or None."""
     if one is None or gap.frames > longest or one.sigma > _SOFT or quantile(one.away, 0.95) > _SOFT_AT_TIMES:
         return None
     begins, ends = gap.first > 0, gap.end < len(one.local)
@@ -95,8 +127,11 @@ def _firmly(one, gap, longest):
 
 
 def _by_a_curve(positions, one, gap, fps, longest):
-    """("soft", path) or ("spline", path) of a short gap: among its helpers, or in the world, whichever would have been
-    the nearer elsewhere in the trial; None where neither would have been near."""
+    """Fill a short gap by a curve: ("soft", path) or ("spline", path), or None.
+
+    Of the carriers' frame and the world, the one is used in which the curve deviates less elsewhere in the trial; None
+    where both deviate too much.
+    """
     ways = []
     if one is not None and gap.frames <= longest.soft * fps:
         ways.append(("soft", one.local))
@@ -111,11 +146,11 @@ def _by_a_curve(positions, one, gap, fps, longest):
 
 
 def _expected(way, frames, fps):
-    """How far a curve over `frames` is off a way (T, 3) where it is seen, m: what nine in ten of some stretches keep
-    to."""
+    """Estimate the error in metres of a curve over `frames`: the 90 % quantile over some visible stretches."""
     seen = np.concatenate([[0], np.cumsum(np.isfinite(way[:, 0]))])
     edge = max(4, int(round(_EDGE * fps)) + 1)
     starts = np.arange(edge, len(way) - frames - edge)
+    # stretches of which all frames and both edges are visible, by differences of the cumulative count
     starts = starts[seen[starts + frames + edge] - seen[starts - edge] == frames + 2 * edge] if len(starts) else starts
     if len(starts) < 3:
         return np.inf
@@ -127,13 +162,13 @@ def _expected(way, frames, fps):
 
 
 def _in_the_world(one, gap, local):
-    """Places (n, 3) m among the helpers, in the world, over the frames of a gap."""
+    """Convert places (n, 3) metres in the carriers' frame to the world, over the frames of a gap."""
     turn, shift = one.fit.rotation[gap.first : gap.end], one.fit.shift[gap.first : gap.end]
     return np.einsum("tij,tj->ti", turn, local) + shift
 
 
 def _others(positions, gap, soft, there, shapes):
-    """How the marker of a gap is carried by markers that are `there` (M,) all through it."""
+    """Measure how the marker of a gap is carried by markers that are visible (M,) throughout."""
     reachable = np.where(there[None, :] & there[:, None], soft, np.inf)
     reachable[gap.marker] = np.where(there, soft[gap.marker], np.inf)
     helpers = helpers_of(gap.marker, reachable, positions)
@@ -143,8 +178,16 @@ def _others(positions, gap, soft, there, shapes):
 
 
 def bridge(way: np.ndarray, first: int, end: int, fps: float) -> np.ndarray | None:
-    """The cubic curve (end - first, 3) m over the frames `first` to `end` of a way (T, 3) m, with the slopes that the
-    way has on either side; None where it is not seen there."""
+    """Build a cubic curve across frames, with the slopes of the trajectory on either side.
+
+    Args:
+        trajectory: (T, 3) metres.
+        first: first frame of the gap.
+        end: the frame after the gap.
+        fps: frames per second.
+    Returns:
+        (end - first, 3) metres; None where the trajectory is not visible on both sides.
+    """
     if first == 0 or end == len(way):
         return None
     before, after = _edge(way[:first][::-1], fps), _edge(way[end:], fps)
@@ -156,7 +199,8 @@ def bridge(way: np.ndarray, first: int, end: int, fps: float) -> np.ndarray | No
 
 
 def _edge(way, fps):
-    """The slope (3,) m a frame with which a way sets out from its first frame, by a parabola; None where it is short.
+    """Measure the slope (3,) metres per frame at the first frame of a trajectory, by a parabola; None where it is
+    too short.
     """
     count = min(len(way), max(4, int(round(_EDGE * fps)) + 1))
     there = np.flatnonzero(np.isnan(way[:count, 0]))

@@ -1,5 +1,7 @@
-"""Pieces of a marker's trajectory, cut where it is not seen and where it leaps as no body does: those that jump
-(ghosts, reflections) are taken out, and those of unlabeled markers get the label that is missing where they are."""
+"""Pieces of a marker's trajectory, cut where it is not visible and where it leaps as no body does.
+
+Pieces that jump (ghosts, reflections) are removed, and those of unlabeled markers get the label that is missing there.
+"""
 
 from __future__ import annotations
 
@@ -13,32 +15,38 @@ from .carriers import Carried
 from .cluster_shape import quantile
 from .gaps import bridge
 
-# a step that bends the way by more than this is a leap, m, if it is also more than what a limb can do in a frame, m/s^2
-# (as its helpers see it, and in the world), and this many times what the marker does in all but a twentieth of the
-# frames
+# A step that bends the trajectory by more than this is a leap, in metres, if it is also more than what a limb can do in
+# a frame, in m/s^2 (in the carriers' frame, and in the world), and this many times the marker's own 95 % quantile.
 _LEAP_LOCAL, _LEAP_WORLD, _TIMES_ITS_OWN = 0.02, 0.04, 6.0
 _LEAP_SWING_LOCAL, _LEAP_SWING_WORLD = 200.0, 500.0
 
-_BURST = 0.08  # the longest burst that is taken out as a jump, s
-# how far off its way a burst lies at least, m, and as a part of what the marker moves meanwhile
+_BURST = 0.08  # s, the longest burst that is removed as a jump
+# how far off its trajectory a burst lies at least, in metres and as a share of the marker's movement meanwhile
 _LEAST_BURST, _LEAST_SHARE = 0.015, 0.3
-_GHOST = 0.06  # a longer stretch is a ghost if it lies at least this far from where its helpers say, m
-# a single sample is off if it leaves the way by this much, m (as its helpers see it; in the world), by more than limbs
-# can do in a frame, m/s^2, and by this many times what nine tenths of the samples around it do
+_GHOST = 0.06  # metres from where the carriers predict the marker, from which on a longer stretch is a ghost
+# A single sample is off if it leaves the trajectory by this many metres (in the carriers' frame, in the world), by more
+# than limbs can do in a frame, in m/s^2, and by this many times the 90 % quantile of the samples around it.
 _OFF_LOCAL, _OFF_WORLD, _TIMES = 0.006, 0.015, 3.0
 _SWING_LOCAL, _SWING_WORLD = 100.0, 300.0
-_AROUND = 12
-_ITS_OWN = 0.5  # a marker that only seems to jump because one of its helpers does stays on its own way in the world
+_AROUND = 12  # frames before and after that count as around
+# Share of a jump in the carriers' frame that must also show in the world; else it is a carrier that jumps.
+_ITS_OWN = 0.5
 
-_SHORTEST = 0.02  # a piece this short tells nothing, s
-# how near a piece must begin to where the label was last seen, and end to where it is seen again, if no cluster tells,
-# m; and how long before or after that may be, s
+_SHORTEST = 0.02  # s, shorter pieces are not assigned
+# Without carriers: distance in metres between the ends of a piece and the label's trajectory, and the gap between them
+# in seconds, at most.
 _JOINS, _WITHIN = 0.02, 0.05
-_AGREES = 0.01  # where label and unlabeled are both seen they must agree to this, m
+_AGREES = 0.01  # metres by which label and unlabeled marker may differ where both are visible
 
 
 class Piece(NamedTuple):
-    """An unbroken stretch of one marker: frames from `first` up to, not with, `end`."""
+    """An unbroken stretch of one marker.
+
+    Attributes:
+        marker: index of the marker.
+        first: first frame.
+        end: the frame after the last.
+    """
 
     marker: int
     first: int
@@ -46,9 +54,17 @@ class Piece(NamedTuple):
 
 
 def leaps(positions: np.ndarray, carried: Mapping[int, Carried], fps: float) -> np.ndarray:
-    """(T, M) bool: between which frames markers (T, M, 3) m leap; True at the frame after.
+    """Detect the frames at which markers leap.
 
-    By how the way in the world bends, and how it does as the marker's helpers see it."""
+    The bend of the trajectory is tested in the world, and in the frame of the marker's carriers.
+
+    Args:
+        positions: (T, M, 3) metres.
+        carried: marker -> how it is carried.
+        fps: frames per second.
+    Returns:
+        (T, M) bool, True at the frame after the leap.
+    """
     out = _leaping(positions, max(_LEAP_WORLD, _LEAP_SWING_WORLD / fps**2))
     local = max(_LEAP_LOCAL, _LEAP_SWING_LOCAL / fps**2)
     for marker, one in carried.items():
@@ -61,11 +77,19 @@ def leaps(positions: np.ndarray, carried: Mapping[int, Carried], fps: float) -> 
 
 
 def pieces(positions: np.ndarray, leaping: np.ndarray) -> list[Piece]:
-    """All pieces of markers (T, M, 3) m, cut where they leap (T, M); by marker, then by time."""
+    """Split the trajectories of markers into pieces.
+
+    Args:
+        positions: (T, M, 3) metres.
+        leaping: (T, M) bool of `detect_leaps`.
+    Returns:
+        All pieces, by marker, then by time.
+    """
     seen = np.isfinite(positions[..., 0])
     found = []
     for marker in range(positions.shape[1]):
         there = np.concatenate([[False], seen[:, marker], [False]])
+        # a piece begins after a frame without sight or at a leap, and ends before one
         begins = there[1:-1] & (~there[:-2] | leaping[:, marker])
         firsts = np.flatnonzero(begins)
         ends = np.flatnonzero(there[1:-1] & (~there[2:] | np.append(leaping[1:, marker], False))) + 1
@@ -74,12 +98,18 @@ def pieces(positions: np.ndarray, leaping: np.ndarray) -> list[Piece]:
 
 
 def bend(places: np.ndarray) -> np.ndarray:
-    """(T, ...) m: how much the step into each frame differs from the two before and the two after, the least of them.
+    """Measure how much the step into each frame differs from the two before and the two after: the smallest difference.
 
-    A leap differs from them all; what comes after a leap, or lies between two, does not. places: (T, ..., 3) m; NaN
-    where there is nothing to compare with."""
+    A leap differs from them all; a frame after a leap, or between two, does not.
+
+    Args:
+        places: (T, ..., 3) metres.
+    Returns:
+        (T, ...) metres; NaN where there is nothing to compare with.
+    """
     steps = np.diff(places, axis=0)
     least = np.full(places.shape[:-1], np.inf)
+    # step k is compared with steps k - apart and k + apart; frame k + 1 is the end of step k
     for apart in (1, 2):
         off = np.linalg.norm(steps[apart:] - steps[:-apart], axis=-1)
         off = np.where(np.isnan(off), np.inf, off)
@@ -90,14 +120,23 @@ def bend(places: np.ndarray) -> np.ndarray:
 
 
 def _leaping(places, least):
-    """(T, N) bool for places (T, N, 3) m."""
+    """Return which of places (T, N, 3) metres bend by more than `least` metres and the marker's own usual: (T, N)
+    bool.
+    """
     bent = bend(places)
     own = np.nan_to_num(quantile(bent, 0.95))
     return np.nan_to_num(bent) > np.maximum(least, _TIMES_ITS_OWN * own)
 
 
 class Jump(NamedTuple):
-    """Samples of one marker that were taken out: frames from `first` up to, not with, `end`; `off` m from its way."""
+    """Samples of one marker that were removed.
+
+    Attributes:
+        marker: index of the marker.
+        first: first frame.
+        end: the frame after the last.
+        off: metres from its trajectory.
+    """
 
     marker: int
     first: int
@@ -106,7 +145,15 @@ class Jump(NamedTuple):
 
 
 def take_out(positions: np.ndarray, carried: Mapping[int, Carried], fps: float) -> tuple[np.ndarray, list[Jump]]:
-    """(positions (T, M, 3) m without the samples that jump, which become NaN, the jumps)."""
+    """Remove samples that jump.
+
+    Args:
+        positions: (T, M, 3) metres.
+        carried: marker -> how it is carried.
+        fps: frames per second.
+    Returns:
+        The positions with NaN for removed samples, and the jumps.
+    """
     out, found = positions.copy(), []
     for jump in [*_bursts(positions, carried, fps), *_ghosts(positions, carried, fps)]:
         out[jump.first : jump.end, jump.marker] = np.nan
@@ -118,11 +165,11 @@ def take_out(positions: np.ndarray, carried: Mapping[int, Carried], fps: float) 
 
 
 def _bursts(positions, carried, fps):
-    """Short pieces between leaps (or a leap and a gap) that lie off the way before and after them."""
+    """Find short pieces between leaps (or a leap and a gap) that lie off the trajectory before and after them."""
     leaping = leaps(positions, carried, fps)
     most = max(3, int(round(_BURST * fps)))
     seen = np.isfinite(positions[..., 0])
-    # the shortest first, so that what lies between two jumps is not held to be one
+    # the shortest first, so that a good piece between two jumps is not taken for one
     for piece in sorted(pieces(positions, leaping), key=lambda piece: piece.end - piece.first):
         marker, first, end = piece
         leapt = leaping[first, marker] or (end < len(positions) and leaping[end, marker])
@@ -133,7 +180,7 @@ def _bursts(positions, carried, fps):
         if one is not None and one.helpers:
             near, near_allowed = _off(one.local, seen[:, marker] & np.isfinite(one.local[:, 0]), piece, most, fps)
             if np.isfinite(near_allowed):
-                # what only seems to jump because a helper does stays on its own way in the world
+                # a marker that only seems to jump, because a carrier does, stays on its trajectory in the world
                 off, allowed = (near, near_allowed) if off > _ITS_OWN * near else (0.0, near_allowed)
         if off > allowed:
             seen[first:end, marker] = False
@@ -141,7 +188,9 @@ def _bursts(positions, carried, fps):
 
 
 def _ghosts(positions, carried, fps):
-    """Longer pieces that begin or end in a leap and lie all along far from where the markers around them say."""
+    """Find longer pieces that begin or end in a leap and lie throughout far from where the markers around predict
+    them.
+    """
     leaping = leaps(positions, carried, fps)
     most = max(3, int(round(_BURST * fps)))
     seen = np.isfinite(positions[..., 0])
@@ -158,7 +207,10 @@ def _ghosts(positions, carried, fps):
 
 
 def _off(way, seen, piece, most, fps):
-    """(how far a piece lies off the smooth way across it, what is allowed), m, of a marker's way (T, 3)."""
+    """Measure how far a piece lies off the smooth curve across it, and how far it may, in metres.
+
+    `trajectory` (T, 3) is that of the marker; without a curve the result is 0 and inf.
+    """
     _, first, end = piece
     before, after = np.flatnonzero(seen[:first]), np.flatnonzero(seen[end:]) + end
     if not (len(before) and len(after)) or after[0] - before[-1] > 2 * most or not seen[first:end].all():
@@ -172,7 +224,7 @@ def _off(way, seen, piece, most, fps):
 
 
 def _spikes(positions, carried, fps):
-    """Single samples off the way through their neighbours."""
+    """Find single samples off the curve through their neighbours."""
     world = _spiking(positions)
     usual = _around(world)
     local_least, world_least = max(_OFF_LOCAL, _SWING_LOCAL / fps**2), max(_OFF_WORLD, _SWING_WORLD / fps**2)
@@ -186,24 +238,29 @@ def _spikes(positions, carried, fps):
             least = np.where(known, local_least, least)
             off = np.where(known, np.where(off > _ITS_OWN * local, local, 0.0), off)
         with np.errstate(invalid="ignore"):
-            spike = off > np.maximum(least, _TIMES * around)  # NaN is none
+            spike = off > np.maximum(least, _TIMES * around)  # NaN is no spike
         for frame in np.flatnonzero(spike):
-            # of neighbours the one farthest off is the spike; the others only feel it
+            # of neighbours, the one farthest off is the spike; the others are only affected by it
             if off[frame] >= np.nanmax(off[max(frame - 2, 0) : frame + 3]):
                 yield Jump(marker, int(frame), int(frame) + 1, float(off[frame]))
 
 
 def _spiking(places):
-    """(T, N) m: how far each sample is off the curve through two before and two after it; NaN where one is missing."""
+    """Measure how far each sample is off the curve through two before and two after it, (T, N) metres; NaN if one is
+    missing.
+    """
     out = np.full(places.shape[:2], np.nan)
     if len(places) > 4:
+        # cubic through the four neighbours, evaluated in the middle: (-1, 4, 4, -1) / 6
         through = (4.0 * (places[1:-3] + places[3:-1]) - places[:-4] - places[4:]) / 6.0
         out[2:-2] = np.linalg.norm(places[2:-2] - through, axis=-1)
     return out
 
 
 def _around(off):
-    """(T, N) m: what nine tenths of the frames around each stay below, without itself and its next neighbours."""
+    """Compute the 90 % quantile of the frames around each one, (T, N) metres, without itself and its next
+    neighbours.
+    """
     frames = len(off)
     steps = [step for step in range(-_AROUND, _AROUND + 1) if abs(step) > 2]
     index = np.clip(np.arange(frames)[:, None] + steps, 0, max(frames - 1, 0))
@@ -211,7 +268,15 @@ def _around(off):
 
 
 class Assigned(NamedTuple):
-    """An unlabeled marker took a label for frames `first` up to, not with, `end`; `off` m from where it should be."""
+    """An unlabeled marker that took a label.
+
+    Attributes:
+        unlabeled: index of the unlabeled marker.
+        label: index of the label.
+        first: first frame.
+        end: the frame after the last.
+        off: metres from where it should be.
+    """
 
     unlabeled: int
     label: int
@@ -221,15 +286,31 @@ class Assigned(NamedTuple):
 
 
 def unlabeled(labels: Sequence[str], known: Sequence[str] = ()) -> list[int]:
-    """Which of the labels are none (`*7`, `U12`, ...); those in `known` are labels whatever they look like."""
+    """Find the unlabeled markers (`*7`, `U12`, ...).
+
+    Args:
+        labels: all labels.
+        known: labels of the marker set; they are labels in any form.
+    Returns:
+        Indices of the unlabeled markers.
+    """
     return [index for index, label in enumerate(labels) if label not in known and UNLABELED.match(label)]
 
 
 def assign(positions: np.ndarray, carried: Mapping[int, Carried], nameless: Sequence[int],
            fps: float) -> tuple[np.ndarray, list[Assigned]]:
-    """(positions (T, M, 3) m, what was assigned): pieces of the `nameless` markers moved to the labels they belong to.
+    """Assign pieces of unlabeled markers to the labels that they belong to.
 
-    The best fitting first; a label takes at most one at a time, and a piece gives each of its frames once."""
+    The best match goes first; a label takes at most one piece at a time, and each frame of a piece is used once.
+
+    Args:
+        positions: (T, M, 3) metres.
+        carried: marker -> how it is carried.
+        unlabeled: indices of the unlabeled markers.
+        fps: frames per second.
+    Returns:
+        The positions with the pieces moved, and the assignments.
+    """
     out, found = positions.copy(), []
     alone = np.ascontiguousarray(positions[:, list(nameless)])
     offered = [
@@ -253,7 +334,7 @@ def assign(positions: np.ndarray, carried: Mapping[int, Carried], nameless: Sequ
 
 
 def _offer(positions, carried, piece, marker, fps):
-    """(rank, piece, marker, how far off) of a piece that may be this marker, or None."""
+    """Rate a piece that may be this marker: (rank, piece, marker, metres off), or None."""
     stretch = slice(piece.first, piece.end)
     way = positions[stretch, piece.marker]
     missing = np.isnan(positions[stretch, marker, 0])
@@ -267,33 +348,37 @@ def _offer(positions, carried, piece, marker, fps):
         if len(told) >= max(2, 0.3 * missing.sum()):
             median, worst = float(np.median(told)), float(np.percentile(told, 95.0))
             fits = median < one.tolerance and worst < 2.0 * one.tolerance
-            # a soft cluster alone is no proof: there the ways must join as well
+            # soft carriers alone are no proof: the trajectories must join as well
             sure = one.tolerance < 0.06 or joins is not None
             return (median / one.tolerance, piece, marker, median) if fits and sure else None
     return (2.0 + joins, piece, marker, joins) if joins is not None else None
 
 
 def _over(positions, piece):
-    """The nameless marker's way over all frames, NaN outside the piece: (T, 3) m."""
+    """Return the unlabeled marker's trajectory over all frames, NaN outside the piece: (T, 3) metres."""
     way = np.full((len(positions), 3), np.nan)
     way[piece.first : piece.end] = positions[piece.first : piece.end, piece.marker]
     return way
 
 
 def _disagree(way, labelled):
-    """Whether label and nameless are both seen, in places apart."""
+    """Return whether label and unlabeled marker are both visible, in different places."""
     apart = np.linalg.norm(way - labelled, axis=-1)
     return bool((apart > _AGREES).any())
 
 
 def _joins(positions, piece, marker, fps):
-    """How far the piece is from the label's way where they should meet, m: the worse of the ends there are, or None."""
+    """Measure how far the piece is from the label's trajectory where they should meet, in metres.
+
+    The larger distance of both ends is returned; None if it is too large, or no end is near enough in time.
+    """
     seen = np.isfinite(positions[:, marker, 0])
     before, after = np.flatnonzero(seen[: piece.first]), np.flatnonzero(seen[piece.end :]) + piece.end
     within, way = max(1, int(_WITHIN * fps)), positions[:, piece.marker]
     misses = []
     if len(before) and piece.first - before[-1] <= within and piece.end - piece.first > 1:
         steps = piece.first - before[-1]
+        # extrapolate the piece linearly to the label's last visible frame before it
         back = way[piece.first] - steps * (way[piece.first + 1] - way[piece.first])
         misses.append(float(np.linalg.norm(back - positions[before[-1], marker])))
     if len(after) and after[0] - (piece.end - 1) <= within and piece.end - piece.first > 1:

@@ -1,7 +1,8 @@
-"""Swaps: two markers that have each other's label for a stretch, found by what their clusters say and by their ways.
+"""Label swaps: two markers that have each other's label for a stretch, found by their clusters and trajectories.
 
-A label that is exchanged deforms the markers around it, and exchanging it back mends them; both are asked for. Where no
-cluster tells, two leaps in which each marker goes on where the other one was, there and back, tell as much.
+Exchanged labels deform the clusters around them, and exchanging them back removes the deformation; both are required.
+Where there is no cluster, two leaps in which each marker continues where the other one was, there and back, are
+sufficient evidence.
 """
 
 from __future__ import annotations
@@ -16,20 +17,27 @@ from ..frames import placed, rigid_fit
 from .carriers import Carried
 from .cluster_shape import median
 
-_PART, _LESS = 0.6, 0.008  # exchanging must bring the deformation down to this part of it and by this much, m
-_STRANGE = 2.0  # the deformation must have been more than this many times the usual
-# exchanged it must be no more than this, m, or this many times what is usual there, or this part of it
+_PART, _LESS = 0.6, 0.008  # an exchange must reduce the deformation to this share and by this many metres
+_STRANGE = 2.0  # multiples of the usual deformation that it must exceed before
+# afterwards it must be at most so many metres, or multiples of the usual, or this share of that before
 _WELL, _TIMES_USUAL, _FAR_LESS = 0.015, 2.5, 0.25
-_EVERY = 0.025  # how often the slow questions are asked, s; a swap shorter than this is only found by its leaps
-# two markers leap onto each other's ways if they are this far apart, m, and miss them by no more than this part of it
+_EVERY = 0.025  # s between frames of the slow tests; a shorter swap is only found by its leaps
+# two markers leap onto each other's trajectories at this distance in metres, if they miss them by at most this share
 _APART, _TURNED = 0.03, 0.4
-_MOST_SWAPS = 200  # where more than this are found, something else is wrong
+_MOST_SWAPS = 200  # with more, something else is wrong
 
 Pairs = tuple[tuple[int, int], ...]
 
 
 class Swap(NamedTuple):
-    """Markers that had each other's labels from frame `first` up to, not with, `end`; `mended` or only told."""
+    """Markers that had each other's labels.
+
+    Attributes:
+        pairs: the pairs of markers.
+        first: first frame.
+        end: the frame after the last.
+        is_corrected: whether they were exchanged back; else only reported.
+    """
 
     pairs: Pairs
     first: int
@@ -38,7 +46,7 @@ class Swap(NamedTuple):
 
 
 def exchanged(positions: np.ndarray, pairs: Pairs) -> np.ndarray:
-    """Positions (T, M, 3) with each pair's markers exchanged."""
+    """Exchange each pair's markers in positions (T, M, 3)."""
     order = np.arange(positions.shape[1])
     for one, other in pairs:
         order[one], order[other] = other, one
@@ -46,9 +54,16 @@ def exchanged(positions: np.ndarray, pairs: Pairs) -> np.ndarray:
 
 
 def there_and_back(positions: np.ndarray, carried: Mapping[int, Carried]) -> tuple[np.ndarray, list[Swap]]:
-    """(positions (T, M, 3) m with these swaps exchanged back, the swaps): pairs that leap onto each other's ways twice.
+    """Correct pairs that leap onto each other's trajectories twice.
 
-    Between the leaps they are exchanged, unless their clusters say that they are before and after."""
+    Between the leaps they are exchanged, unless their clusters show that they are before and after.
+
+    Args:
+        positions: (T, M, 3) metres.
+        carried: marker -> how it is carried.
+    Returns:
+        The corrected positions, and the swaps.
+    """
     out, found, deformed = positions.copy(), [], _Deformed(carried)
     together: dict[tuple[int, int], list[tuple[int, int]]] = {}
     for pair, frames in _moments(_crossings(positions)).items():
@@ -63,12 +78,21 @@ def there_and_back(positions: np.ndarray, carried: Mapping[int, Carried]) -> tup
 
 def mend(positions: np.ndarray, carried: Mapping[int, Carried], leaping: np.ndarray, fps: float,
          opposite: Sequence[Pairs] = (), ask: Callable[[], None] = lambda: None) -> tuple[np.ndarray, list[Swap]]:
-    """(positions (T, M, 3) m with swaps exchanged back, the swaps): what deforms the clusters and mends them exchanged.
+    """Correct swaps that deform clusters and whose exchange removes the deformation.
 
-    leaping: (T, M) bool from `pieces.leaps`. opposite: pairs that are likely taken for each other (left and right), and
-    whole segments of them: always asked about. The exchange that mends the most is made first, and the others are asked
-    about again where it matters. ask: called for each question; it may raise. Of a pair that no cluster tells of, a
-    single leap onto each other's ways is told."""
+    The exchange that reduces the deformation the most is made first, and the others are rated again where they are
+    affected. A pair without a cluster that leaps once onto each other's trajectories is only reported.
+
+    Args:
+        positions: (T, M, 3) metres.
+        carried: marker -> how it is carried.
+        leaping: (T, M) bool of `pieces.detect_leaps`.
+        fps: frames per second.
+        opposite: pairs that are easily confused (left and right), and whole segments of them; always tested.
+        check_cancelled: called for each test; it may raise.
+    Returns:
+        The corrected positions, and the swaps.
+    """
     out, found, deformed = positions.copy(), [], _Deformed(carried)
     crossings = _crossings(positions)
     step = max(1, int(_EVERY * fps))
@@ -96,7 +120,10 @@ def mend(positions: np.ndarray, carried: Mapping[int, Carried], leaping: np.ndar
 
 
 def _offers(deformed, positions, pairs, leaping, step):
-    """[(gain, first, end)] of the stretches in which exchanging these pairs is called for."""
+    """Rate the stretches in which these pairs should be exchanged: [(gain, first, end)].
+
+    A coarse test on every `step`-th frame comes first.
+    """
     keep, swap = deformed.both_ways(positions[::step], pairs)
     if not np.any(keep - swap > _LESS):
         return []
@@ -106,7 +133,7 @@ def _offers(deformed, positions, pairs, leaping, step):
 
 
 def _wrong_side(deformed, positions, pairs, first, end):
-    """The stretches in which these pairs are exchanged: between their two leaps, or before and after, or none."""
+    """Return the stretches in which these pairs are exchanged: between their two leaps, before and after, or none."""
     inside = [(first, end)]
     if not deformed.told(pairs):
         return inside if end - first <= len(positions) // 2 else [(0, first), (end, len(positions))]
@@ -120,7 +147,7 @@ def _wrong_side(deformed, positions, pairs, first, end):
 
 
 def _moments(crossings):
-    """{pair: frames at which its markers leap onto each other's ways}."""
+    """Collect {pair: frames at which its markers leap onto each other's trajectories}."""
     found: dict[tuple[int, int], list[int]] = {}
     for frame, pairs in crossings:
         for pair in pairs:
@@ -129,33 +156,41 @@ def _moments(crossings):
 
 
 class _Deformed:
-    """How markers with their helpers are deformed, as they are labelled and with some exchanged."""
+    """The deformation of markers with their carriers, as labeled and with some markers exchanged."""
 
     def __init__(self, carried):
         self._carried = carried
 
     def told(self, pairs: Pairs) -> bool:
-        """Whether any cluster would show that these markers are exchanged."""
+        """Return whether any cluster would show that these markers are exchanged."""
         return bool(self._telling(pairs))
 
     def _telling(self, pairs):
-        """The markers whose shapes are asked: the pairs' own, or where those have none, those they help to carry."""
+        """Find the markers whose shapes are tested: the pairs' own, or where those have no carriers, those that they
+        carry.
+        """
         own = {marker for pair in pairs for marker in pair}
         with_helpers = [marker for marker in sorted(own) if marker in self._carried and self._carried[marker].helpers]
         return with_helpers or [other for other, one in self._carried.items() if own & set(one.helpers)]
 
     def touched_by(self, pairs: Pairs) -> set[int]:
-        """All markers whose shape an exchange of these pairs changes."""
+        """Return all markers whose shape changes with an exchange of these pairs."""
         markers = {marker for pair in pairs for marker in pair}
         return markers | {other for other, one in self._carried.items() if markers & set(one.helpers)}
 
     def usual(self, pairs: Pairs) -> float:
-        """The median deformation of the pairs' shapes, m."""
+        """Compute the mean of the usual deformation of the pairs' shapes, in metres."""
         ones = [self._carried[marker] for marker in self._telling(pairs)]
         return float(np.mean([max(one.shape.usual, one.sigma / np.sqrt(len(one.helpers) + 1.0)) for one in ones]))
 
     def both_ways(self, positions: np.ndarray, pairs: Pairs) -> tuple[np.ndarray, np.ndarray]:
-        """(T,) m each: mean deformation of the pairs' shapes as they are, and with the pairs exchanged; NaN if untold.
+        """Measure the mean deformation of the pairs' shapes, as labeled and with the pairs exchanged.
+
+        Args:
+            positions: (T, M, 3) metres.
+            pairs: the pairs of markers.
+        Returns:
+            (T,) metres each; NaN where unknown.
         """
         markers = self._telling(pairs)
         keep, swap = (
@@ -168,7 +203,7 @@ class _Deformed:
         )
 
     def _rms(self, positions, marker):
-        """(T,) m: how far marker and helpers are from their shape; NaN where it or too many are not seen."""
+        """Measure how far marker and carriers are from their shape, (T,) metres; NaN where too few are visible."""
         one = self._carried[marker]
         places = np.vstack([one.place, one.shape.places])
         sigma = np.append(one.sigma, one.shape.sigma)
@@ -181,8 +216,10 @@ class _Deformed:
 
 
 def _questions(positions, carried, crossings, fps, opposite):
-    """The exchanges worth asking about: those that leaps suggest, those that two strayed markers suggest, and the
-    likely ones if some frame speaks for them; groups before single pairs."""
+    """List the exchanges worth testing, groups before single pairs.
+
+    They are those suggested by leaps, by two strayed markers, and the likely ones (left and right).
+    """
     asked: dict[Pairs, None] = {}
     for _, pairs in crossings:
         if len(pairs) > 1:
@@ -198,7 +235,7 @@ def _questions(positions, carried, crossings, fps, opposite):
 
 
 def _strayed(positions, carried, fps):
-    """Pairs of markers that are each far from where their helpers say, and near where the other one's say."""
+    """Find pairs of markers that are each far from their own predicted place, and near that of the other."""
     markers = [marker for marker, one in carried.items() if one.helpers]
     if not markers:
         return []
@@ -212,6 +249,7 @@ def _strayed(positions, carried, fps):
         bad = np.flatnonzero(off[frame])
         across = np.linalg.norm(where[frame, bad][:, None] - told[frame, bad][None], axis=-1)
         own = np.diagonal(across)
+        # (i, j): marker i lies where the carriers of j predict j, and clearly nearer than to its own place
         better = (across < reach[bad][None]) & (across < 0.5 * own[:, None])
         for i, j in np.argwhere(np.triu(better & better.T, 1)):
             found[(markers[bad[i]], markers[bad[j]])] = None
@@ -219,13 +257,13 @@ def _strayed(positions, carried, fps):
 
 
 def _stretches(keep, swap, usual, leaping):
-    """(first, end) of the frames in which the exchange is called for, from where it begins to be the better one."""
+    """Find the (first, end) frames in which an exchange is required, from where it begins to be better."""
     gain = keep - swap
     well = (swap < max(_WELL, _TIMES_USUAL * usual)) | (swap < _FAR_LESS * keep)
     clear = (gain > np.maximum(_LESS, (1.0 - _PART) * keep)) & well & (keep > _STRANGE * usual)
     leap = leaping.any(axis=1)
     found = []
-    for first, end in runs(~(gain <= 0.0)):  # better, or nothing tells
+    for first, end in runs(~(gain <= 0.0)):  # better, or unknown
         inside = np.flatnonzero(clear[first:end]) + first
         if not len(inside):
             continue
@@ -238,9 +276,10 @@ def _stretches(keep, swap, usual, leaping):
 
 
 def _crossings(positions):
-    """[(frame, pairs)]: where markers go on, from one frame to the next, on each other's ways."""
+    """Find where markers continue, from one frame to the next, on each other's trajectories: [(frame, pairs)]."""
     was = np.full_like(positions, np.nan)
     was[1:] = positions[:-1]
+    # expected place: linear extrapolation from the two frames before
     ahead = 2.0 * positions[1:-1] - positions[:-2]
     was[2:] = np.where(np.isnan(ahead), was[2:], ahead)
     leapt = np.nan_to_num(np.linalg.norm(positions - was, axis=-1)) > 0.5 * _APART
@@ -253,10 +292,17 @@ def _crossings(positions):
 
 
 def _crossing(now, was, markers):
-    """The pairs among `markers` whose arrow from one to the other turns round, about the middle between them.
+    """Find the pairs whose connecting vector reverses about the middle between them.
 
-    now, was: (N, 3) m, where they are and where they should be by their ways. No segment turns round in one frame, and
-    markers that pass by each other do so on their ways."""
+    No segment reverses in one frame, and markers that pass each other do so on their trajectories.
+
+    Args:
+        now: (N, 3) metres, where the markers are.
+        expected: (N, 3) metres, where their trajectories predict them.
+        markers: (N,) their indices.
+    Returns:
+        The pairs, each marker at most once.
+    """
     arrow, awaited = now[None] - now[:, None], was[None] - was[:, None]
     apart = np.linalg.norm(arrow, axis=-1)
     miss = np.linalg.norm(arrow + awaited, axis=-1)
@@ -272,7 +318,7 @@ def _crossing(now, was, markers):
 
 
 def _untold(crossings, deformed, found, frames):
-    """A leap onto each other's ways of markers that no cluster tells of, which nothing has mended: told from there."""
+    """Report leaps onto each other's trajectories of markers without a cluster, which nothing has corrected."""
     for pair, when in _moments(crossings).items():
         known = any(pair in swap.pairs and swap.first - 3 <= when[-1] <= swap.end + 3 for swap in found)
         if not known and not deformed.told((pair,)):

@@ -1,8 +1,8 @@
-"""C3D files: markers of optical motion capture (www.c3d.org, "The C3D file format: a user guide").
+"""Read C3D files: markers of optical motion capture (www.c3d.org, "The C3D file format: a user guide").
 
-The `c3d` package reads header and parameters; the samples are read here, all frames at once, since it goes frame by
-frame, converts analog channels that nobody asked for, and refuses files whose header and parameters disagree. Where
-they do, the file's own size tells who is right.
+The `c3d` package reads header and parameters; the samples are read here, all frames at once, since the package reads
+frame by frame, converts analog channels that are not needed, and rejects files whose header and parameters disagree.
+Where they disagree, the file's size decides.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ from ...files.content import opened
 from ..trial import FEWEST_FPS, MOST_FPS, MarkerTrial
 from .raw_markers import RawMarkers, as_trial
 
-BLOCK = 512
-_PROCESSORS = {84: "<", 85: "<", 86: ">"}  # Intel, DEC, SGI/MIPS: the order of bytes
+BLOCK = 512  # bytes
+_PROCESSORS = {84: "<", 85: "<", 86: ">"}  # Intel, DEC, SGI/MIPS: the byte order
 _DEC = 85
 _EVENTS_IN_HEADER = 18
 _EXPORT_AGAIN = "export it again"
@@ -32,12 +32,20 @@ _AXES = {sign + axis: ("XYZ".index(axis), -1 if sign == "-" else 1) for sign in 
 
 def read_c3d(path: str | os.PathLike, unit: float | str | None = None, subject: str | None = None,
              up: str | None = None) -> MarkerTrial:  # fmt: skip
-    """The trial in a C3D file: one subject's markers and the events; analog channels, angles, forces and points that
-    a model computed are left out, and told in the notes.
+    """Read the trial in a C3D file: one subject's markers and the events.
 
-    unit: metres per unit or a name; None for the file's own. subject: whose markers, where the file has several bodies.
-    up: the file's axis that points up, None to find it.
-    InputError where the file is missing, damaged, cut off or no C3D file, and as `raw_markers.as_trial`."""
+    Analog channels, angles, forces and points that a model computed are left out and reported in the notes.
+
+    Args:
+        path: the file.
+        unit: metres per unit or a name; None for the file's own.
+        subject: whose markers, if the file contains several bodies.
+        up: the file's axis that points up; None to detect it.
+    Returns:
+        The trial, metres, Z up.
+    Raises:
+        InputError: if the file is missing, damaged, cut off or not a C3D file, and as `raw_markers.build_trial`.
+    """
     path = Path(path)
     with opened(path, "a C3D file") as handle:
         size = os.fstat(handle.fileno()).st_size
@@ -52,15 +60,23 @@ def read_c3d(path: str | os.PathLike, unit: float | str | None = None, subject: 
 
 
 class _Parameters:
-    """The header and the parameters of a file. Arrays of parameters are taken as far as the file holds them: what their
-    dimensions promise is not believed."""
+    """The header and the parameters of a file.
+
+    Arrays of parameters are read up to the data that is present, whatever their dimensions promise.
+    """
 
     def __init__(self, reader, order: str, dec: bool):
         self._reader, self.header, self.order, self.dec = reader, reader.header, order, dec
 
     def numbers(self, name: str, unsigned: bool = True) -> np.ndarray:
-        """(N,) float: the values of a parameter; none where it is absent or text. Whole numbers of 16 bits are counts,
-        so they go beyond 32767 unless `unsigned` is False."""
+        """Return the values of a numeric parameter.
+
+        Args:
+            name: GROUP:NAME.
+            unsigned: read 16-bit integers as counts up to 65535; False reads them as signed.
+        Returns:
+            (N,) float; empty where the parameter is absent or text.
+        """
         parameter = self._reader.get(name)
         if parameter is None:
             return np.zeros(0)
@@ -72,12 +88,12 @@ class _Parameters:
         return _floats(data, self) if size == 4 else np.frombuffer(data, kinds[size]).astype(float)
 
     def number(self, name: str) -> float:
-        """The first value of a parameter; NaN where there is none."""
+        """Return the first value of a parameter; NaN where there is none."""
         values = self.numbers(name)
         return float(values[0]) if len(values) else math.nan
 
     def texts(self, name: str) -> list[str]:
-        """The texts of a parameter, also of those that go on under NAME2, NAME3 ..."""
+        """Return the texts of a parameter, and of its continuations NAME2, NAME3 ..."""
         out = []
         for number in itertools.chain([""], range(2, 100)):
             parameter = self._reader.get(f"{name}{number}")
@@ -90,6 +106,7 @@ class _Parameters:
 
 
 def _text(data: bytes) -> str:
+    """Decode a text as UTF-8, else as Windows-1252, without control characters."""
     try:
         text = data.decode("utf-8")
     except UnicodeDecodeError:
@@ -98,11 +115,11 @@ def _text(data: bytes) -> str:
 
 
 def _floats(data: bytes, parameters: _Parameters) -> np.ndarray:
-    """(N,) float of single precision numbers as this file writes them."""
+    """Decode single-precision numbers as this file writes them, (N,) float."""
     if not parameters.dec:
         with np.errstate(invalid="ignore"):  # some kinds of NaN
             return np.frombuffer(data, f"{parameters.order}f4").astype(float)
-    # VAX F floating (DEC): the 16-bit halves are exchanged, the exponent's bias is two greater, and no number is NaN.
+    # VAX F floating (DEC): the 16-bit halves are swapped, the exponent's bias is two greater, and there is no NaN.
     halves = np.frombuffer(data, "<u2").astype(np.uint32)
     bits = (halves[0::2] << 16) | halves[1::2]
     values = bits.view(np.float32).astype(float) / 4.0
@@ -110,7 +127,7 @@ def _floats(data: bytes, parameters: _Parameters) -> np.ndarray:
 
 
 def _parameters(path: Path, handle, size: int) -> _Parameters:
-    """InputError where header or parameters are damaged, or the file is another one."""
+    """Read header and parameters; raise InputError where they are damaged, or the file is of another kind."""
     head = handle.read(BLOCK)
     if len(head) < BLOCK or head[1] != 0x50 or head[0] == 0:
         found = "an empty file" if not head else "not the start of a C3D file"
@@ -129,7 +146,7 @@ def _parameters(path: Path, handle, size: int) -> _Parameters:
 
 
 def _parsed(path: Path, section: bytes):
-    """The package's reader on header and parameters alone, so that what they promise cannot lead it into the data."""
+    """Parse header and parameters with the package, without the data, so that wrong sizes cannot lead into it."""
     try:
         import c3d
     except ImportError as error:
@@ -137,12 +154,12 @@ def _parsed(path: Path, section: bytes):
         raise InputError(path, found, "c3d 0.6 or newer", "pip install 'beyond-mocap[markers]'") from None
 
     class Reader(c3d.Reader):
-        def _check_metadata(self):  # asserts that header and parameters agree: looked at in `_layout`
+        def _check_metadata(self):  # the package asserts that header and parameters agree; `_find_layout` handles it
             pass
 
     try:
         return Reader(io.BytesIO(section))
-    except Exception as error:  # whatever a parser stumbles over: the parameters are damaged
+    except Exception as error:  # any error of the parser means that the parameters are damaged
         found = f"damaged parameters ({type(error).__name__}: {str(error)[:60]})"
         raise InputError(path, found, "a C3D file", _EXPORT_AGAIN) from None
 
@@ -152,8 +169,17 @@ def _parsed(path: Path, section: bytes):
 
 @dataclass(frozen=True, kw_only=True)
 class _Layout:
-    """Where the samples lie. data: byte of the first. points, analog: values of a frame (a point has four). scale: as
-    the file has it; negative where samples are floats. notes: where header and parameters disagree."""
+    """Where the samples lie in the file.
+
+    Attributes:
+        data: byte of the first sample.
+        points: number of points in a frame (four values each).
+        analog: number of analog values in a frame.
+        frames: number of frames.
+        scale: as in the file; negative where samples are floats.
+        first_frame: number of the first frame.
+        notes: messages where header and parameters disagree.
+    """
 
     data: int
     points: int
@@ -175,8 +201,10 @@ class _Layout:
 
 
 def _layout(path: Path, parameters: _Parameters, size: int) -> _Layout:
-    """Where the samples lie: of all that header and parameters say, what fits the size of the file, the header's first.
-    InputError where nothing does."""
+    """Find the layout that fits the size of the file, of all that header and parameters say, the header's first.
+
+    Raises InputError where none fits.
+    """
     scale = _one_of(parameters.number("POINT:SCALE"), parameters.header.scale_factor)
     if not 1e-12 < abs(scale) < 1e12:
         raise InputError(path, f"scale {scale:g} of the points", "a scale that is not 0", _EXPORT_AGAIN)
@@ -207,17 +235,17 @@ def _layout(path: Path, parameters: _Parameters, size: int) -> _Layout:
 
 
 def _one_of(*values: float) -> float:
-    """The first that is a number."""
+    """Return the first value that is a number, or NaN."""
     return next((float(value) for value in values if math.isfinite(value)), math.nan)
 
 
 def _counts(*values: float) -> list[int]:
-    """The different whole numbers among these."""
+    """List the different whole numbers among these values."""
     return list(dict.fromkeys(int(value) for value in values if math.isfinite(value) and value >= 0))
 
 
 def _analog(parameters: _Parameters) -> float:
-    """Analog values in a frame of points, as the parameters say."""
+    """Count the analog values in a frame of points, as the parameters say; NaN where they do not."""
     used, rate = parameters.number("ANALOG:USED"), parameters.number("ANALOG:RATE")
     points = _one_of(parameters.number("POINT:RATE"), parameters.header.frame_rate)
     if used == 0:
@@ -227,7 +255,9 @@ def _analog(parameters: _Parameters) -> float:
 
 
 def _frames(parameters: _Parameters) -> tuple[int, list[int]]:
-    """(number of the first frame, how many there are as the file says in different places, the surest first)."""
+    """Return the number of the first frame, and the numbers of frames given in different places, the most reliable
+    first.
+    """
     start, end = (parameters.numbers(f"TRIAL:ACTUAL_{name}_FIELD") for name in ("START", "END"))
     header = parameters.header
     first = int(start[0] + 65536 * start[1]) if len(start) == 2 else int(header.first_frame)
@@ -238,7 +268,7 @@ def _frames(parameters: _Parameters) -> tuple[int, list[int]]:
 
 
 def _words(path: Path, handle, layout: _Layout) -> np.ndarray:
-    """(T, bytes of a frame's points) uint8."""
+    """Read (T, bytes of a frame's points) uint8."""
     handle.seek(layout.data)
     points = 4 * layout.points * layout.word
     if not layout.analog:
@@ -249,7 +279,7 @@ def _words(path: Path, handle, layout: _Layout) -> np.ndarray:
 
 
 def _points(words: np.ndarray, layout: _Layout, parameters: _Parameters) -> tuple[np.ndarray, np.ndarray]:
-    """(T, M, 3) places in the file's unit, NaN where not seen, and (T, M) residuals."""
+    """Decode (T, M, 3) places in the file's unit, NaN where not visible, and (T, M) residuals."""
     shape, magnitude = (layout.frames, layout.points, 4), abs(layout.scale)
     if layout.scale < 0:
         values = _floats(np.ascontiguousarray(words).tobytes(), parameters).reshape(shape)
@@ -257,7 +287,7 @@ def _points(words: np.ndarray, layout: _Layout, parameters: _Parameters) -> tupl
     else:
         values = np.ascontiguousarray(words).view(f"{parameters.order}i2").reshape(shape).astype(float)
         places, fourth = values[..., :3] * magnitude, values[..., 3]
-    # The fourth word: negative where the point is not seen, else cameras in the upper byte, residual in the lower.
+    # The fourth word: negative where the point is not visible, else cameras in the upper byte, residual in the lower.
     unseen = ~(np.isfinite(values).all(axis=-1)) | (fourth < 0)
     places = np.where(unseen[..., None], np.nan, places)
     word = np.where(unseen | (fourth > 32767), 0, fourth).astype(int)
@@ -268,6 +298,7 @@ def _points(words: np.ndarray, layout: _Layout, parameters: _Parameters) -> tupl
 
 
 def _raw(path: Path, parameters: _Parameters, layout: _Layout, positions, residuals) -> RawMarkers:
+    """Build the raw markers with labels, rate, unit, axes and events from the parameters."""
     rate = _one_of(parameters.number("POINT:RATE"), parameters.header.frame_rate)
     if not FEWEST_FPS <= rate <= MOST_FPS:
         rate = float(parameters.header.frame_rate)
@@ -287,13 +318,15 @@ def _raw(path: Path, parameters: _Parameters, layout: _Layout, positions, residu
 
 
 def _listed(parameters: _Parameters) -> list[str]:
-    """Parameters that list the points that are no markers: the usual ones and those that the file names itself."""
+    """List the parameters that name points that are no markers: the usual ones and those that the file defines
+    itself.
+    """
     named = [name.upper() for name in parameters.texts("POINT:TYPE_GROUPS")]
     return list(dict.fromkeys([*_NO_MARKERS, *(name for name in named if name not in ("LABELS", "DESCRIPTIONS"))]))
 
 
 def _events(parameters: _Parameters) -> list[tuple[float, str, str, str]]:
-    """(seconds, label, side, subject) of the EVENT group, else of the header; seconds from frame 1."""
+    """Read (seconds, label, side, subject) of the EVENT group, else of the header; seconds from frame 1."""
     times = parameters.numbers("EVENT:TIMES")
     labels, sides, whose = (parameters.texts(f"EVENT:{name}") for name in ("LABELS", "CONTEXTS", "SUBJECTS"))
     used = parameters.number("EVENT:USED")

@@ -1,4 +1,4 @@
-"""Marker sets as small texts (docs/markers/markers.md), those of our own among them."""
+"""Marker sets as short texts (docs/markers/markers.md), including the shipped ones."""
 
 from __future__ import annotations
 
@@ -13,35 +13,56 @@ from ..model.marker_set import MarkerSet
 from ..model.template import JOINTS, LANDMARKS
 
 SHIPPED = Path(__file__).resolve().parents[2] / "markers" / "sets"
-LARGEST = 1_000_000  # bytes of a file above which it is no marker set
+LARGEST = 1_000_000  # bytes; a larger file is not a marker set
 _FORM = "see docs/markers/markers.md"
 _LISTS = ("static", "optional", "ball", "other")
 _KEYWORDS = "marker set, about, segment JOINT, landmark NAME, also LABEL, static, optional, ball, other"
 
 
 def shipped_sets() -> tuple[MarkerSet, ...]:
-    """The sets that come with Beyond Mocap, by name."""
+    """Read the marker sets that come with Beyond Mocap, sorted by name."""
     return tuple(sorted((read_marker_set(path) for path in SHIPPED.glob("*.txt")), key=lambda one: one.name))
 
 
 def chosen_set(named: str) -> MarkerSet:
-    """The shipped set of this name, else the one in the file of this path. InputError where there is neither."""
+    """Choose a marker set by name or path.
+
+    Args:
+        name: the name of a shipped set, else the path of a file.
+    Returns:
+        The set.
+    Raises:
+        InputError: if there is neither.
+    """
     shipped = {one.name: one for one in shipped_sets()}
     if named.strip().lower() in shipped:
         return shipped[named.strip().lower()]
     if not Path(named).exists():
         found = f"no marker set {named[:60]!r}"
-        raise InputError("--marker-set", found, f"one of {', '.join(shipped)}, or a file", "check the name")
+        raise InputError("marker set", found, f"one of {', '.join(shipped)}, or a file", "check the name")
     return read_marker_set(named)
 
 
 def read_marker_set(path: str | os.PathLike) -> MarkerSet:
-    """The set that a file holds. InputError, with the line, for whatever is wrong."""
+    """Read the marker set in a file.
+
+    Raises:
+        InputError: if anything is wrong, with the line.
+    """
     return parse_marker_set(utf8(path, "a marker set", LARGEST), str(path))
 
 
 def parse_marker_set(text: str, name: str = "marker set") -> MarkerSet:
-    """The set in a text; `name` stands before the line of what is wrong with it, as InputError."""
+    """Parse a marker set.
+
+    Args:
+        text: the text.
+        name: of the file, for messages.
+    Returns:
+        The set.
+    Raises:
+        InputError: if anything is wrong, with name and line.
+    """
     read = _Reading()
     for number, line in enumerate(re.split(r"\r\n|\n|\r", text), 1):
         line = re.sub(r"(^|\s)#.*", "", line).strip()
@@ -59,7 +80,7 @@ def parse_marker_set(text: str, name: str = "marker set") -> MarkerSet:
 
 
 class _Reading:
-    """What has been read so far. Lines of one segment or landmark add up."""
+    """The part of a marker set that has been parsed. Lines on one segment or landmark add up."""
 
     def __init__(self):
         self.name = self.about = ""
@@ -69,6 +90,7 @@ class _Reading:
         self.lists: dict[str, tuple[str, ...]] = {}
 
     def statement(self, line: str, place: str) -> None:
+        """Parse one line."""
         head, colon, said = (part.strip() for part in line.partition(":"))
         if not colon:
             raise InputError(place, f"{line[:40]!r}", "`what: labels`", _FORM)
@@ -87,7 +109,7 @@ class _Reading:
 
     def _named(self, said: str, place: str) -> None:
         if self.name:
-            raise InputError(place, "a second `marker set`", "one set a file", "make it a file of its own")
+            raise InputError(place, "a second `marker set`", "one set per file", "move it to a second file")
         if not re.fullmatch(r"[\w\-.]{1,60}", said):
             raise InputError(place, f"name {said[:40]!r}", "one word of letters, digits, `_`, `-` and `.`", _FORM)
         self.name = said
@@ -107,10 +129,11 @@ class _Reading:
         for other in others:
             if self.aliases.setdefault(other, own) != own:
                 found = f"{other[:40]!r} for {self.aliases[other]!r} and {own!r}"
-                raise InputError(place, found, "one marker for each other label", "take one out")
+                raise InputError(place, found, "one marker for each other label", "remove one")
 
 
 def _labels(said: str, place: str) -> tuple[str, ...]:
+    """Parse labels separated by commas; raise InputError for an empty label or one with a colon."""
     labels = tuple(" ".join(label.split()) for label in said.split(","))
     if not all(labels):
         raise InputError(place, "an empty label" if said else "no labels", "labels, separated by commas", _FORM)
@@ -120,7 +143,11 @@ def _labels(said: str, place: str) -> tuple[str, ...]:
 
 
 def marker_set_text(marker_set: MarkerSet) -> str:
-    """The set as `read_marker_set` reads it. InputError for labels with a comma, a colon or ` #`."""
+    """Format a marker set as `read_marker_set` reads it.
+
+    Raises:
+        InputError: if a label contains a comma, a colon or ` #`.
+    """
     lines = [f"marker set: {marker_set.name}"]
     lines += [f"about: {' '.join(marker_set.about.split())}"] if marker_set.about else []
     lines += ["", *(f"segment {joint}: {_joined(labels)}" for joint, labels in marker_set.segments.items() if labels)]
@@ -135,7 +162,7 @@ def marker_set_text(marker_set: MarkerSet) -> str:
 
 
 def _in_order(labels) -> list[str]:
-    """Sets have no order of their own."""
+    """Sort sets, which have no order; keep the order of tuples."""
     return sorted(labels) if isinstance(labels, frozenset) else list(labels)
 
 
@@ -144,6 +171,7 @@ def _joined(labels) -> str:
 
 
 def _written(label: str) -> str:
+    """Return the label; raise InputError where the text form cannot contain it."""
     if label != " ".join(label.split()) or not label or re.search(r"[,:]|(^|\s)#", label):
         raise InputError("marker set", f"label {label[:40]!r}", "a label without comma, colon and ` #`", "rename it")
     return label

@@ -1,4 +1,4 @@
-"""MODEL.json: the body that was found out of markers, with the markers on it, as a file (docs/markers/markers.md)."""
+"""MODEL.json: a reconstructed body with the markers on it, as a file (docs/markers/markers.md)."""
 
 from __future__ import annotations
 
@@ -17,28 +17,36 @@ from ..model.model import BallMarker, Freedom, MarkerModel
 from ..trial import repeated
 
 VERSION = 1
-LARGEST = 10_000_000  # bytes of a file above which it is no model
+LARGEST = 10_000_000  # bytes; a larger file is not a model
 _PAGE = "docs/markers/markers.md"
 _TRIPLE = "[x, y, z] in metres"
-_FARTHEST = 100.0  # metres within a body
-_MOST = 10_000  # joints or markers
+_FARTHEST = 100.0  # metres, largest coordinate within a body
+_MOST = 10_000  # joints or markers at most
 _JOINT = ("name", "parent", "offset", "order", "free", "low", "high", "stiffness", "centre_sigma")
 _MARKER = ("label", "joint", "place", "sigma", "edge_sigma")
 _WHOLE = ("version", "subject", "sessions", "marker_set", "notes", "joints", "tips", "markers", "ball")
 
 
 def read_model(path: str | os.PathLike) -> MarkerModel:
-    """The model that a file holds. InputError, which names the file and the place in it, for whatever is wrong."""
+    """Read the model in a file.
+
+    Raises:
+        InputError: if anything is wrong, with the file and the place in it.
+    """
     return parse_model(utf8(path, "a MODEL.json", LARGEST), str(path))
 
 
 def write_model(model: MarkerModel, path: str | os.PathLike) -> None:
-    """Write a model as `read_model` reads it, number for number. InputError where it cannot be written."""
+    """Write a model as `read_model` reads it, number for number.
+
+    Raises:
+        InputError: if the file cannot be written.
+    """
     atomic_write(path, model_text(model))
 
 
 def model_text(model: MarkerModel) -> str:
-    """The text of a MODEL.json; one joint and one marker a line."""
+    """Format a model as MODEL.json, with one joint and one marker per line."""
     skeleton, names = model.skeleton, model.skeleton.names
     joints = [_joint_out(model, i) for i in range(len(skeleton))]
     tips = [{"joint": names[parent], "offset": _list(offset)}
@@ -58,6 +66,7 @@ def model_text(model: MarkerModel) -> str:
 
 
 def _joint_out(model: MarkerModel, i: int) -> dict:
+    """Return the values of a joint for JSON."""
     skeleton, freedom = model.skeleton, model.freedom
     parent = skeleton.parents[i]
     return {"name": skeleton.names[i], "parent": None if parent < 0 else skeleton.names[parent],
@@ -68,7 +77,7 @@ def _joint_out(model: MarkerModel, i: int) -> dict:
 
 
 def _value_out(value) -> str:
-    """JSON text; a list of objects has a line for each."""
+    """Format JSON text; a list of objects has one line for each."""
     if isinstance(value, list) and value and isinstance(value[0], dict):
         return "[\n" + ",\n".join(f"  {json.dumps(one, ensure_ascii=False)}" for one in value) + "\n ]"
     return json.dumps(value, ensure_ascii=False, allow_nan=False)
@@ -79,7 +88,7 @@ def _list(values: np.ndarray) -> list:
 
 
 def _number_out(value) -> float | None:
-    """null where there is no number, or no limit."""
+    """Return the number for JSON; null where it is not finite (no value, or no limit)."""
     return float(value) if math.isfinite(value) else None
 
 
@@ -87,7 +96,16 @@ def _number_out(value) -> float | None:
 
 
 def parse_model(said: str, name: str = "model") -> MarkerModel:
-    """The model in a text; `name` stands before what is wrong with it, as InputError."""
+    """Parse a model.
+
+    Args:
+        source: the text.
+        name: of the file, for messages.
+    Returns:
+        The model.
+    Raises:
+        InputError: if anything is wrong, with name and place.
+    """
     whole = object_of(said, name, _PAGE)
     try:
         return _model(whole)
@@ -96,9 +114,10 @@ def parse_model(said: str, name: str = "model") -> MarkerModel:
 
 
 def _model(whole) -> MarkerModel:
+    """Build the model from the parsed JSON."""
     check_names(whole, "the model", _WHOLE, ("version", "joints", "markers"))
     if whole["version"] != VERSION or isinstance(whole["version"], bool):
-        raise InputError("version", str(whole["version"])[:40], str(VERSION), "it is of another Beyond Mocap")
+        raise InputError("version", str(whole["version"])[:40], str(VERSION), "use the version that wrote it")
     joints = _objects(whole["joints"], "joint", _JOINT, ("name", "parent", "offset"))
     names = [text(row["name"], f"joint {i}: name") for i, row in enumerate(joints, 1)]
     if twice := repeated(names):
@@ -121,6 +140,7 @@ def _model(whole) -> MarkerModel:
 
 
 def _objects(value, what: str, known, needed) -> list[dict]:
+    """Check a list of objects and their keys; raise InputError where they are not valid."""
     rows = entries(value, f"{what}s")
     if len(rows) > _MOST:
         raise InputError(f"{what}s", f"{len(rows)}", f"at most {_MOST}")
@@ -130,6 +150,7 @@ def _objects(value, what: str, known, needed) -> list[dict]:
 
 
 def _skeleton(joints, names, index, tips) -> Skeleton:
+    """Build the skeleton from joints and tips."""
     if not joints:
         raise InputError("joints", "none", "a body")
     parents = [-1 if row["parent"] is None else _index(row["parent"], f"joint {i}: parent", index)
@@ -140,7 +161,7 @@ def _skeleton(joints, names, index, tips) -> Skeleton:
 
 
 def _freedom(joints) -> Freedom:
-    """Joints that say nothing of their freedom turn freely."""
+    """Build the freedom; joints without such entries turn freely."""
 
     def row(i: int, joint: dict) -> tuple:
         order = text(joint.get("order", "XYZ"), f"joint {i}: order")
@@ -155,17 +176,20 @@ def _freedom(joints) -> Freedom:
 
 
 def _three(value, where: str) -> list:
+    """Return a list of three values; raise InputError for anything else."""
     if not isinstance(value, list) or len(value) != 3:
         raise InputError(where, f"{len(value)} values" if isinstance(value, list) else "no list", "three values")
     return value
 
 
 def _column(rows, what: str, name: str, usual: float) -> np.ndarray:
+    """Read one number from each row; `usual` where it is missing."""
     return np.array([usual if row.get(name) is None else number(row[name], f"{what} {i}: {name}")
                      for i, row in enumerate(rows, 1)])  # fmt: skip
 
 
 def _ball(value, index) -> BallMarker | None:
+    """Read the ball marker; None where there is none."""
     if value is None:
         return None
     names = ("label", "joint", "centre", "radius")
@@ -178,6 +202,7 @@ def _ball(value, index) -> BallMarker | None:
 
 
 def _index(value, where: str, index: dict[str, int]) -> int:
+    """Return the index of a joint by its name; raise InputError where it does not exist."""
     name = text(value, where)
     if name not in index:
         raise InputError(where, f"no joint {name[:40]!r}", "one of the joints", "check the spelling")
@@ -185,12 +210,13 @@ def _index(value, where: str, index: dict[str, int]) -> int:
 
 
 def _places(rows, what: str, name: str) -> np.ndarray:
-    """(N, 3) metres."""
+    """Read (N, 3) metres."""
     places = [_place(row[name], f"{what} {i}: {name}") for i, row in enumerate(rows, 1)]
     return np.array(places, dtype=float).reshape(-1, 3)
 
 
 def _place(value, where: str) -> tuple[float, float, float]:
+    """Read a place of three coordinates in metres."""
     place = numbers(value, where, 3, _TRIPLE)
     if max(map(abs, place)) > _FARTHEST:
         raise InputError(where, f"{max(place, key=abs):g} m", "metres within a body", "check the unit")

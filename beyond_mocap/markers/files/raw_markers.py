@@ -1,5 +1,6 @@
-"""Markers as a file holds them, and their way to a trial of ours: one subject, metres, Z up, unique labels, nothing
-that is no marker."""
+"""Markers as a file contains them, and their conversion to a trial: one subject, metres, Z up, unique labels, only
+markers.
+"""
 
 from __future__ import annotations
 
@@ -15,13 +16,13 @@ from ...base.errors import InputError
 from ..trial import MarkerEvent, MarkerTrial, list_some
 from .unit_and_axes import decide_unit, handedness, read_given_unit, tall, up_axis
 
-_WILD = 1e9  # in any unit
-_FARTHEST = 1000.0  # metres from the origin: a mark for "not seen", or damage
+_WILD = 1e9  # in any unit; a larger coordinate is damage
+_FARTHEST = 1000.0  # metres from the origin; farther is a code for "not visible", or damage
 _UP = {(2, 1): ((0, 1, 2), (1, 1, 1)), (2, -1): ((0, 1, 2), (1, -1, -1)), (1, 1): ((0, 2, 1), (1, -1, 1)),
        (1, -1): ((0, 2, 1), (1, 1, -1)), (0, 1): ((1, 2, 0), (1, 1, 1)), (0, -1): ((1, 2, 0), (-1, 1, -1))}
-"""What points up in the file, (axis, sign) -> which of its axes ours are, and their signs: turned, never mirrored."""
+"""(up axis of the file, sign) -> the file's axes that become X, Y and Z, and their signs: rotations, no reflections."""
 
-FEWEST_OF_A_BODY = 10  # markers below which a subject of a file is taken for an object
+FEWEST_OF_A_BODY = 10  # markers; a subject of a file with fewer is taken for an object
 
 _COMPUTED = re.compile(
     r"(Angles?V?|Force|Moment|Power|GRF|CentreOfMass(Floor)?|CenterOfMass(Floor)?|^CoM(Floor)?|GroundReaction\w*"
@@ -31,12 +32,22 @@ _FRAME_OF = re.compile(r"(.+)([OALP])")
 
 @dataclass(kw_only=True)
 class RawMarkers:
-    """What a reader found. T frames, M points, the file's unit and axes.
+    """What a reader found: T frames, M points, in the file's unit and axes.
 
-    labels: as written. positions: (T, M, 3), NaN where not seen. residuals: (T, M) in the file's unit, NaN where not
-    seen; None where unknown. unit: as written, "" where absent. up: (axis, sign) as the file says; None where it does
-    not. usual_up: what such files have where they say nothing. prefixes: of labels, as the file names them. listed:
-    labels that the file says are no markers. events: (seconds, label, side, subject). notes: lines for people."""
+    Attributes:
+        labels: as written.
+        positions: (T, M, 3), NaN where not visible.
+        fps: frames per second.
+        unit: as written, "" where absent.
+        residuals: (T, M) in the file's unit, NaN where not visible; None where unknown.
+        up: (axis, sign) as the file says; None where it does not.
+        usual_up: what such files have where they do not say.
+        prefixes: prefixes of labels, as the file lists them.
+        computed: labels that the file lists as no markers.
+        events: (seconds, label, side, subject).
+        start: seconds of frame 0.
+        notes: messages for people.
+    """
 
     labels: list[str]
     positions: np.ndarray
@@ -54,10 +65,19 @@ class RawMarkers:
 
 def as_trial(raw: RawMarkers, path: str | os.PathLike, unit: float | str | None, subject: str | None,
              up: str | None) -> MarkerTrial:  # fmt: skip
-    """The trial that a file holds. unit: as the user gives it (`unit_and_axes.metres_per_unit`), None for the file's.
-    subject: whose markers, None for the only body. up: the file's axis that points up ("Z", "-Y"), None to find it.
+    """Convert raw markers to a trial.
 
-    InputError where no marker is ever seen, several bodies are in the file and none is chosen, or the unit is unknown.
+    Args:
+        raw: what a reader found.
+        path: the file, for messages and the name.
+        unit: as the user gives it (`unit_and_axes.parse_unit`); None for the file's.
+        subject: whose markers; None for the only body.
+        up: the file's axis that points up ("Z", "-Y"); None to detect it.
+    Returns:
+        The trial, metres, Z up.
+    Raises:
+        InputError: if no marker is ever visible, several bodies are in the file and none is chosen, or the unit is
+            unknown.
     """
     notes = list(raw.notes)
     chosen, labels, whose = _choose(raw, path, subject, notes)
@@ -73,7 +93,7 @@ def as_trial(raw: RawMarkers, path: str | os.PathLike, unit: float | str | None,
     positions *= metres
     far = wild | (np.abs(positions) > _FARTHEST).any(axis=-1)
     if far.any():
-        notes.append(f"{far.sum()} places farther than {_FARTHEST:.0f} m from the origin, taken as not seen")
+        notes.append(f"{far.sum()} places farther than {_FARTHEST:.0f} m from the origin, treated as not visible")
         positions[far] = np.nan
     positions[~np.isfinite(positions).all(axis=-1)] = np.nan
     labels, positions, residuals = _seen_only(path, labels, positions, residuals, notes)
@@ -89,7 +109,7 @@ def as_trial(raw: RawMarkers, path: str | os.PathLike, unit: float | str | None,
 
 
 def _choose(raw: RawMarkers, path, subject, notes) -> tuple[list[int], list[str], str]:
-    """Which points are the subject's markers, their labels, and who that is."""
+    """Choose the subject's points: their indices, their labels, and the subject."""
     listed = {split_label(label, raw.prefixes)[1] for label in raw.listed}
     parted = [split_label(label, raw.prefixes) for label in raw.labels]
     of: dict[str, list[str]] = {}
@@ -111,48 +131,56 @@ def _choose(raw: RawMarkers, path, subject, notes) -> tuple[list[int], list[str]
     if others := [name for name in counts if name not in ("", whose)]:
         notes.append(f"subject {whose or 'without a name'!r} of {list_some(list(counts))}")
         if objects := [name for name in others if counts[name] < FEWEST_OF_A_BODY]:
-            notes.append(f"markers of {list_some(objects)} kept under their own names")
+            notes.append(f"markers of {list_some(objects)} kept with their own names")
     labels, twice = make_unique(labels)
     if twice:
-        notes.append(f"labels that came twice, numbered: {list_some(twice)}")
+        notes.append(f"duplicate labels, numbered: {list_some(twice)}")
     return kept, labels, whose
 
 
 def _seen_only(path, labels, positions, residuals, notes):
-    """The markers that are seen at all."""
+    """Remove markers that are never visible; raise InputError if none is left."""
     ever = np.isfinite(positions).all(axis=-1).any(axis=0)
     if not ever.any():
-        raise InputError(path, f"{len(labels)} markers, none of them ever seen", "places of markers", "export it again")
+        raise InputError(path, f"{len(labels)} markers, none ever visible", "places of markers", "export it again")
     if not ever.all():
-        notes.append(f"never seen: {list_some([label for label, seen in zip(labels, ever) if not seen])}")
+        notes.append(f"never visible: {list_some([label for label, seen in zip(labels, ever) if not seen])}")
     labels = [label for label, seen in zip(labels, ever) if seen]
     return labels, positions[:, ever], None if residuals is None else residuals[:, ever]
 
 
 def _upright(raw: RawMarkers, labels, positions, given: str | None, notes) -> np.ndarray:
-    """The places with Z up: as given, else as the file says, else as the body stands, else as such files usually
-    are."""
+    """Rotate the places to Z up: as given, else as the file says, else as the body shows, else as such files usually
+    are.
+    """
     stands = up_axis(labels, positions)
     said = {"as given": None if given is None else axis_named(given), "as the file says": raw.up,
             "heads above feet": stands, "as such files usually are": raw.usual_up}
     why, up = next((why, up) for why, up in said.items() if up)
     notes.append(f"{_axis(up)} is up, {why}")
     if stands and stands != up and given is None:
-        notes.append(f"heads lie above feet along {_axis(stands)}, though: check which way is up")
+        notes.append(f"but heads are above feet along {_axis(stands)}: check which way is up")
     axes, signs = _UP[up]
     return positions[..., axes] * np.array(signs, dtype=float)
 
 
 def _events(raw: RawMarkers, whose: str) -> tuple[MarkerEvent, ...]:
+    """Select the events of the subject, and those without a subject."""
     return tuple(MarkerEvent(seconds, label, side) for seconds, label, side, name in raw.events
                  if not name or not whose or name == whose)  # fmt: skip
 
 
 def axis_named(name: str) -> tuple[int, int]:
-    """(axis 0..2, sign) of an axis's name: "Z", "+Y", "-x". InputError where it is none."""
+    """Parse the name of an axis: "Z", "+Y", "-x".
+
+    Returns:
+        (axis 0..2, sign).
+    Raises:
+        InputError: if it is not an axis.
+    """
     plain = name.strip().upper().lstrip("+-")
     if plain not in ("X", "Y", "Z") or len(name.strip()) > 2:
-        raise InputError("--up", f"axis {name[:20]!r}", "one of X, Y, Z, -X, -Y, -Z", "name the axis that points up")
+        raise InputError("up axis", f"axis {name[:20]!r}", "one of X, Y, Z, -X, -Y, -Z", "name the axis that points up")
     return "XYZ".index(plain), -1 if "-" in name else 1
 
 
@@ -161,7 +189,14 @@ def _axis(up: tuple[int, int]) -> str:
 
 
 def split_label(label: str, prefixes: Iterable[str] = ()) -> tuple[str, str]:
-    """(subject, label) of a label as files write it: "Derrick:C7", or by the prefixes that the file names."""
+    """Split a label as files write it ("Derrick:C7") into subject and label.
+
+    Args:
+        label: as written.
+        prefixes: that the file lists.
+    Returns:
+        (subject, label); the subject is "" without a prefix.
+    """
     for prefix in sorted((one for one in prefixes if one.strip()), key=len, reverse=True):
         if label.startswith(prefix) and len(label) > len(prefix):
             return prefix.strip().rstrip(":_").strip(), label[len(prefix) :].strip()
@@ -170,8 +205,15 @@ def split_label(label: str, prefixes: Iterable[str] = ()) -> tuple[str, str]:
 
 
 def find_computed(labels: Sequence[str], listed: Iterable[str] = ()) -> set[str]:
-    """Which of these are no markers: `listed` by the file as angles, forces and the like, named as such, or the four
-    points (O, A, L, P) of a segment's frame that Plug-in Gait works out."""
+    """Find the labels that are no markers.
+
+    Args:
+        labels: of one subject.
+        listed: labels that the file lists as angles, forces and the like.
+    Returns:
+        The listed labels, those named as such, and the four points (O, A, L, P) of a segment's frame that Plug-in Gait
+        computes.
+    """
     stems: dict[str, set[str]] = {}
     for label in labels:
         if frame := _FRAME_OF.fullmatch(label):
@@ -182,29 +224,44 @@ def find_computed(labels: Sequence[str], listed: Iterable[str] = ()) -> set[str]
 
 
 def chosen_subject(path, counts: dict[str, int], wanted: str | None) -> str:
-    """Whose markers are meant. counts: {subject: its markers}; wanted: by the user, None for the only body.
+    """Choose whose markers are meant.
 
-    InputError, which lists them, where there are several bodies or not the one wanted."""
+    Args:
+        path: for messages.
+        counts: {subject: number of its markers}.
+        requested: by the user; None for the only body.
+    Returns:
+        The subject.
+    Raises:
+        InputError: if there are several bodies, or not the requested one; the message lists them.
+    """
     named = ", ".join(f"{name!r} ({count} markers)" for name, count in counts.items() if name)
     if wanted is not None and wanted.strip():
         if not named:
             found = f"no subject {wanted.strip()[:60]!r}"
-            raise InputError(path, found, "no choice, since its labels name nobody", "leave out --subject")
+            raise InputError(path, found, "no choice, since its labels name no subject", "leave the subject empty")
         for name in counts:
             if name.lower() == wanted.strip().lower():
                 return name
-        raise InputError(path, f"no subject {wanted.strip()[:60]!r}", f"one of {named}", "choose one with --subject")
+        raise InputError(path, f"no subject {wanted.strip()[:60]!r}", f"one of {named}", "choose one subject")
     bodies = [name for name, count in counts.items() if count >= FEWEST_OF_A_BODY]
     named_bodies = [name for name in bodies if name]
     bodies = named_bodies or bodies
     if len(bodies) > 1:
-        raise InputError(path, f"{len(bodies)} subjects: {named}", "one", "choose one with --subject")
+        raise InputError(path, f"{len(bodies)} subjects: {named}", "one", "choose one subject")
     return bodies[0] if bodies else max(counts, key=counts.__getitem__)
 
 
 def make_unique(labels: Sequence[str]) -> tuple[list[str], list[str]]:
-    """The labels without repetition, and those that came twice: the second "LASI" is called "LASI (2)". A marker
-    without a label becomes "*1", "*2" ..., as trackers call the unlabeled."""
+    """Make labels unique: the second "LASI" becomes "LASI (2)".
+
+    A marker without a label becomes "*1", "*2" ..., as trackers name unlabeled markers.
+
+    Args:
+        labels: as written.
+    Returns:
+        The unique labels, and those that occurred more than once.
+    """
     out: list[str] = []
     taken, twice, unnamed = {label for label in labels if label}, [], 0
     met: set[str] = set()

@@ -1,8 +1,9 @@
-"""TRC files, read and written: markers as text, as Motion Analysis wrote them first and OpenSim does today.
+"""Read and write TRC files: markers as text, first written by Motion Analysis, today by OpenSim.
 
-Five lines of head (kind, names and values of the rate, count and unit, labels, coordinates), then a row for each frame:
-number, time, X Y Z of every marker. There is no standard; blanks, missing cells, decimal commas, line ends and codings
-differ, and are read leniently. What a body would come out wrong by is said. Written are millimetres, Y up.
+Five header lines (kind, names and values of the rate, count and unit, labels, coordinates), then one row for each
+frame: number, time, X Y Z of every marker. There is no standard; blanks, missing cells, decimal commas, line ends and
+encodings differ, and are read leniently. Anything that would make a body wrong is reported. Files are written in
+millimetres, Y up.
 """
 
 from __future__ import annotations
@@ -23,19 +24,26 @@ from .raw_markers import RawMarkers, as_trial
 
 _MISSING = {"", "nan", "-", "na", "n/a", "null", "none", "inf", "-inf"}
 _EXPORT_AGAIN = "export it again"
-_MOST_FRAMES = 2_000_000
-_LARGEST = 4_000_000_000  # bytes
+_MOST_FRAMES = 2_000_000  # with filled gaps
+_LARGEST = 4_000_000_000  # bytes of a file
 
 _PLACE = "%.4f\t%.4f\t%.4f"
 
 
 def read_trc(path: str | os.PathLike, unit: float | str | None = None, subject: str | None = None,
              up: str | None = None) -> MarkerTrial:  # fmt: skip
-    """The trial in a TRC file. Its Y is up unless the body in it stands otherwise.
+    """Read the trial in a TRC file. Y is up unless the body shows otherwise.
 
-    unit: metres per unit or a name; None for the file's own. subject: whose markers, where labels have prefixes.
-    up: the file's axis that points up, None to find it.
-    InputError, with the line, where the file is missing, damaged or no TRC file, and as `raw_markers.as_trial`."""
+    Args:
+        path: the file.
+        unit: metres per unit or a name; None for the file's own.
+        subject: whose markers, if labels have prefixes.
+        up: the file's axis that points up; None to detect it.
+    Returns:
+        The trial, metres, Z up.
+    Raises:
+        InputError: if the file is missing, damaged or not a TRC file, with the line, and as `raw_markers.build_trial`.
+    """
     path = Path(path)
     lines = _lines(path)
     head = _head(path, lines)
@@ -47,7 +55,7 @@ def read_trc(path: str | os.PathLike, unit: float | str | None = None, subject: 
 
 
 def _lines(path: Path) -> list[str]:
-    """The lines of the file, ends and blanks at the end taken off."""
+    """Read the lines of the file, without their ends."""
     data = content(path, "a TRC file", _LARGEST)
     if not data.strip():
         raise InputError(path, "an empty file", "a TRC file", _EXPORT_AGAIN)
@@ -65,8 +73,16 @@ def _lines(path: Path) -> list[str]:
 
 @dataclass(frozen=True, kw_only=True)
 class _Head:
-    """What stands above the rows. columns: (M, 3) of the cells with X, Y and Z; first_row: index of the line where the
-    rows begin; values: of the head, by their names in small letters; tabs: whether they part the cells."""
+    """The header of a file.
+
+    Attributes:
+        labels: M labels.
+        columns: (M, 3) columns of the cells with X, Y and Z.
+        first_row: index of the line where the rows begin.
+        values: of the header, by their names in lower case.
+        tabs: whether tabs separate the cells.
+        notes: messages for people.
+    """
 
     labels: list[str]
     columns: np.ndarray
@@ -77,10 +93,11 @@ class _Head:
 
     @property
     def unit(self) -> str:
+        """Unit in the header, "" without one."""
         return self.values.get("units", "")
 
     def number(self, name: str) -> float:
-        """A value of the head; NaN where it is absent or no number."""
+        """Return a value of the header; NaN where it is absent or not a number."""
         try:
             value = float(self.values.get(name, "").replace(",", "."))
         except ValueError:
@@ -89,9 +106,10 @@ class _Head:
 
 
 def _head(path: Path, lines: list[str]) -> _Head:
+    """Parse the header; raise InputError where it is not that of a TRC file."""
     at = next((i for i, line in enumerate(lines[:20]) if line.lstrip().lower().startswith("frame#")), None)
     if at is None:
-        raise InputError(f"{path}:1", "no line that begins with Frame#", "the head of a TRC file", "choose a TRC file")
+        raise InputError(f"{path}:1", "no line that starts with Frame#", "a TRC header", "choose a TRC file")
     tabs = "\t" in lines[at]
     below = next((i for i in range(at + 1, min(at + 4, len(lines))) if re.match(r"\s*[XYZ]\d+(\s|$)", lines[i])), None)
     named = _cells(lines[at], tabs)
@@ -106,7 +124,7 @@ def _head(path: Path, lines: list[str]) -> _Head:
     notes, values = [], _values(lines, at, tabs)
     said = values.get("nummarkers", "")
     if said.isdigit() and int(said) != len(labels):
-        notes.append(f"{len(labels)} markers, not the {said} of the head")
+        notes.append(f"{len(labels)} markers, not {said} as in the header")
     columns = np.array(starts)[:, None] + np.array(order)
     return _Head(labels=labels, columns=columns, first_row=(at if below is None else below) + 1, values=values,
                  tabs=tabs, notes=notes)
@@ -117,7 +135,7 @@ def _cells(line: str, tabs: bool) -> list[str]:
 
 
 def _labels(path: Path, named: list[str], at: int, tabs: bool) -> tuple[list[str], list[int]]:
-    """Labels and the first column of each: every third cell where tabs part them, one after the other else."""
+    """Parse the labels and the first column of each: every third cell with tabs, else one after the other."""
     if len(named) < 3 or not named[1].lower().startswith("time"):
         raise InputError(f"{path}:{at + 1}", f"{' '.join(named[:2])[:40]!r}", "Frame#, Time and labels", _EXPORT_AGAIN)
     if not tabs:
@@ -134,8 +152,9 @@ def _labels(path: Path, named: list[str], at: int, tabs: bool) -> tuple[list[str
 
 
 def _by_coordinates(path, cells, below, labels, starts, tabs):
-    """Labels, first columns and the order of the axes, as the line X1 Y1 Z1 ... has them; markers without a label are
-    kept."""
+    """Parse the line X1 Y1 Z1 ...: labels, first columns and the order of the axes; markers without a label are
+    kept.
+    """
     names = [cell for cell in cells if cell]
     letters = "".join(name[0].upper() for name in names[:3])
     if sorted(letters) != ["X", "Y", "Z"] or len(names) % 3:
@@ -149,7 +168,7 @@ def _by_coordinates(path, cells, below, labels, starts, tabs):
 
 
 def _values(lines: list[str], at: int, tabs: bool) -> dict[str, str]:
-    """The values of the head by their names: a line of names over a line of values."""
+    """Parse the values of the header by their names: a line of names above a line of values."""
     for i in range(at - 1):
         names = lines[i].split()
         if names and names[0].lower() == "datarate":
@@ -162,7 +181,7 @@ def _values(lines: list[str], at: int, tabs: bool) -> dict[str, str]:
 
 
 def _rows(path: Path, lines: list[str], head: _Head) -> tuple[list[str], np.ndarray]:
-    """(T texts of Time, (T, M, 3) places, NaN where a cell is empty)."""
+    """Parse the rows: T texts of Time, and (T, M, 3) places, NaN where a cell is empty."""
     width = int(head.columns.max()) + 1
     times, rows = [], []
     for i in range(head.first_row, len(lines)):
@@ -172,20 +191,22 @@ def _rows(path: Path, lines: list[str], head: _Head) -> tuple[list[str], np.ndar
         times.append(cells[1].strip())
         rows.append(_numbers(path, i, cells[2:]))
     if not rows:
-        raise InputError(path, "no rows below the head", "a row for each frame", _EXPORT_AGAIN)
+        raise InputError(path, "no rows below the header", "a row for each frame", _EXPORT_AGAIN)
     return times, np.array(rows)[:, head.columns - 2]
 
 
 def _row(path: Path, index: int, line: str, head: _Head, width: int) -> list[str]:
-    """The cells of a row, filled up where empty ones at its end are left out. InputError where there are more than
-    markers, or a place is cut in two."""
+    """Split a row into cells, and add empty ones that are left out at its end.
+
+    Raises InputError where there are more cells than markers, or a place is cut in two.
+    """
     cells = line.split("\t") if head.tabs else line.split()
     while len(cells) > width and not cells[-1].strip():
         cells.pop()
     place = f"{path}:{index + 1}"
     if len(cells) > width:
         found = f"{len(cells) - 2} coordinates"
-        raise InputError(place, found, f"{width - 2} for {len(head.labels)} markers", "one recording a file")
+        raise InputError(place, found, f"{width - 2} for {len(head.labels)} markers", "one recording per file")
     while head.tabs and cells and not cells[-1].strip():
         cells.pop()
     short = width - len(cells)
@@ -197,7 +218,7 @@ def _row(path: Path, index: int, line: str, head: _Head, width: int) -> list[str
 
 
 def _numbers(path: Path, index: int, cells: list[str]) -> np.ndarray:
-    """(3 M,) float of one row's cells, NaN where there is nothing."""
+    """Parse (3 M,) float of one row's cells, NaN for empty ones."""
     try:
         return np.array(list(map(float, cells)))
     except ValueError:
@@ -205,33 +226,37 @@ def _numbers(path: Path, index: int, cells: list[str]) -> np.ndarray:
 
 
 def _number(path: Path, cell: str, line: int, column: int) -> float:
+    """Parse one cell; raise InputError with line and column where it is not a number."""
     if cell.lower() in _MISSING:
         return math.nan
     try:
         return float(cell if "." in cell else cell.replace(",", "."))
     except ValueError:
-        raise InputError(f"{path}:{line}", f"{cell[:40]!r} in column {column}", "a number", "mend it") from None
+        raise InputError(f"{path}:{line}", f"{cell[:40]!r} in column {column}", "a number", "correct it") from None
 
 
 # -- time
 
 
 def _on_one_clock(path: Path, head: _Head, times: list[str], positions: np.ndarray):
-    """(frames per second, seconds of the first frame, places, notes): frames that the times leave out are put in, not
-    seen. InputError where times go back or are not those of one rate."""
+    """Align the rows to one frame rate; frames missing in the times are added as not visible.
+
+    Returns frames per second, seconds of the first frame, places and messages. Raises InputError where times go back or
+    have no single rate.
+    """
     rates = (head.number(name) for name in ("datarate", "camerarate", "origdatarate"))
     said = next((rate for rate in rates if rate > 0), math.nan)
     seconds, coarse = _seconds(times)
     if len(times) < 2 or not np.isfinite(seconds).all() or np.ptp(seconds) == 0:
         _check_rate(path, said)
-        told = [] if len(times) < 2 else ["no times in the file: frames follow one another at DataRate"]
+        told = [] if len(times) < 2 else ["no times in the file: DataRate is used as the frame rate"]
         return said, 0.0 if not np.isfinite(seconds[:1]).all() else float(seconds[0]), positions, told
     steps = np.diff(seconds)
-    only_coarse = bool((steps >= 0).all()) and said > 0 and 1 / said < coarse  # equal times, of few digits
+    only_coarse = bool((steps >= 0).all()) and said > 0 and 1 / said < coarse  # equal times, written with few digits
     if (steps <= 0).any() and not only_coarse:
         frame = int(np.argmax(steps <= 0)) + 2
         found = f"Time of frame {frame} is {times[frame - 1][:20]}, after {times[frame - 2][:20]}"
-        raise InputError(path, found, "times that grow", "one recording a file")
+        raise InputError(path, found, "increasing times", "one recording per file")
     fps, told = _rate(said, seconds, steps, coarse)
     _check_rate(path, fps)
     frames = np.rint((seconds - seconds[0]) * fps).astype(int)
@@ -240,13 +265,13 @@ def _on_one_clock(path: Path, head: _Head, times: list[str], positions: np.ndarr
         frames = plain
     off = np.abs((seconds - seconds[0]) - frames / fps).max()
     if len(np.unique(frames)) < len(frames) or off > max(0.25 / fps, coarse):
-        found = f"times that lie up to {1000 * off:.3g} ms beside {fps:g} frames per second"
+        found = f"times that are up to {1000 * off:.3g} ms off {fps:g} frames per second"
         raise InputError(path, found, "one rate", "resample it to one rate")
     return fps, float(seconds[0]), *_with_gaps(path, frames, positions, told)
 
 
 def _seconds(times: list[str]) -> tuple[np.ndarray, float]:
-    """(T,) seconds, NaN where there is none, and how coarsely they are written."""
+    """Parse (T,) seconds, NaN for invalid ones, and the resolution of their digits."""
     texts = [time.replace(",", ".") for time in times]
 
     def value(text: str) -> float:
@@ -261,7 +286,7 @@ def _seconds(times: list[str]) -> tuple[np.ndarray, float]:
 
 
 def _rate(said: float, seconds: np.ndarray, steps: np.ndarray, coarse: float) -> tuple[float, list[str]]:
-    """Frames per second: as the head says where the times agree, else as the times do, which is told."""
+    """Choose the frame rate: the header's where the times agree, else that of the times, with a message."""
     if said > 0:
         frames = np.rint((seconds - seconds[0]) * said)
         exact = np.abs(seconds - seconds[0] - frames / said).max() <= coarse + 0.1 / said
@@ -271,35 +296,50 @@ def _rate(said: float, seconds: np.ndarray, steps: np.ndarray, coarse: float) ->
     mean = (len(seconds) - 1) / float(seconds[-1] - seconds[0])
     own = mean if abs(mean / own - 1) < 0.05 else own
     own = round(own) if abs(own - round(own)) < 0.005 * own and round(own) else own
-    return own, [f"{own:g} frames per second by the times; the head says {said:g}"] if said > 0 else []
+    return own, [f"{own:g} frames per second by the times; the header says {said:g}"] if said > 0 else []
 
 
 def _check_rate(path: Path, fps: float) -> None:
+    """Raise InputError where the rate is out of range."""
     if not FEWEST_FPS <= fps <= MOST_FPS:
         expected = f"{FEWEST_FPS:g} to {MOST_FPS:g}"
         raise InputError(path, f"{fps:g} frames per second", expected, "check DataRate and Time")
 
 
 def _with_gaps(path: Path, frames: np.ndarray, positions: np.ndarray, told: list[str]):
-    """Places with a frame for each number, and the notes."""
+    """Insert missing frames as not visible; return the places and the messages."""
     count = int(frames[-1]) + 1
     missing = count - len(frames)
     if not missing:
         return positions, told
     if count > min(20 * len(frames) + 1000, _MOST_FRAMES):
-        raise InputError(path, f"times that leave out {missing} frames of {count}", "one recording", "cut it in two")
+        raise InputError(path, f"times that skip {missing} frames of {count}", "one recording", "split it in two")
     whole = np.full((count, *positions.shape[1:]), np.nan)
     whole[frames] = positions
-    return whole, [*told, f"{missing} frames that the times leave out, not seen"]
+    return whole, [*told, f"{missing} frames missing in the times, added as not visible"]
 
 
 def write_trc(trial: MarkerTrial, path: str | os.PathLike) -> None:
-    """Write a trial; cells of markers that are not seen stay empty. InputError where it cannot be written."""
+    """Write a trial as a TRC file; cells of markers that are not visible stay empty.
+
+    Args:
+        trial: the trial.
+        path: the file.
+    Raises:
+        InputError: if the file cannot be written.
+    """
     atomic_write(path, trc_text(trial, Path(path).name))
 
 
 def trc_text(trial: MarkerTrial, name: str = "") -> str:
-    """The text of a TRC file; `name` stands in its first line."""
+    """Format a trial as TRC text.
+
+    Args:
+        trial: the trial.
+        name: in the first line; "" uses the trial's name.
+    Returns:
+        The text, millimetres, Y up.
+    """
     labels = [" ".join(label.split()) for label in trial.labels]
     count, rate = len(labels), f"{trial.fps:.6f}"
     head = [f"PathFileType\t4\t(X/Y/Z)\t{name or trial.name}",
@@ -314,7 +354,7 @@ def trc_text(trial: MarkerTrial, name: str = "") -> str:
 
 
 def _row_text(places: np.ndarray, seen: np.ndarray) -> str:
-    """One frame's (M, 3) places in millimetres; empty cells where a marker is not seen."""
+    """Format one frame's (M, 3) places in millimetres; empty cells where a marker is not visible."""
     if seen.all():
         return "\t".join([_PLACE] * len(seen)) % tuple(places.ravel().tolist())
     return "\t".join(_PLACE % tuple(place) if there else "\t\t" for place, there in zip(places.tolist(), seen))

@@ -1,6 +1,6 @@
-"""Metres per unit and the axis that points up in a file of markers: as its header says, or as the body in it tells.
+"""Metres per unit and the up axis of a marker file: as its header says, or as the body in it shows.
 
-Names of markers tell which way is up and whether left is left: heads stand above feet, toes before heels.
+The names of markers show which way is up and which side is left: heads are above feet, toes in front of heels.
 """
 
 from __future__ import annotations
@@ -20,26 +20,35 @@ NAMES = {"m": 1.0, "meter": 1.0, "meters": 1.0, "metre": 1.0, "metres": 1.0, "dm
          "centimetres": 0.01, "mm": 0.001, "millimeter": 0.001, "millimeters": 0.001, "millimetre": 0.001,
          "millimetres": 0.001, "um": 1e-6, "micrometer": 1e-6, "micrometers": 1e-6, "in": 0.0254, "inch": 0.0254,
          "inches": 0.0254, '"': 0.0254, "ft": 0.3048, "foot": 0.3048, "feet": 0.3048}
-_GUESSED = ("mm", "m", "cm", "in")
+_GUESSED = ("mm", "m", "cm", "in")  # units that are tried
 _USUAL = 1.5  # metres that the markers of a standing body span
-_GUESS_RANGE = (0.5, 2.6)
-_BODY_RANGE = (0.1, 10.0)
-_HEIGHT_RANGE = (0.25, 2.8)  # from the feet to the head, or to the pelvis where nothing above is marked
-_GIVEN_RANGE = (0.01, 100.0)
-_SAY = "say --unit (metres per unit, or mm, cm, m, in)"
+_GUESS_RANGE = (0.5, 2.6)  # metres that the markers may span for a guessed unit
+_BODY_RANGE = (0.1, 10.0)  # metres that they may span for the header's unit
+_HEIGHT_RANGE = (0.25, 2.8)  # metres from the feet to the head, or to the pelvis without markers above it
+_GIVEN_RANGE = (0.01, 100.0)  # metres that the markers may span for a given unit
+_SAY = "set the unit (metres per unit, or mm, cm, m, in)"
 
 HIGH = re.compile(r"HD$|HEAD|^C7$|^T[1-4]$|CLAV|STRN|^MAN|SHO?U?L?D?E?R?$|ACR|SJN", re.I)
 MIDDLE = re.compile(r"ASI|PSI|SACR", re.I)
 LOW = re.compile(r"HEE|TOE|ANK|MAL|CALC|FOOT|MT\d?$|MFS|^[LR]?MT|MET", re.I)
 FRONT, BACK = re.compile(r"TOE|MT\d?$|ASI", re.I), re.compile(r"HEE|CALC|PSI|SACR", re.I)
-_DECISIVE = 0.7  # of the way from feet to head along one axis, in the median frame
-_FRAMES = 400  # looked at
-_TINY = 1e-300  # of any unit: only points that coincide have no direction
-_SURE = 0.25  # sine volume of the three directions
+_DECISIVE = 0.7  # share of the direction from feet to head along one axis, in the median frame
+_FRAMES = 400  # frames that are used
+_TINY = 1e-300  # in any unit; only coinciding points have no direction
+_SURE = 0.25  # volume of the three unit directions, from which on the handedness is clear
 
 
-def metres_per_unit(unit: float | str, where: object = "--unit") -> float:
-    """A unit as users give it: metres per unit, or a name. InputError where it is neither."""
+def metres_per_unit(unit: float | str, where: object = "unit") -> float:
+    """Parse a unit as users give it.
+
+    Args:
+        unit: metres per unit, or a name.
+        where: for messages.
+    Returns:
+        Metres per unit.
+    Raises:
+        InputError: if it is neither.
+    """
     value = NAMES.get(str(unit).strip().lower())
     if value is None:
         try:
@@ -52,23 +61,39 @@ def metres_per_unit(unit: float | str, where: object = "--unit") -> float:
 
 
 def read_given_unit(path: str | os.PathLike, unit: float | str, positions: np.ndarray) -> tuple[float, str]:
-    """(metres per unit, line on it) of a unit that the user gives; positions: (T, M, 3) in the file's unit. InputError
-    where it is none, or makes something of the body that no body is."""
+    """Check a unit given by the user against the size of the body.
+
+    Args:
+        path: for messages.
+        unit: metres per unit, or a name.
+        positions: (T, M, 3) in the file's unit.
+    Returns:
+        Metres per unit, and a message.
+    Raises:
+        InputError: if it is not a unit, or gives an impossible size.
+    """
     metres, span = metres_per_unit(unit), body_span(positions)
     if span > 0 and not _GIVEN_RANGE[0] <= span * metres <= _GIVEN_RANGE[1]:
         found = f"makes {path} span {span * metres:.4g} m"
-        raise InputError(f"--unit {str(unit)[:40]}", found, "a body", "check the unit")
+        raise InputError(f"unit {str(unit)[:40]}", found, "a body", "check the unit")
     told = f"unit {metres:g} m, as given"
     usual = not span or _BODY_RANGE[0] <= span * metres <= _BODY_RANGE[1]
-    return metres, told if usual else f"{told}: makes the markers span {span * metres:.4g} m, as no body does"
+    return metres, told if usual else f"{told}: the markers then span {span * metres:.4g} m, unusual for a body"
 
 
 def decide_unit(path: str | os.PathLike, said: str, positions: np.ndarray, height: float = 0.0) -> tuple[float, str]:
-    """(metres per unit, line on how it was found). said: as the header has it; positions: (T, M, 3) in the file's unit;
-    height: from feet to head (or pelvis) in it, 0 where unknown.
+    """Decide the unit of a file.
 
-    InputError, which names --unit, where neither header nor size tell, or where the body is impossibly large or small
-    by what the header says."""
+    Args:
+        path: for messages.
+        header_unit: unit in the header, "" for none.
+        positions: (T, M, 3) in the file's unit.
+        height: from feet to head (or pelvis) in that unit, 0 where unknown.
+    Returns:
+        Metres per unit, and a message on how it was decided.
+    Raises:
+        InputError: if neither header nor size give the unit, or the header's unit gives an impossible size.
+    """
     known = NAMES.get(said.strip().lower())
     span = body_span(positions)
     if known is not None:
@@ -88,7 +113,7 @@ def decide_unit(path: str | os.PathLike, said: str, positions: np.ndarray, heigh
 
 
 def body_span(positions: np.ndarray) -> float:
-    """How far the markers reach along the axis of their largest reach, in a usual frame; 0 where nothing is seen."""
+    """Measure how far the markers extend along their longest axis, in a usual frame; 0 without visible markers."""
     few = positions[:: max(len(positions) // 400, 1)]
     seen = np.isfinite(few)
     reach = np.where(seen, few, -np.inf).max(axis=1) - np.where(seen, few, np.inf).min(axis=1)
@@ -97,10 +122,14 @@ def body_span(positions: np.ndarray) -> float:
 
 
 def up_axis(labels: Sequence[str], positions: np.ndarray) -> tuple[int, int] | None:
-    """(axis 0..2, sign) along which heads (or pelvis) lie above feet; None where the names do not tell or the body
-    lies down.
+    """Detect the axis along which heads (or the pelvis) are above feet.
 
-    positions: (T, M, 3), any unit, any axes, NaN where not seen."""
+    Args:
+        labels: M labels.
+        positions: (T, M, 3), any unit and axes, NaN where not visible.
+    Returns:
+        (axis 0..2, sign); None where the labels do not show it, or the body lies down.
+    """
     up = _upwards(labels, positions)
     if up is None:
         return None
@@ -110,8 +139,14 @@ def up_axis(labels: Sequence[str], positions: np.ndarray) -> tuple[int, int] | N
 
 
 def tall(labels: Sequence[str], positions: np.ndarray) -> float:
-    """How far heads (or pelvis) usually lie from the feet, in the unit of the positions (T, M, 3); 0 where the names do
-    not tell."""
+    """Measure the usual distance from feet to head (or pelvis).
+
+    Args:
+        labels: M labels.
+        positions: (T, M, 3).
+    Returns:
+        The distance in the positions' unit; 0 where the labels do not show it.
+    """
     for high in (HIGH, MIDDLE):
         apart = _apart(labels, positions, LOW, high)
         length = np.linalg.norm(apart, axis=-1) if apart is not None else np.zeros(0)
@@ -121,10 +156,17 @@ def tall(labels: Sequence[str], positions: np.ndarray) -> float:
 
 
 def handedness(labels: Sequence[str], positions: np.ndarray) -> float:
-    """How surely the body is as bodies are: near +1 where ahead, left and up, as the names of markers tell them, form a
-    right-handed frame; near -1 where it is mirrored (its coordinates, or its left and right labels); 0 where unknown.
+    """Measure whether the body is right-handed or mirrored.
 
-    positions: (T, M, 3), any unit and axes, NaN where not seen."""
+    Ahead, left and up, by the names of markers, form a right-handed frame, or a left-handed one if the coordinates are
+    mirrored or left and right labels exchanged.
+
+    Args:
+        labels: M labels.
+        positions: (T, M, 3), any unit and axes, NaN where not visible.
+    Returns:
+        Near +1 for right-handed, near -1 for mirrored, 0 where unknown.
+    """
     ahead, up, sides = _between(labels, positions, BACK, FRONT), _upwards(labels, positions), _sides(labels)
     if ahead is None or up is None or not sides:
         return 0.0
@@ -137,25 +179,27 @@ def handedness(labels: Sequence[str], positions: np.ndarray) -> float:
 
 
 def _upwards(labels, positions) -> np.ndarray | None:
-    """(t, 3) unit directions from the feet to the head, or to the pelvis where only legs are marked."""
+    """Measure (t, 3) unit directions from the feet to the head, or to the pelvis where only legs have markers."""
     whole = _between(labels, positions, LOW, HIGH)
     return _between(labels, positions, LOW, MIDDLE) if whole is None else whole
 
 
 def _few(positions: np.ndarray) -> np.ndarray:
-    """Some frames, spread over the trial."""
+    """Return some frames, spread over the trial."""
     return positions[:: max(len(positions) // _FRAMES, 1)]
 
 
 def _between(labels, positions, start: re.Pattern, end: re.Pattern) -> np.ndarray | None:
-    """(t, 3) unit directions from the middle of some markers to that of others; None where there are none."""
+    """Measure (t, 3) unit directions from the middle of some markers to that of others; None where there are none."""
     apart = _apart(labels, positions, start, end)
     direction = None if apart is None else unit_vectors(apart, np.nan, _TINY)
     return None if direction is None or not np.isfinite(direction).any() else direction
 
 
 def _apart(labels, positions, start: re.Pattern, end: re.Pattern) -> np.ndarray | None:
-    """(t, 3) from the middle of some markers to that of others, in some frames; None where no labels are such."""
+    """Measure (t, 3) vectors from the middle of some markers to that of others, in some frames; None without such
+    labels.
+    """
     ends = [[i for i, label in enumerate(labels) if pattern.search(label)] for pattern in (start, end)]
     if not all(ends):
         return None
@@ -164,14 +208,14 @@ def _apart(labels, positions, start: re.Pattern, end: re.Pattern) -> np.ndarray 
 
 
 def _sides(labels) -> list[tuple[int, int]]:
-    """(left, right) indices of markers whose names differ in their first letter, or in Left and Right."""
+    """List (left, right) indices of markers whose names differ in their first letter, or in Left and Right."""
     where = {label.upper(): i for i, label in enumerate(labels)}
     swapped = ((label, re.sub(r"^L(EFT)?", lambda m: "RIGHT" if m[1] else "R", label)) for label in where)
     return [(where[label], where[other]) for label, other in swapped if other != label and other in where]
 
 
 def _mean(values: np.ndarray, axis: int) -> np.ndarray:
-    """The mean of what is a number; NaN where nothing is."""
+    """Compute the mean along `axis`, ignoring NaN; NaN where all values are."""
     seen = np.isfinite(values)
     count = seen.sum(axis=axis)
     with np.errstate(invalid="ignore", divide="ignore"):

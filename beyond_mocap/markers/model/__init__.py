@@ -1,1 +1,1 @@
-"""The model that is fitted to markers: set, landmarks, calibration, subject (Fredriksson §5.2)."""
+"""The model that is fitted to markers: marker set, landmarks, calibration, subject (Fredriksson section 5.2)."""

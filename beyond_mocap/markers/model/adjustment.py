@@ -1,13 +1,13 @@
-"""A model and its poses in many frames, adjusted together: all markers of all frames tell joint centres, bone lengths
-and the markers' places, weighed against what was known before.
+"""Adjust a model and its poses in many frames together (bundle adjustment).
 
-This is how surveyors and photographs' cameras are adjusted. The unknowns of one frame (its pose) touch that frame
-alone, so they are eliminated frame by frame (Schur's complement), and what is left is one small system for the body.
-Where the motion turns a joint far, its centre follows from the motion, as in functional methods; where it does not, the
-predicted centre stays: each counts by its uncertainty.
+All markers of all frames determine joint centres, bone lengths and the markers' places, weighted against prior
+knowledge. The unknowns of one frame (its pose) affect that frame alone, so they are eliminated frame by frame (Schur
+complement), which leaves one small system for the body. Where the motion rotates a joint far, its centre follows from
+the motion, as in functional methods; where it does not, the predicted centre stays: each is weighted by its
+uncertainty.
 
-Pose unknowns are small turns about the world's axes and a shift of the root; a marker x below a joint at p moves by
-turn x (x - p).
+Pose unknowns are small rotations about the world's axes and a shift of the root; a marker x below a joint at p moves by
+rotation x (x - p).
 """
 
 from __future__ import annotations
@@ -20,19 +20,26 @@ from ...base.vectors import skew_matrix
 from ...motion import quaternion
 from ...motion.motion import Motion
 
-_HUBER = 2.5  # sigmas beyond which a marker counts less
-_HINGES = {"Leg": (1, 2, 0), "ForeArm": (2, 1, None)}  # axis of the bend, axis that must stay square to it, its twist
-_LARGEST_TURN = 0.3  # radians in one step: further off the equations are no longer straight
+_HUBER = 2.5  # sigmas beyond which a marker has less weight
+_HINGES = {"Leg": (1, 2, 0), "ForeArm": (2, 1, None)}  # bend axis, axis at right angles to it, twist axis
+_LARGEST_TURN = 0.3  # radians in one step; beyond, the equations are no longer linear
 _CARRY, _TWIST = np.radians(4.0), np.radians(15.0)
-"""How far a hinge's axis strays (radians): to the side, and about the limb (knees)."""
+"""Tolerance in radians of a hinge's axis: to the side, and about the limb (knees)."""
 
 
 @dataclass(eq=False, kw_only=True)
 class Body:
-    """What is adjusted, J joints and M markers.
+    """The unknowns of the body: J joints and M markers.
 
-    names, parents: of the skeleton. offsets: (J, 3) m. joint: (M,). places: (M, 3) m. held: (J,) bool, joints that do
-    not turn. limb: (J,) axis (0, 1, 2) along which the bone to this joint lies exactly, -1 where it may lie anyhow."""
+    Attributes:
+        names: joint names.
+        parents: index of each joint's parent, -1 for the root.
+        offsets: (J, 3) metres, each joint in its parent's frame.
+        joint: (M,) index of the joint that carries each marker.
+        places: (M, 3) metres in that joint's frame.
+        is_fixed: (J,) bool, joints that do not turn.
+        limb: (J,) axis (0, 1, 2) along which the bone to this joint lies exactly, -1 where it may have any direction.
+    """
 
     names: tuple[str, ...]
     parents: tuple[int, ...]
@@ -45,8 +52,15 @@ class Body:
 
 @dataclass(eq=False, kw_only=True)
 class Prior:
-    """What was known before: offsets (J, 3) m with sigma (J,), places (M, 3) m with sigma (M,), and by how much the
-    bones of both sides may differ (m)."""
+    """What is known before the adjustment.
+
+    Attributes:
+        offsets: (J, 3) metres.
+        offset_sigma: (J,) metres.
+        places: (M, 3) metres.
+        place_sigma: (M,) metres.
+        side_sigma: metres by which left and right bones may differ.
+    """
 
     offsets: np.ndarray
     offset_sigma: np.ndarray
@@ -57,9 +71,13 @@ class Prior:
 
 @dataclass(eq=False)
 class Pull:
-    """Turns that are drawn to the rest pose: joint -> (3,) radians of play about its own X, Y, Z (inf: none).
+    """Rotations that are pulled to the rest pose.
 
-    runs: joints between which no marker stands; they turn alike up to `uneven` radians."""
+    Attributes:
+        tolerance: joint -> (3,) radians about its own X, Y and Z axes, inf for none.
+        runs: joints between which no marker lies; they turn alike.
+        run_tolerance: radians by which the joints of a run may differ.
+    """
 
     play: dict[int, np.ndarray]
     runs: tuple[tuple[int, ...], ...] = ()
@@ -67,10 +85,19 @@ class Pull:
 
 
 class Adjustment:
-    """The running adjustment of one body over F frames."""
+    """The adjustment of one body over F frames: damped Gauss-Newton with robust weights."""
 
     def __init__(self, body: Body, prior: Prior, pull: Pull, seen: np.ndarray, sigma: np.ndarray, worth: float):
-        """seen: (F, M, 3) m, NaN where not seen. sigma: (M,) m. worth: how many independent frames they are worth."""
+        """Set up the adjustment.
+
+        Args:
+            body: the unknowns; changed in place.
+            prior: what is known before.
+            pull: the pull to the rest pose.
+            seen: (F, M, 3) metres, NaN where not visible.
+            sigma: (M,) metres, deviation of each marker.
+            effective_frames: effective number of independent frames.
+        """
         self.body, self.prior, self.pull = body, prior, pull
         self.there = np.isfinite(seen).all(axis=-1)
         self.seen = np.where(self.there[..., None], seen, 0.0)
@@ -79,18 +106,23 @@ class Adjustment:
         self.columns = _Columns(body)
 
     def start(self, motion: Motion) -> None:
-        """Begin from these poses of F frames."""
+        """Start from a motion's poses of F frames."""
         self.root = motion.root_positions.copy()
         self.local = quaternion.to_matrix(motion.rotations)
 
     def run(self, steps: int = 14) -> None:
-        """Adjust until nothing moves by more than a tenth of a millimetre, at most so many steps."""
+        """Adjust until no unknown moves by more than a tenth of a millimetre.
+
+        Args:
+            steps: maximum number of steps.
+        """
         damping = 1e-4
         cost = self.cost()
         for _ in range(steps):
             kept = self._state()
             largest = self._step(damping)
             now = self.cost()
+            # a step that raises the cost is undone and repeated with more damping
             if now > cost * (1.0 + 1e-9):
                 self._restore(kept)
                 damping *= 20.0
@@ -108,7 +140,7 @@ class Adjustment:
         self.root, self.local, self.body.offsets, self.body.places = kept
 
     def placed(self):
-        """World rotations (F, J, 3, 3), joints (F, J, 3), markers (F, M, 3)."""
+        """Compute world rotations (F, J, 3, 3), joints (F, J, 3) and markers (F, M, 3) in metres."""
         body = self.body
         world, joints = np.empty_like(self.local), np.empty((len(self.root), len(body.names), 3))
         for joint, parent in enumerate(body.parents):
@@ -121,21 +153,24 @@ class Adjustment:
         return world, joints, markers
 
     def residuals(self) -> np.ndarray:
-        """(F, M, 3) m, model minus seen, NaN where not seen."""
+        """Compute model minus recorded markers, (F, M, 3) metres, NaN where not visible."""
         return np.where(self.there[..., None], self.placed()[2] - self.seen, np.nan)
 
     def cost(self) -> float:
-        """The robust sum that is made small."""
+        """Compute the robust sum of squares that is minimised."""
         world, _, markers = self.placed()
         away = np.linalg.norm(markers - self.seen, axis=-1) / self.sigma
-        near = np.where(away < _HUBER, away**2, 2.0 * _HUBER * away - _HUBER**2)
+        near = np.where(away < _HUBER, away**2, 2.0 * _HUBER * away - _HUBER**2)  # Huber: linear beyond the threshold
         total = self.share * float(np.sum(near[self.there]))
         total += sum(float(np.sum(error**2)) for error, _ in self._pulls(world)) * self.share
         error, _ = self._priors()
         return total + float(np.sum(error**2))
 
     def _pulls(self, world: np.ndarray):
-        """Weighted errors (F,) of hinges and of turns drawn to rest, with [(joint, derivative (F, 3) by its turn)]."""
+        """Build the weighted errors (F,) of hinges and of rotations pulled to rest.
+
+        Each comes with [(joint, derivative (F, 3) by its rotation)].
+        """
         out = self._uneven(world)
         for joint, name in enumerate(self.body.names):
             part = name.removeprefix("Left").removeprefix("Right")
@@ -155,11 +190,13 @@ class Adjustment:
         return out
 
     def _turn(self, joint: int) -> np.ndarray:
-        """How far a joint is turned from rest, (F, 3) rotation vectors in radians."""
+        """Compute how far a joint is rotated from rest, (F, 3) rotation vectors in radians."""
         return quaternion.to_rotation_vector(quaternion.from_matrix(self.local[:, joint]))
 
     def _uneven(self, world: np.ndarray):
-        """By how much the joints of runs turn otherwise than the run's mean, in the form of `_pulls`."""
+        """Build the errors of runs, whose joints should turn like the run's mean, in the form of
+        `_build_pull_errors`.
+        """
         out = []
         for run in self.pull.runs:
             turns = {joint: self._turn(joint) for joint in run}
@@ -176,7 +213,7 @@ class Adjustment:
         return out
 
     def _priors(self):
-        """Errors (N,) of what was known before, and their derivative (N, columns)."""
+        """Build the errors (N,) against the prior, and their derivative (N, columns)."""
         body, prior = self.body, self.prior
         known: list[tuple[float, list[tuple[int, float]]]] = []
         for joint, axis in zip(*np.nonzero(self.columns.offset >= 0)):
@@ -195,7 +232,7 @@ class Adjustment:
         return np.array([error for error, _ in known]), rows
 
     def _alike(self) -> list[tuple[float, list[tuple[int, float]]]]:
-        """By how much the bones of both sides differ, with the derivative by their columns."""
+        """Build the errors of left against right bones, with the derivative by their columns."""
         body, out = self.body, []
         for joint, name in enumerate(body.names):
             twin = name.replace("Left", "Right")
@@ -210,7 +247,7 @@ class Adjustment:
         return out
 
     def _step(self, damping: float) -> float:
-        """One Gauss-Newton step; the largest move of an offset or place, m."""
+        """Take one Gauss-Newton step; return the largest change of an offset or place in metres."""
         world, joints, markers = self.placed()
         error, rows = self._priors()
         normal, right = rows.T @ rows, rows.T @ error
@@ -220,10 +257,12 @@ class Adjustment:
         diagonal = range(own.shape[-1])
         own[:, diagonal, diagonal] += 1e-3 + damping * own[:, diagonal, diagonal]
         slope = np.einsum("fra,fr->fa", pose, miss)
+        # Schur complement: eliminate each frame's pose (`own`), which leaves `normal` for the body's unknowns
         solved = np.linalg.solve(own, np.concatenate([mixed, slope[..., None]], axis=-1))
         flat = _joined(shape)
         normal = normal + flat.T @ flat - _joined(mixed).T @ _joined(solved[..., :-1])
         right = right + flat.T @ miss.reshape(-1) - np.einsum("fap,fa->p", mixed, solved[..., -1])
+        # kept undamped for `compute_uncertainty`
         self.normal = normal.copy()
         diagonal = range(self.columns.count)
         normal[diagonal, diagonal] *= 1.0 + damping
@@ -232,8 +271,13 @@ class Adjustment:
         return float(np.abs(change).max())
 
     def _equations(self, world, joints, markers):
-        """Weighted derivatives of all frames' errors by the pose (F, R, 3 + 3 J) and by the body (F, R, columns), and
-        the errors (F, R): three rows a marker, then one a pull."""
+        """Build the weighted derivatives and errors of all frames.
+
+        Rows are three for each marker, then one for each pull.
+
+        Returns:
+            Derivatives by the pose (F, R, 3 + 3 J) and by the body (F, R, columns), and the errors (F, R).
+        """
         body, columns, frames = self.body, self.columns, len(self.root)
         away = markers - self.seen
         far = np.linalg.norm(away, axis=-1) / self.sigma
@@ -248,6 +292,7 @@ class Adjustment:
             pose[:, at, :3] = weight * np.eye(3)
             shape[:, at, columns.place[marker]] = weight * world[:, carrier]
             joint = int(carrier)
+            # walk from the carrier to the root: every joint above moves the marker
             while joint >= 0:
                 if not body.held[joint]:
                     arm = markers[:, marker] - joints[:, joint]
@@ -263,6 +308,7 @@ class Adjustment:
         return pose, shape, miss
 
     def _move(self, world, change, pose_change) -> None:
+        """Apply a step to the body and the poses; rotations are limited to `_MAX_ROTATION_STEP`."""
         body, columns = self.body, self.columns
         body.offsets = body.offsets + np.where(columns.offset >= 0, change[columns.offset], 0.0)
         body.places = body.places + change[columns.place]
@@ -274,21 +320,22 @@ class Adjustment:
         for joint, parent in enumerate(body.parents):
             if body.held[joint]:
                 continue
+            # limited rotation about the world's axes
             turn = quaternion.to_matrix(quaternion.from_rotation_vector(turns[:, joint]))
-            # a turn of this joint alone, about the world's axes as they stood
+            # the rotation of this joint alone, converted from world axes to the parent's frame
             above = world[:, parent] if parent >= 0 else np.broadcast_to(np.eye(3), turn.shape)
             inside = np.einsum("fba,fbc,fcd->fad", above, turn, above)
             local[:, joint] = np.einsum("fab,fbc->fac", inside, self.local[:, joint])
         self.local = local
 
     def uncertainty(self) -> np.ndarray:
-        """(J,) m, how uncertain each offset is left (its largest axis)."""
+        """Compute the remaining uncertainty of each offset, (J,) metres (its largest axis)."""
         spread = np.sqrt(np.maximum(np.diag(np.linalg.inv(self.normal)), 0.0))
         return np.where(self.columns.offset >= 0, spread[self.columns.offset], 0.0).max(axis=1)
 
 
 class _Columns:
-    """Which column of the body's system is which: offset (J, 3), place (M, 3); -1 where nothing is to be found."""
+    """The columns of the body's system: offset (J, 3), place (M, 3); -1 where a value is fixed."""
 
     def __init__(self, body: Body):
         count = 0
@@ -303,5 +350,5 @@ class _Columns:
 
 
 def _joined(blocks: np.ndarray) -> np.ndarray:
-    """(F, A, B) as (F A, B)."""
+    """Reshape (F, A, B) to (F A, B)."""
     return blocks.reshape(-1, blocks.shape[-1])

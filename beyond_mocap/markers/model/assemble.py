@@ -1,13 +1,12 @@
-"""Models put together: from one frame of markers (of the motion, or a static trial's mean), and models of several
-sessions made one of the subject (Fredriksson §5.2).
+"""Build models from one frame of markers, and merge the models of a subject's sessions (Fredriksson section 5.2).
 
-A standing body breathes and sways. Averaging places would shrink what turns; so each cluster of a static trial is
-averaged in its own technical frame, and the frames against those of the segments they hang on, from the root outwards.
+A standing body breathes and sways. Averaging places would shrink what rotates, so each cluster of a static trial is
+averaged in its own technical frame, and each frame relative to that of the segment it hangs on, from the root outwards.
 
-A body's bones are the same on every day, only the markers lie elsewhere, and what is found of the bones differs by how
-they lay. Segment by segment, from the root down, the sessions' frames are turned onto each other where the centres of
-the joints below say that they differ; these centres are then averaged in the turned frames, those that are surer
-counting more; and the markers of each session go along with their segment.
+A body's bones are the same every day; only the markers lie elsewhere, and so the estimated bones differ. Segment by
+segment, from the root down, the sessions' frames are rotated onto each other where the centres of the joints below show
+a difference. These centres are then averaged in the rotated frames, weighted by their certainty, and the markers of
+each session follow their segment.
 """
 
 from __future__ import annotations
@@ -27,16 +26,24 @@ from .marker_set import MarkerSet
 from .model import MarkerModel, freedom_of
 from .template import JOINTS, PARENTS, SCAPULAE
 
-SIGMA = 0.008  # how far skin markers stray, metres, until a motion tells; how far edges stray is left open (NaN)
+# Deviation of skin markers in metres, until a motion gives a better estimate; that of edges stays unknown (NaN).
+SIGMA = 0.008
 
-_STILL = 0.1  # nobody who stands still moves faster than this, m/s (median of the markers over a second)
+_STILL = 0.1  # m/s, median of the markers over a second; a body that stands still is not faster
 
-_ROUNDS = 4
-_SURE = 1e-4  # metres: no centre is surer
+_ROUNDS = 4  # alternations of rotating the sessions' frames and averaging the centres
+_SURE = 1e-4  # metres, lower bound of the uncertainty of a centre
 
 
 def landmark_places(frame: Mapping[str, np.ndarray], marker_set: MarkerSet) -> dict[str, np.ndarray]:
-    """Landmark -> (3,) m, from places of markers {label: (3,) m}; those of which no marker is seen are left out."""
+    """Find the places of landmarks.
+
+    Args:
+        frame: label -> (3,) metres, NaN where not visible.
+        marker_set: says which markers a landmark lies on.
+    Returns:
+        Landmark -> (3,) metres; landmarks with a marker that is not visible are left out.
+    """
     found = {}
     for landmark, labels in marker_set.landmarks.items():
         seen = [frame[x] for x in labels if x in frame and np.isfinite(frame[x]).all()]
@@ -47,10 +54,19 @@ def landmark_places(frame: Mapping[str, np.ndarray], marker_set: MarkerSet) -> d
 
 def model_from_frame(frame: Mapping[str, np.ndarray], marker_set: MarkerSet, standing: bool = True, subject: str = "",
                      session: str = "") -> MarkerModel:
-    """The model that one frame gives, with predicted joint centres, on which each marker lies where it was seen.
+    """Build the model of one frame: predicted joint centres, with each marker where it was recorded.
 
-    frame: label -> (3,) m, Z up, NaN where not seen. standing: whether it is a static trial's frame. InputError where
-    too few landmarks are marked."""
+    Args:
+        frame: label -> (3,) metres, Z up, NaN where not visible.
+        marker_set: the marker set.
+        is_static: whether it is a frame of a static trial.
+        subject: whose markers these are.
+        session: name of the recording.
+    Returns:
+        The model.
+    Raises:
+        InputError: if too few landmarks are visible.
+    """
     centres = predict(landmark_places(frame, marker_set), standing)
     carried = {label: marker_set.segment_of(label) for label in frame if np.isfinite(frame[label]).all()}
     names = _joint_names(centres, set(carried.values()))
@@ -64,7 +80,7 @@ def model_from_frame(frame: Mapping[str, np.ndarray], marker_set: MarkerSet, sta
             joints.append(index)
             on.append(axes[index].T @ (np.asarray(frame[label], dtype=float) - places[index]))
     if not labels:
-        raise InputError("model", "no marker on any joint", "markers of the set", "check labels and marker set")
+        raise InputError("model", "no marker on any joint", "markers of the set", "check the labels and the marker set")
     counts = {name: joints.count(index) for index, name in enumerate(names)}
     freedom, stiffness = freedom_of(names, skeleton.parents, counts)
     return MarkerModel(skeleton=skeleton, markers=tuple(labels), joint=np.array(joints), places=np.array(on),
@@ -75,7 +91,7 @@ def model_from_frame(frame: Mapping[str, np.ndarray], marker_set: MarkerSet, sta
 
 
 def _joint_names(centres: Centres, carriers: set) -> list[str]:
-    """Joints that the frame tells, parents first; shoulder blades only where they are marked, arms down to a gap."""
+    """Select the joints with known axes, parents first; shoulder blades only with markers, arms only down to a gap."""
     names: list[str] = []
     for name in JOINTS:
         if name not in centres.axes or (name in SCAPULAE and name not in carriers):
@@ -94,7 +110,7 @@ def _parent(name: str, names: list[str]) -> int:
 
 
 def _skeleton(centres: Centres, names: list[str]):
-    """Skeleton, world axes (J, 3, 3) and places (J, 3) m of its joints in the frame."""
+    """Build the skeleton; return it with world axes (J, 3, 3) and places (J, 3) metres of its joints in the frame."""
     parents = [_parent(name, names) for name in names]
     axes = np.array([centres.axes[name] for name in names])
     places = np.array([centres.places[name] for name in names])
@@ -108,12 +124,20 @@ def _skeleton(centres: Centres, names: list[str]):
 
 def static_frame(trial: MarkerTrial, clusters: Mapping[str, Sequence[str]],
                  seconds: float = 2.0) -> dict[str, np.ndarray]:
-    """The markers of a static trial as one frame: label -> (3,) m, NaN for what is never seen in its stillest
-    `seconds`.
+    """Average the stillest part of a static trial into one frame.
 
-    clusters: segment (of `template.JOINTS`, others hang on the root) -> labels. Markers of segments with too few for a
-    frame of their own are averaged in the frame of the segment they hang on, and markers of no segment by their places.
-    Raises InputError where nobody stands still."""
+    Markers of segments with too few markers for a frame of their own are averaged in the frame of the segment they hang
+    on; markers of no segment by their places.
+
+    Args:
+        trial: the static trial.
+        clusters: segment (of `template.JOINTS`, others hang on the root) -> labels.
+        seconds: duration of the part.
+    Returns:
+        Label -> (3,) metres, NaN for markers that are never visible in that part.
+    Raises:
+        InputError: if the body moves throughout the trial.
+    """
     first, end = stillest(trial, seconds)
     part = trial.positions[first:end]
     index = {label: i for i, label in enumerate(trial.labels)}
@@ -136,9 +160,16 @@ def static_frame(trial: MarkerTrial, clusters: Mapping[str, Sequence[str]],
 
 
 def stillest(trial: MarkerTrial, seconds: float = 2.0) -> tuple[int, int]:
-    """The frames, first and the one after the last, of the `seconds` in which the most is seen and moves the least.
+    """Find the stillest part of a trial, of those in which the most markers are visible.
 
-    Raises InputError where somebody walks even there."""
+    Args:
+        trial: the static trial.
+        seconds: duration of the part.
+    Returns:
+        Index of the first frame, and the index after the last.
+    Raises:
+        InputError: if the body moves even there.
+    """
     length = max(1, min(len(trial), int(round(seconds * trial.fps))))
     positions = trial.positions
     step = max(1, int(round(0.1 * trial.fps)))
@@ -151,13 +182,13 @@ def stillest(trial: MarkerTrial, seconds: float = 2.0) -> tuple[int, int]:
     unrest = [(-round(float(seen[a : a + length].mean())), float(medians(moved[a : a + length]))) for a in starts]
     best = min(range(len(starts)), key=lambda i: unrest[i])
     if unrest[best][1] > _STILL:
-        raise InputError(trial.name, f"its stillest {length / trial.fps:.1f} s still move at {unrest[best][1]:.2f} m/s",
-                         "a static trial, in which somebody stands", "choose another, or go without")
+        raise InputError(trial.name, f"even the stillest {length / trial.fps:.1f} s move at {unrest[best][1]:.2f} m/s",
+                         "a static trial, in which the person stands", "choose another static trial, or use none")
     return int(starts[best]), int(starts[best]) + length
 
 
 def _technical_frames(part, groups):
-    """{segment: its frames in the world} of the clusters that determine one in nearly every frame."""
+    """Fit {segment: its frames in the world} for the clusters that determine one in more than half of the frames."""
     frames = {}
     for name, group in groups.items():
         if len(group) < 3:
@@ -170,12 +201,12 @@ def _technical_frames(part, groups):
 
 
 def _wide(flags, like):
-    """Flags (T,) with as many axes as `like` (T, ...)."""
+    """Return flags (T,) with as many axes as `like` (T, ...)."""
     return flags.reshape(-1, *[1] * (like.ndim - 1))
 
 
 def _above(name, means):
-    """The nearest segment above with a frame that is averaged already; the first of all where there is none."""
+    """Return the nearest segment above that has a mean frame already; the first of all where there is none."""
     parent = PARENTS.get(name)
     while parent is not None and parent not in means:
         parent = PARENTS.get(parent)
@@ -183,7 +214,9 @@ def _above(name, means):
 
 
 def _mean_frame(own, above, mean_above):
-    """The mean of frames `own`, against the segment `above` and its mean, or in the world where there is none."""
+    """Compute the mean of the frames `own` relative to the segment `above` and its mean, or in the world without
+    one.
+    """
     if above is None:
         return RigidFit(mean_rotation(own.rotation), medians(own.shift), np.zeros(()), np.ones((), dtype=bool))
     turn = np.einsum("tji,tjk->tik", above.rotation, own.rotation)
@@ -193,11 +226,18 @@ def _mean_frame(own, above, mean_above):
 
 
 def subject_models(models: Sequence[MarkerModel]) -> tuple[MarkerModel, ...]:
-    """The models of one subject's sessions, all with the same skeleton, in their order.
+    """Merge the models of one subject's sessions.
 
-    InputError where they are none, or their joints differ: sessions of another marker set, or another body's."""
+    Args:
+        models: one model for each session.
+    Returns:
+        The models in their order, all with the same skeleton.
+    Raises:
+        InputError: if there are none, or their joints differ (another marker set, or another body).
+    Source: Fredriksson section 5.2.3.
+    """
     if not models:
-        raise InputError("models", "none given", "at least one")
+        raise InputError("models", "no models", "at least one")
     _check_alike(models)
     first = models[0].skeleton
     worth = np.array([1.0 / np.maximum(model.centre_sigma, _SURE) ** 2 for model in models])
@@ -208,6 +248,7 @@ def subject_models(models: Sequence[MarkerModel]) -> tuple[MarkerModel, ...]:
         below = list(first.children(joint))
         if not below:
             continue
+        # one joint below only fixes a direction, which all frames share: no rotation, one average
         for _ in range(_ROUNDS if len(below) > 1 else 1):
             for number in range(len(models)):
                 turns[number, joint] = _turn_onto(offsets[number, below], mean[below], worth[number, below])
@@ -221,27 +262,32 @@ def subject_models(models: Sequence[MarkerModel]) -> tuple[MarkerModel, ...]:
 
 
 def _check_alike(models: Sequence[MarkerModel]) -> None:
+    """Raise InputError if the models have different joints."""
     for model in models[1:]:
         one, other = models[0].skeleton, model.skeleton
         if (one.names, one.parents, one.end_parents) != (other.names, other.parents, other.end_parents):
             odd = sorted(set(one.names) ^ set(other.names))
-            raise InputError("models", f"joints that not all sessions have: {', '.join(odd) or 'in another order'}",
+            raise InputError("models", f"joints that differ between sessions: {', '.join(odd) or 'their order'}",
                              "sessions of one subject with the same joints")  # fmt: skip
 
 
 def _turn_onto(own: np.ndarray, mean: np.ndarray, worth: np.ndarray) -> np.ndarray:
-    """The rotation (3, 3) about the joint that brings the centres below it (N, 3) nearest to their means: none for a
-    single one, whose direction all frames share, as rest poses have it."""
+    """Fit the rotation (3, 3) about the joint that brings the centres below it (N, 3) nearest to their means.
+
+    A single centre gives no rotation: all frames share its direction, as rest poses have it.
+    """
     if len(own) < 2:
         return np.eye(3)
-    joint, held = [[0.0, 0.0, 0.0]], np.r_[worth.max() * 100.0, worth]  # the joint itself stays
+    joint, held = [[0.0, 0.0, 0.0]], np.r_[worth.max() * 100.0, worth]  # a large weight keeps the joint itself in place
     fit = rigid_fit(np.vstack([joint, own]), np.vstack([joint, mean]), held)
     return fit.rotation if fit.sound else np.eye(3)
 
 
 def _on(model: MarkerModel, skeleton: Skeleton, turn: np.ndarray, sessions, sigma) -> MarkerModel:
-    """A session's model on the subject's skeleton: markers turn with their segment, and those along a bone that became
-    longer or shorter keep their share of it."""
+    """Move a session's model to the subject's skeleton.
+
+    Markers rotate with their segment, and those along a bone that became longer or shorter keep their share of it.
+    """
     places = np.einsum("mij,mj->mi", turn[model.joint], model.places)
     for joint in range(len(skeleton)):
         below = skeleton.children(joint)
@@ -255,7 +301,9 @@ def _on(model: MarkerModel, skeleton: Skeleton, turn: np.ndarray, sessions, sigm
 
 
 def _agreement(worth: np.ndarray, offsets: np.ndarray, mean: np.ndarray) -> np.ndarray:
-    """(J,) m, how uncertain a centre is after averaging: what each session says of itself, or how far they differ."""
+    """Compute the uncertainty (J,) metres of averaged centres: from that of each session, or from their spread if
+    larger.
+    """
     told = 1.0 / np.sqrt(worth.sum(axis=0))
     apart = np.linalg.norm(np.sqrt(np.mean((offsets - mean) ** 2, axis=0)), axis=-1) / np.sqrt(len(offsets))
     return np.maximum(told, apart)

@@ -1,13 +1,12 @@
-"""A subject's model from recordings: built on the static trial or on upright frames of the motion, then refined by the
-motion (Fredriksson §5.2.2).
+"""Calibrate a subject's model: build it from the static trial or upright frames, then refine it with the motion.
 
 Landmarks predict all joint centres (`centres`). The motion then refines them by adjusting the model and its poses in
-many frames together (`adjustment`). This takes the place of sphere fits joint by joint (the [14] and [19] of
-Fredriksson §3.2.4): it too finds the point that stands still in both segments, but for all joints at once, with the
-bones between them as long in every frame, and it says how sure each centre is. So hips, knees, ankles, shoulders,
-elbows and marked wrists are functional as far as the motion turns them, and stay predicted where it does not; spine,
-neck and toes are predicted, with little play. Axes of knees and elbows come out of it as well: they are where these
-joints bend like hinges.
+many frames together (`adjustment`). This replaces sphere fits joint by joint (references [14] and [19] of Fredriksson
+section 3.2.4): it also finds the point that is fixed in both segments, but for all joints at once, with bones of
+constant length, and it estimates the uncertainty of each centre. Hips, knees, ankles, shoulders, elbows and marked
+wrists are therefore functional where the motion rotates them enough, and stay predicted where it does not; spine, neck
+and toes are predicted, with little tolerance. The axes of knees and elbows follow from it too: they lie where these
+joints bend like hinges. Source: Fredriksson section 5.2.2.
 """
 
 from __future__ import annotations
@@ -31,25 +30,36 @@ from .assemble import SIGMA, model_from_frame, static_frame
 from .marker_set import MarkerSet
 from .model import MarkerModel, freedom_of
 
-FRAMES = 60
-_STATIC_FRAMES = 4
-_NEUTRAL_FRAMES = 5
-_WORTH = 10.0  # independent frames that the chosen ones are worth: skin errs alike in poses alike
-_PLACE_SIGMA = 0.008
-_USUAL_SIGMA = 0.006
-_UNTOLD = 0.001  # m: what no motion can tell stays as predicted
-_FAR, _FAR_BESIDE = 2.0, 0.005  # a frame is passed over that fits so many times, and m, worse than the middle one
+FRAMES = 60  # frames of the motion to which a model is adjusted
+_STATIC_FRAMES = 4  # frames of the static trial that are added
+_NEUTRAL_FRAMES = 5  # upright frames from which a model without a static starts
+_WORTH = 10.0  # effective number of independent frames: similar poses have similar skin errors
+_PLACE_SIGMA = 0.008  # metres, prior uncertainty of a marker's place
+_USUAL_SIGMA = 0.006  # metres by which skin markers usually deviate
+_UNTOLD = 0.001  # metres, prior uncertainty that keeps offsets of fixed joints as predicted
+# A frame is skipped if its residual exceeds so many times the median, plus so many metres.
+_FAR, _FAR_BESIDE = 2.0, 0.005
 _LIMBS = {"ForeArm": 1, "Hand": 1, "Leg": 2, "Foot": 2}
 """Bones that lie exactly along an axis: joint at their end -> axis."""
-_CANDIDATES = 400  # frames of a motion of which those are chosen that are as unlike as can be
-_FRAMES, _FEWEST = 40, 3  # frames that place a marker that was not shown at first, and in which it has to be seen
+_CANDIDATES = 400  # frames of a motion among which the most different ones are selected
+# Frames from which a late marker is placed, and frames in which it must be visible.
+_FRAMES, _FEWEST = 40, 3
 
 
 def with_late_markers(model: MarkerModel, marker_set: MarkerSet, trial: MarkerTrial,
                       cancelled: Callable[[], bool] | None = None) -> MarkerModel:
-    """The model with the set's markers that it lacks and the trial shows, and joints freed that they now tell.
+    """Add the markers of the set that the model lacks and the trial shows, and free the joints that they determine.
 
-    Each lies at the median of where it is seen in its segment's frame, over some frames solved without it."""
+    Each marker is placed at the median of its positions in its segment's frame, over some frames solved without it.
+
+    Args:
+        model: the model so far.
+        marker_set: its marker set.
+        trial: the recorded markers.
+        cancelled: returns True when the user stops the job.
+    Returns:
+        The extended model, or the model itself.
+    """
     seen = dict(zip(trial.labels, trial.seen.sum(axis=0)))
     late = [label for label in marker_set.labels
             if label not in model.markers and seen.get(label, 0) >= _FEWEST
@@ -76,20 +86,29 @@ def with_late_markers(model: MarkerModel, marker_set: MarkerSet, trial: MarkerTr
 
 
 def _added(model: MarkerModel, labels: list[str], joints: list[int], places: list[np.ndarray]) -> MarkerModel:
+    """Return the model with more markers: labels, joint indices and places (3,) metres."""
     joint = np.concatenate([model.joint, joints])
     counts = {name: int(np.sum(joint == index)) for index, name in enumerate(model.skeleton.names)}
     freedom, stiffness = freedom_of(model.skeleton.names, model.skeleton.parents, counts)
     return replace(model, markers=(*model.markers, *labels), joint=joint, places=np.concatenate([model.places, places]),
                    sigma=np.concatenate([model.sigma, np.full(len(labels), SIGMA)]),
                    edge_sigma=np.concatenate([model.edge_sigma, np.full(len(labels), np.nan)]), freedom=freedom,
-                   stiffness=stiffness, notes=(*model.notes, f"placed by the motion alone: {', '.join(labels)}"))
+                   stiffness=stiffness, notes=(*model.notes, f"placed from the motion alone: {', '.join(labels)}"))
 
 
 def neutral_frames(trial: MarkerTrial, landmarks: dict[str, tuple[int, ...]], count: int) -> list[int]:
-    """Up to `count` frames in which the body stands most like one in a static trial, best first.
+    """Find frames in which the body stands most like in a static trial.
 
-    landmarks: name -> indices of its markers. Straight knees, an upright trunk and low feet count; frames lie a fifth
-    of a second apart, and frames in which a landmark is hidden come only where there are no others."""
+    Straight knees, an upright trunk and vertical shanks lower the cost; frames in which a landmark is hidden are used
+    only where there are no others. Frames are at least a fifth of a second apart.
+
+    Args:
+        trial: the recorded markers.
+        landmarks: name -> indices of its markers.
+        count: maximum number of frames.
+    Returns:
+        Frame indices, best first.
+    """
     at = {name: trial.positions[:, list(group)].mean(axis=1) for name, group in landmarks.items()}
     cost = np.zeros(len(trial))
     for place in at.values():
@@ -115,15 +134,22 @@ def neutral_frames(trial: MarkerTrial, landmarks: dict[str, tuple[int, ...]], co
 
 
 def _tilt(v: np.ndarray) -> np.ndarray:
-    """Angle in radians between vectors (T, 3) and the vertical."""
+    """Compute the angle in radians between vectors (T, 3) and the vertical."""
     return arctan2(np.linalg.norm(v[:, :2], axis=-1), v[:, 2])
 
 
 def unlike_frames(trial: MarkerTrial, root: np.ndarray, count: int) -> np.ndarray:
-    """`count` frames whose poses differ most, ascending: each next one is farthest from those chosen.
+    """Select the frames whose poses differ most: each next one is farthest from those chosen.
 
-    root: indices of the pelvis' markers, in whose frame poses are compared. Frames that show less than two thirds of
-    what others show are passed over."""
+    Frames that show less than two thirds of the markers that others show are skipped.
+
+    Args:
+        trial: the recorded markers.
+        root: indices of the pelvis markers, in whose frame poses are compared.
+        count: number of frames.
+    Returns:
+        Frame indices, ascending.
+    """
     frames = np.unique(np.linspace(0, len(trial) - 1, min(len(trial), _CANDIDATES)).astype(int))
     shown = trial.seen[frames].sum(axis=1)
     frames = frames[shown >= 0.67 * shown.max()]
@@ -137,9 +163,10 @@ def unlike_frames(trial: MarkerTrial, root: np.ndarray, count: int) -> np.ndarra
     known = np.isfinite(pose)
     middle = np.where(known, pose, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
     pose = np.where(known, pose, middle).reshape(len(frames), -1)
-    if not pose.any():  # the pelvis is never seen: nothing tells poses apart
+    if not pose.any():  # without a visible pelvis poses cannot be compared
         return frames[np.unique(np.linspace(0, len(frames) - 1, count).astype(int))]
     chosen = [int(np.argmin(np.linalg.norm(pose - pose.mean(axis=0), axis=1)))]
+    # farthest-point sampling: `nearest` is the distance of each frame to the chosen set
     nearest = np.full(len(frames), np.inf)
     while len(chosen) < count:
         nearest = np.minimum(nearest, np.linalg.norm(pose - pose[chosen[-1]], axis=1))
@@ -150,11 +177,22 @@ def unlike_frames(trial: MarkerTrial, root: np.ndarray, count: int) -> np.ndarra
 def calibrate(marker_set: MarkerSet, trial: MarkerTrial, static: MarkerTrial | None = None,
               progress: Callable[[float, str], None] | None = None,
               cancelled: Callable[[], bool] | None = None) -> MarkerModel:
-    """The model of the body in `trial`.
+    """Calibrate the model of the body in a trial.
 
-    trial: cleaned, labelled as the set labels its markers. static: a static trial of the same body with the same
-    markers, or None: the model then begins with upright frames of the motion. InputError where too few landmarks are
-    seen, Cancelled when the user stops."""
+    Args:
+        marker_set: the marker set of the trial's labels.
+        trial: cleaned.
+        static: a static trial of the same body with the same markers, or None; the model then starts from upright
+            frames.
+        progress: called with the share that is done and a text.
+        cancelled: returns True when the user stops the job.
+    Returns:
+        The model, with the name of the trial as its session.
+    Raises:
+        InputError: if too few landmarks are visible.
+        Cancelled: if the user stops the job.
+    Source: Fredriksson section 5.2.2.
+    """
     tell = progress or (lambda part, text: None)
     stopped = cancelled or (lambda: False)
     tell(0.0, "joint centres")
@@ -169,25 +207,43 @@ def calibrate(marker_set: MarkerSet, trial: MarkerTrial, static: MarkerTrial | N
 
 
 def _left_out(model: MarkerModel, marker_set: MarkerSet, trial: MarkerTrial) -> list[str]:
-    """Lines on the set's markers that are not on the model, and why."""
+    """Describe which markers of the set are not on the model, and why."""
     absent = sorted(set(marker_set.labels) - set(model.markers) - marker_set.optional - marker_set.static)
     shown = {label for label, seen in zip(trial.labels, trial.seen.any(axis=0)) if seen}
     nowhere = [label for label in absent if label not in shown]
     loose = [label for label in absent if label in shown]
-    lines = [f"seen nowhere, so not on the model: {', '.join(nowhere)}"] if nowhere else []
+    lines = [f"never visible, so not on the model: {', '.join(nowhere)}"] if nowhere else []
     if loose:
-        lines.append(f"not on the model, since too little tells how their segments lie: {', '.join(loose)}")
+        lines.append(f"not on the model, since too few markers determine their segments: {', '.join(loose)}")
     return lines
 
 
 def from_static(marker_set: MarkerSet, static: MarkerTrial) -> MarkerModel:
-    """The model that a static trial gives where it is stillest, averaged over its segments."""
+    """Build a model from the stillest part of a static trial.
+
+    Args:
+        marker_set: the marker set.
+        static: the static trial.
+    Returns:
+        The model before refinement.
+    Raises:
+        InputError: if the body moves, or landmarks are missing.
+    """
     frame = static_frame(static, marker_set.clusters(static.labels))
     return model_from_frame(frame, marker_set, standing=True, subject=static.subject)
 
 
 def from_motion(marker_set: MarkerSet, trial: MarkerTrial) -> MarkerModel:
-    """The mean of the models that some upright frames of a motion give."""
+    """Build a model as the mean of the models of some upright frames.
+
+    Args:
+        marker_set: the marker set.
+        trial: the recorded motion.
+    Returns:
+        The model before refinement.
+    Raises:
+        InputError: if no frame shows enough landmarks.
+    """
     index = {label: i for i, label in enumerate(trial.labels)}
     landmarks = {name: tuple(index[label] for label in labels) for name,
                  labels in marker_set.landmarks.items() if all(label in index for label in labels)}
@@ -204,14 +260,25 @@ def from_motion(marker_set: MarkerSet, trial: MarkerTrial) -> MarkerModel:
     alike = [m for m in found if m.skeleton.names == most.skeleton.names and m.markers == most.markers]
     skeleton = replace(most.skeleton, offsets=np.mean([m.skeleton.offsets for m in alike], axis=0),
                        end_offsets=np.mean([m.skeleton.end_offsets for m in alike], axis=0))
-    note = f"no static trial: begun with {len(alike)} upright frame{'s' if len(alike) > 1 else ''} of the motion"
+    note = f"no static trial: started from {len(alike)} upright frame{'s' if len(alike) > 1 else ''} of the motion"
     places = np.mean([m.places for m in alike], axis=0)
     return replace(most, skeleton=skeleton, places=places, notes=(*most.notes, note))
 
 
 def refined(model: MarkerModel, trial: MarkerTrial, static: MarkerTrial | None,
             cancelled: Callable[[], bool]) -> MarkerModel:
-    """The model adjusted to the motion: joint centres, bone lengths and markers' places, each by its uncertainty."""
+    """Adjust a model to the motion: joint centres, bone lengths and markers' places, each weighted by its uncertainty.
+
+    Args:
+        model: the model so far.
+        trial: the recorded motion.
+        static: the static trial, or None.
+        cancelled: returns True when the user stops the job.
+    Returns:
+        The adjusted model with the uncertainties of its centres and markers.
+    Raises:
+        Cancelled: if the user stops the job.
+    """
     part = _chosen(model, trial, static)
     solved = solve(model, part, PoseSettings(weights=False, limits=False), cancelled=cancelled)
     motion, part = _sane(solved, part)
@@ -231,9 +298,11 @@ def refined(model: MarkerModel, trial: MarkerTrial, static: MarkerTrial | None,
 
 
 def _chosen(model: MarkerModel, trial: MarkerTrial, static: MarkerTrial | None) -> MarkerTrial:
-    """The frames to adjust to, of the model's markers alone: unlike ones of the motion, and some of the static trial.
+    """Select the frames to adjust to, with the model's markers alone: diverse frames of the motion and some of the
+    static.
 
-    They are no neighbours in time, which the rate of one frame a second tells whoever solves them."""
+    The frames are not neighbours in time; a rate of one frame per second keeps the solver from treating them as such.
+    """
     root = [i for i, label in enumerate(trial.labels) if label in model.markers
             and model.joint[model.markers.index(label)] == 0]
     positions = seen_markers(model, trial)[unlike_frames(trial, np.array(root, dtype=int), FRAMES)]
@@ -244,7 +313,7 @@ def _chosen(model: MarkerModel, trial: MarkerTrial, static: MarkerTrial | None) 
 
 
 def _sane(solved: Solved, part: MarkerTrial) -> tuple[Motion, MarkerTrial]:
-    """Without the frames that fit far worse than most: swapped markers, or a pose that was not found."""
+    """Remove frames that fit far worse than most: swapped markers, or a pose that was not found."""
     known = np.isfinite(solved.residual)
     square = np.where(known, solved.residual, 0.0) ** 2
     away = np.sqrt(square.sum(axis=1) / np.maximum(known.sum(axis=1), 1))
@@ -256,6 +325,7 @@ def _sane(solved: Solved, part: MarkerTrial) -> tuple[Motion, MarkerTrial]:
 
 
 def _body(model: MarkerModel) -> Body:
+    """Build the unknowns of the adjustment from a model."""
     names = model.skeleton.names
     limb = np.array([_LIMBS.get(name.removeprefix("Left").removeprefix("Right"), -1) for name in names])
     held = ~model.freedom.free.any(axis=1)
@@ -264,6 +334,7 @@ def _body(model: MarkerModel) -> Body:
 
 
 def _prior(model: MarkerModel) -> Prior:
+    """Build the prior of the adjustment from the uncertainties of a model."""
     sigma = np.maximum(model.centre_sigma, 0.003)
     above = sigma[np.maximum(model.skeleton.parents, 0)]
     places = np.full(len(model.joint), _PLACE_SIGMA)
@@ -274,7 +345,7 @@ def _prior(model: MarkerModel) -> Prior:
 
 
 def _pull(model: MarkerModel) -> Pull:
-    """Play about the rest pose: of joints that are drawn to it, and of angles that are not free."""
+    """Build the pull to the rest pose: of stiff joints, and of angles that are not free."""
     play = {}
     for joint in range(1, len(model.skeleton)):
         free = model.freedom.free[joint]
@@ -292,7 +363,9 @@ def _pull(model: MarkerModel) -> Pull:
 
 
 def _scatter(residuals: np.ndarray) -> np.ndarray:
-    """How far markers stray (M,) m, from residuals (F, M, 3), half by what skin usually does."""
+    """Estimate how far markers deviate, (M,) metres, from residuals (F, M, 3): half measured, half the usual value
+    of skin.
+    """
     known = np.isfinite(residuals).all(axis=-1)
     square = np.where(known, np.sum(np.nan_to_num(residuals) ** 2, axis=-1), 0.0).sum(axis=0)
     mean = square / np.maximum(known.sum(axis=0), 1) / 3.0

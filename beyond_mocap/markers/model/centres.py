@@ -1,11 +1,11 @@
-"""Joint centres and segment axes predicted from landmarks of one frame.
+"""Predict joint centres and segment axes from the landmarks of one frame.
 
-Hips after Harrington et al. 2007 ("Prediction of the hip joint centre in adults, children, and patients with cerebral
+Hips follow Harrington et al. 2007 ("Prediction of the hip joint centre in adults, children, and patients with cerebral
 palsy based on magnetic resonance imaging", J Biomech 40:595): regressions on the width and depth of the pelvis. Knees,
 ankles and elbows lie midway between their epicondyles and malleoli (Wu et al. 2002, 2005), or half a width away from
-the lateral one, square to the limb (Davis et al. 1991). Shoulders lie 15 % of the distance between the acromia below
-them (17 % in Rab et al. 2002, from markers' middles to heads of the humerus that lie lower with hanging arms). Pelvis,
-thorax and head are turned as the typical body's landmarks (`template`) fit them best.
+the lateral one, at right angles to the limb (Davis et al. 1991). Shoulders lie 15 % of the distance between the acromia
+below them (17 % in Rab et al. 2002, measured from markers' centres to heads of the humerus that lie lower with hanging
+arms). Pelvis, thorax and head take the rotation with which the typical body's landmarks (`template`) fit best.
 """
 
 from __future__ import annotations
@@ -22,23 +22,28 @@ from ...motion import quaternion
 from ..frames import mean_rotation, rigid_fit
 from .template import LANDMARK_PLACES, PLACES, TIPS
 
-MARKER_RADIUS = 0.007  # m
+MARKER_RADIUS = 0.007  # metres
 HALF_WIDTHS = {"knee": 0.052, "ankle": 0.036, "elbow": 0.036}
-"""Half the breadth of a joint in metres, of an adult of 1.80 m; a marker's radius comes on top."""
+"""Half the width of a joint in metres, of an adult of 1.80 m; the marker's radius is added."""
 SIGMAS = {"both": 0.006, "one side": 0.012, "hip": 0.007, "shoulder": 0.015, "alone": 0.02, "trunk": 0.02}
-"""How uncertain a predicted centre is, metres: the errors that the sources give, rounded."""
-_unit = partial(unit_vector, least=1e-12)  # metres: shorter ones have no direction
-_STRAIGHT = 0.14  # sine of the angle of an elbow (8 degrees) below which its plane says nothing
-_UPRIGHT = 0.35  # radians between the trunk and the vertical that still count as standing
+"""Uncertainty of a predicted centre in metres: the errors that the sources give, rounded."""
+_unit = partial(unit_vector, least=1e-12)  # metres; shorter vectors have no direction
+_STRAIGHT = 0.14  # sine of the elbow angle (8 degrees) below which its plane is undetermined
+_UPRIGHT = 0.35  # radians between trunk and vertical up to which the body counts as upright
 
 
 @dataclass(kw_only=True)
 class Centres:
-    """What one frame tells about a body.
+    """The joint centres of one frame.
 
-    places: joint -> centre (3,) m. axes: joint -> (3, 3), columns are the joint's X, Y, Z in the world. sigma: joint ->
-    m, how uncertain the centre is. tips: joint -> place (3,) m of its tip. size: how large against the typical body.
-    notes: lines for people."""
+    Attributes:
+        size: body size relative to the typical body.
+        places: joint -> centre (3,) metres, world.
+        axes: joint -> (3, 3), the columns are the joint's X, Y and Z axes in the world.
+        sigma: joint -> uncertainty of the centre in metres.
+        tips: joint -> place (3,) metres of its tip, world.
+        notes: messages for people.
+    """
 
     size: float
     places: dict[str, np.ndarray] = field(default_factory=dict)
@@ -48,16 +53,29 @@ class Centres:
     notes: list[str] = field(default_factory=list)
 
     def put(self, joint: str, place: np.ndarray, axes: np.ndarray, sigma: float) -> None:
-        """Note a joint's centre, axes and uncertainty."""
+        """Add a joint.
+
+        Args:
+            joint: its name.
+            place: (3,) metres, world.
+            axes: (3, 3) columns in the world.
+            sigma: uncertainty in metres.
+        """
         self.places[joint], self.axes[joint], self.sigma[joint] = place, axes, sigma
 
 
 def predict(points: Mapping[str, np.ndarray], standing: bool = True) -> Centres:
-    """Centres and axes of all joints that the landmarks reach.
+    """Predict centres and axes of all joints for which there are landmarks.
 
-    points: landmark -> (3,) m, Z up. standing: whether this is a static trial, so that an upright trunk's axes are the
-    vertical and soles lie flat; otherwise they are what the typical body's are. InputError where pelvis or a whole leg
-    cannot be told."""
+    Args:
+        points: landmark -> (3,) metres, Z up.
+        is_static: whether this is a static trial. The axes of an upright trunk are then vertical and soles lie flat;
+            otherwise both follow the typical body.
+    Returns:
+        The predicted centres.
+    Raises:
+        InputError: if the landmarks of the pelvis or a leg are missing.
+    """
     points = {name: np.asarray(place, dtype=float) for name, place in points.items() if np.isfinite(place).all()}
     out = Centres(size=body_size(points))
     _pelvis(out, points)
@@ -75,7 +93,14 @@ def predict(points: Mapping[str, np.ndarray], standing: bool = True) -> Centres:
 
 
 def body_size(points: Mapping[str, np.ndarray]) -> float:
-    """How large a body is against the typical one: the middle of its distances within segments and along limbs."""
+    """Estimate the body size relative to the typical body, as the median ratio of distances within segments and along
+    limbs.
+
+    Args:
+        points: landmark -> (3,) metres.
+    Returns:
+        The ratio, between 0.4 and 1.6; 1 where nothing can be compared.
+    """
     pairs = [
         (f"{side}_{a}", f"{side}_{b}")
         for side in ("left", "right")
@@ -89,9 +114,10 @@ def body_size(points: Mapping[str, np.ndarray]) -> float:
 
 
 def _fit(joint: str, points: Mapping[str, np.ndarray], size: float, beside: tuple[str, ...] = ()):
-    """The typical body's segment laid on its landmarks: rotation (3, 3) and shift, or None where they do not tell.
+    """Fit the typical body's segment to its landmarks: rotation (3, 3) and shift (3,), or None if undetermined.
 
-    beside: landmarks of other segments that are taken in where there are too few of its own."""
+    `beside` are landmarks of other segments, used where there are too few of its own.
+    """
     names = [name for name, (carrier, _) in LANDMARK_PLACES.items() if carrier == joint and name in points]
     firm = [name for name in names if not name.endswith("scapula")]
     names = firm if len(firm) >= 3 else names
@@ -105,12 +131,22 @@ def _fit(joint: str, points: Mapping[str, np.ndarray], size: float, beside: tupl
 
 
 def _on(fit, place: np.ndarray, size: float) -> np.ndarray:
+    """Move a place of the typical body with a fit."""
     rotation, shift = fit
     return rotation @ (size * np.asarray(place)) + shift
 
 
 def frame_along(axis: str, along: np.ndarray, second: str, towards: np.ndarray) -> np.ndarray:
-    """The right-handed axes (3, 3) whose `axis` is exactly `along` and whose `second` lies nearest to `towards`."""
+    """Build right-handed axes from two directions.
+
+    Args:
+        axis: "X", "Y" or "Z", the axis that is exactly `along`.
+        along: (3,) direction.
+        second: the axis that lies nearest to `towards`.
+        towards: (3,) direction.
+    Returns:
+        (3, 3), the columns are the X, Y and Z axes.
+    """
     columns = {axis: _unit(along)}
     columns[second] = _unit(towards - (towards @ columns[axis]) * columns[axis])
     third = next(letter for letter in "XYZ" if letter not in columns)
@@ -120,22 +156,22 @@ def frame_along(axis: str, along: np.ndarray, second: str, towards: np.ndarray) 
 
 
 def _pelvis(out: Centres, points: Mapping[str, np.ndarray]) -> None:
-    """Pelvis and hips; the root lies midway between the hips."""
+    """Predict pelvis and hips; the root lies midway between the hips."""
     fit = _fit("Hips", points, out.size)
     if fit is None:
         raise InputError("pelvis", "fewer than three landmarks", "both iliac spines and the sacrum",
-                         "name the pelvis' markers in the marker set")
+                         "add the pelvis markers to the marker set")
     hips = _harrington(points)
     if hips is None:
         hips = {side: _on(fit, PLACES[f"{side}UpLeg"], out.size) for side in ("Left", "Right")}
-        out.notes.append("hips placed as a typical pelvis has them: an iliac spine or the sacrum is not marked")
+        out.notes.append("hips placed as on a typical pelvis: an iliac spine or the sacrum has no marker")
     out.put("Hips", 0.5 * (hips["Left"] + hips["Right"]), fit[0], SIGMAS["hip"])
     for side, place in hips.items():
         out.places[f"{side}UpLeg"], out.sigma[f"{side}UpLeg"] = place, SIGMAS["hip"]
 
 
 def _harrington(points: Mapping[str, np.ndarray]) -> dict[str, np.ndarray] | None:
-    """Hip centres from both anterior spines and the posterior ones (or the sacrum); None where one is missing."""
+    """Predict hip centres from both anterior spines and the posterior ones (or the sacrum); None if one is missing."""
     back = [points[name] for name in ("left_psis", "right_psis") if name in points]
     back = np.mean(back, axis=0) if len(back) == 2 else points.get("sacrum")
     if back is None or "left_asis" not in points or "right_asis" not in points:
@@ -143,21 +179,23 @@ def _harrington(points: Mapping[str, np.ndarray]) -> dict[str, np.ndarray] | Non
     front = 0.5 * (points["left_asis"] + points["right_asis"])
     across = points["left_asis"] - points["right_asis"]
     axes = frame_along("Y", across, "X", front - back)
-    # skin markers stand a radius away from the bone
+    # skin markers lie a radius away from the bone
     front, depth = front - MARKER_RADIUS * axes[:, 0], np.linalg.norm(front - back) - 2.0 * MARKER_RADIUS
     width = np.linalg.norm(across)
+    # regression coefficients of Harrington et al. 2007, constants in metres
     ahead, up, side = -0.24 * depth - 0.0099, -0.30 * width - 0.0109, 0.33 * width + 0.0073
     return {name: front + axes @ np.array([ahead, sign * side, up]) for name, sign in (("Left", 1.0), ("Right", -1.0))}
 
 
 def _thorax(out: Centres, points: Mapping[str, np.ndarray]) -> None:
+    """Predict chest, neck and collar bones."""
     fit = _fit("Chest", points, out.size, ("left_acromion", "right_acromion"))
     if fit is None:
         raise InputError("thorax", "fewer than three landmarks, or all on one line",
-                         "for instance c7, jugular_notch and t10", "name the thorax' markers in the marker set")
+                         "for instance c7, jugular_notch and t10", "add the thorax markers to the marker set")
     out.put("Chest", _on(fit, PLACES["Chest"], out.size), fit[0], SIGMAS["trunk"])
     neck = _on(fit, PLACES["Neck"], out.size)
-    if "c7" in points:  # anchored where it is marked
+    if "c7" in points:  # anchored at the marker
         neck = points["c7"] + fit[0] @ (out.size * (PLACES["Neck"] - LANDMARK_PLACES["c7"][1]))
     out.put("Neck", neck, fit[0], SIGMAS["trunk"])
     for side in ("Left", "Right"):
@@ -169,29 +207,31 @@ def _thorax(out: Centres, points: Mapping[str, np.ndarray]) -> None:
 
 
 def _head(out: Centres, points: Mapping[str, np.ndarray]) -> None:
+    """Predict the head."""
     fit = _fit("Head", points, out.size)
-    if fit is None:  # a head that no marker shows stands on the neck as a typical one does
+    if fit is None:  # a head without markers is placed on the neck as on the typical body
         fit = (out.axes["Chest"], out.places["Neck"] - out.axes["Chest"] @ (out.size * PLACES["Neck"]))
-        out.notes.append("head not marked: held straight on the neck")
+        out.notes.append("head without markers: held straight on the neck")
     out.put("Head", _on(fit, PLACES["Head"], out.size), fit[0], SIGMAS["trunk"])
     out.tips["Head"] = _on(fit, TIPS["Head"], out.size)
 
 
 def _upright(out: Centres) -> None:
-    """In a static trial the trunk's axes are level, so that standing straight is the rest pose."""
+    """Make the trunk's axes level in a static trial, so that standing straight is the rest pose."""
     for joint in ("Hips", "Chest", "Head"):
         if joint in out.axes and out.axes[joint][2, 2] > np.cos(_UPRIGHT):
             out.axes[joint] = frame_along("Z", np.array([0.0, 0.0, 1.0]), "Y", out.axes[joint][:, 1])
 
 
 def _spine(out: Centres) -> None:
-    """The lumbar joints between pelvis and thorax, the upper neck between neck and head."""
+    """Predict the lumbar joints between pelvis and thorax, and the upper neck between neck and head."""
     if "Chest" not in out.axes:
         return
     pelvis, chest = out.axes["Hips"], out.axes["Chest"]
     out.put("Spine", out.places["Hips"] + pelvis @ (out.size * PLACES["Spine"]), pelvis, SIGMAS["trunk"])
     low, high = PLACES["Spine"], PLACES["Chest"]
     middle = mean_rotation(np.stack([pelvis, chest]))
+    # `share`: height of Spine1 between Spine and Chest; `bow`: its offset from the straight line between them
     share = (PLACES["Spine1"][2] - low[2]) / (high[2] - low[2])
     bow = out.size * (PLACES["Spine1"] - (1.0 - share) * low - share * high)
     place = (1.0 - share) * out.places["Spine"] + share * out.places["Chest"] + middle @ bow
@@ -202,9 +242,18 @@ def _spine(out: Centres) -> None:
 
 
 def _hinge(out, points, side, joint, above, hint) -> tuple[np.ndarray, np.ndarray, float] | None:
-    """A knee's, ankle's or elbow's centre, the unit direction from its middle to the outside, and the uncertainty.
+    """Predict the centre of a knee, ankle or elbow.
 
-    above: the centre (3,) of the joint above. hint: (3,) roughly outwards, where only one side is marked."""
+    Args:
+        out: the centres so far.
+        points: landmark -> (3,) metres.
+        side: "left" or "right".
+        joint: "knee", "ankle" or "elbow".
+        above: (3,) metres, the centre of the joint above.
+        hint: (3,) rough outward direction, for joints with a marker on one side only.
+    Returns:
+        Centre, unit direction from the centre outwards, uncertainty in metres; None without markers.
+    """
     lateral, medial = points.get(f"{side}_{joint}_lateral"), points.get(f"{side}_{joint}_medial")
     if lateral is None and medial is None:
         return None
@@ -215,21 +264,22 @@ def _hinge(out, points, side, joint, above, hint) -> tuple[np.ndarray, np.ndarra
     length = max(float(np.linalg.norm(above - marker)), 1e-6)
     up = (above - marker) / length
     outwards = _unit(hint - (hint @ up) * up)
-    sine = min(half / length, 0.9)  # so that the centre lies square below the joint above
+    sine = min(half / length, 0.9)  # so that the offset is at right angles to the line to the joint above
     return marker + half * (sine * up + inwards * np.sqrt(1.0 - sine**2) * outwards), outwards, SIGMAS["one side"]
 
 
 def _leg(out: Centres, points: Mapping[str, np.ndarray], side: str, standing: bool) -> None:
+    """Predict knee, ankle and foot of a leg."""
     name, sign = side.capitalize(), 1.0 if side == "left" else -1.0
     hip = out.places[f"{name}UpLeg"]
     knee = _hinge(out, points, side, joint="knee", above=hip, hint=_knee_outwards(out, points, side, sign, standing))
     if knee is None:
         raise InputError(f"{side} leg", "no marker on the knee", f"{side}_knee_lateral",
-                         "name the leg's markers in the marker set")
+                         "add the leg markers to the marker set")
     ankle = _hinge(out, points, side, joint="ankle", above=knee[0], hint=knee[1])
     if ankle is None:
         raise InputError(f"{side} leg", "no marker on the ankle", f"{side}_ankle_lateral",
-                         "name the leg's markers in the marker set")
+                         "add the leg markers to the marker set")
     across = sign * knee[1]
     out.axes[f"{name}UpLeg"] = frame_along("Z", hip - knee[0], "Y", across)
     out.put(f"{name}Leg", knee[0], frame_along("Z", knee[0] - ankle[0], "Y", across), knee[2])
@@ -237,8 +287,11 @@ def _leg(out: Centres, points: Mapping[str, np.ndarray], side: str, standing: bo
 
 
 def _knee_outwards(out, points, side, sign, standing) -> np.ndarray:
-    """Where the outside of a knee points when only that side is marked: by the thigh's marker, as Plug-in Gait has it;
-    standing, more by the pelvis, since wands are seldom placed that well."""
+    """Estimate the outward direction of a knee with a lateral marker only.
+
+    The marker on the thigh gives it, as in Plug-in Gait; in a static trial the pelvis counts more, since wands are
+    seldom placed that precisely.
+    """
     pelvis = sign * out.axes["Hips"][:, 1]
     wand, lateral = points.get(f"{side}_thigh"), points.get(f"{side}_knee_lateral")
     if wand is None or lateral is None:
@@ -249,6 +302,7 @@ def _knee_outwards(out, points, side, sign, standing) -> np.ndarray:
 
 
 def _foot(out: Centres, points: Mapping[str, np.ndarray], side: str, ankle, standing: bool) -> None:
+    """Predict ankle and toe joint and the tip of the toes."""
     name = side.capitalize()
     marked = [x for x in ("heel", "toe", "metatarsal_1", "metatarsal_5", "toe_tip") if f"{side}_{x}" in points]
     front = [points[f"{side}_{x}"] for x in marked if x.startswith(("toe", "meta")) and x != "toe_tip"]
@@ -256,7 +310,7 @@ def _foot(out: Centres, points: Mapping[str, np.ndarray], side: str, ankle, stan
     shank = out.axes[f"{name}Leg"]
     if not front:
         axes = shank
-        out.notes.append(f"{side} foot: no marker at the toes; held square to the shank")
+        out.notes.append(f"{side} foot: no marker at the toes; held at right angles to the shank")
     else:
         middle = np.mean(front, axis=0)
         behind = points.get(f"{side}_heel", ankle[0])
@@ -272,7 +326,7 @@ def _foot(out: Centres, points: Mapping[str, np.ndarray], side: str, ankle, stan
 
 
 def _foot_axes(out, points, side, ankle, forward, standing) -> np.ndarray:
-    """A foot's axes: level where it stands; else as heel, toes and ankle lie on a typical foot."""
+    """Build the axes of a foot: level in a static trial, else as heel, toes and ankle lie on a typical foot."""
     name = side.capitalize()
     if standing and abs(forward[2]) < 0.35 * np.linalg.norm(forward):
         return frame_along("Z", np.array([0.0, 0.0, 1.0]), "X", forward)
@@ -283,7 +337,7 @@ def _foot_axes(out, points, side, ankle, forward, standing) -> np.ndarray:
 
 
 def _arm(out: Centres, points: Mapping[str, np.ndarray], side: str) -> None:
-    """Collar bone, shoulder, elbow, wrist, hand."""
+    """Predict collar bone, shoulder blade, shoulder, elbow, wrist and hand."""
     name, sign = side.capitalize(), 1.0 if side == "left" else -1.0
     chest, acromion = out.axes["Chest"], points[f"{side}_acromion"]
     other = points.get("right_acromion" if side == "left" else "left_acromion")
@@ -316,7 +370,7 @@ def _arm(out: Centres, points: Mapping[str, np.ndarray], side: str) -> None:
 
 
 def _wrist(points, side) -> tuple[np.ndarray | None, np.ndarray | None]:
-    """The wrist's centre and the direction from its ulnar to its radial side; None for what is not marked."""
+    """Predict the wrist's centre and the direction from its ulnar to its radial side; None for what has no marker."""
     radial, ulnar = points.get(f"{side}_wrist_radial"), points.get(f"{side}_wrist_ulnar")
     if radial is not None and ulnar is not None:
         return 0.5 * (radial + ulnar), _unit(radial - ulnar)
@@ -325,15 +379,16 @@ def _wrist(points, side) -> tuple[np.ndarray | None, np.ndarray | None]:
 
 
 def _outwards_plainly(chest, shoulder, elbow, sign) -> np.ndarray:
-    """Where the outside of an elbow points when the arm has come down from a T-pose the short way."""
+    """Estimate the outward direction of an elbow, as if the arm came down from a T-pose on the shortest path."""
     turn = quaternion.between(sign * chest[:, 1], elbow - shoulder)
     return quaternion.rotate(turn, chest[:, 2])
 
 
 def _elbow_and_wrist(out, points, side, sign, shoulder, marker, plain):
-    """An elbow as `_elbow` and the wrist's centre, where a lone `marker` lies on the back of the wrist.
+    """Predict elbow and wrist where a single `marker` lies on the back of the wrist.
 
-    Which side is the back follows from the elbow, and the elbow from the wrist's centre."""
+    The back of the wrist depends on the elbow, and the elbow on the wrist's centre, so both are found by iteration.
+    """
     inside = out.size * (LANDMARK_PLACES["left_wrist"][1] - PLACES["LeftHand"])[2]
     outwards = plain
     for _ in range(4):
@@ -344,7 +399,7 @@ def _elbow_and_wrist(out, points, side, sign, shoulder, marker, plain):
 
 
 def _elbow(out, points, side, sign, shoulder, wrist, radial, plain):
-    """An elbow's centre, the direction from its medial to its lateral side, and the uncertainty."""
+    """Predict an elbow's centre, the direction from its medial to its lateral side, and the uncertainty in metres."""
     lateral = points.get(f"{side}_elbow_lateral", points.get(f"{side}_elbow_medial"))
     if wrist is not None and f"{side}_elbow_medial" not in points:
         half = out.size * HALF_WIDTHS["elbow"] + MARKER_RADIUS
@@ -356,16 +411,26 @@ def _elbow(out, points, side, sign, shoulder, wrist, radial, plain):
 
 
 def _plane_beside(marker, above, below, half, sign) -> np.ndarray | None:
-    """The normal of the plane through `above` and `below` that passes a marker at the distance `half`, towards the
-    marker; None where the joint is too straight to have such a plane.
+    """Find the limb plane through two joints that passes a marker at a given distance.
 
-    Two planes do; in one of them the joint bends the right way: (upper x lower bone) x sign points to the marker."""
+    Two planes do. In one of them the joint bends in the right sense: (upper x lower bone) x sign points to the marker.
+
+    Args:
+        marker: (3,) metres.
+        above: (3,) metres, the joint above.
+        below: (3,) metres, the joint below.
+        half: distance in metres between marker and plane.
+        sign: sense of the bend.
+    Returns:
+        (3,) the plane's normal towards the marker; None where the joint is too straight to have a plane.
+    """
     line = _unit(below - above)
     away = (marker - above) - ((marker - above) @ line) * line
     distance = float(np.linalg.norm(away))
     if distance < half * 1.001:
         return None
     away /= distance
+    # the normals at distance `half` form an angle with `away` of which this is the cosine
     cosine = half / distance
     aside = np.sqrt(1.0 - cosine**2) * np.cross(line, away)
     for normal in (cosine * away + aside, cosine * away - aside):
@@ -377,6 +442,7 @@ def _plane_beside(marker, above, below, half, sign) -> np.ndarray | None:
 
 
 def _hand(out, points, side, sign, wrist, forearm, sigma) -> None:
+    """Predict the hand and its tip."""
     name = side.capitalize()
     knuckle = points.get(f"{side}_knuckle")
     axes = forearm

@@ -1,8 +1,7 @@
-"""Which markers a recording has on which part of the body, which anatomical points they mark, and a trial under the
-set's names.
+"""Marker sets: which markers lie on which segment and which anatomical points they mark.
 
-A set knows no coordinates. Its segments say which joint carries a marker; its landmarks say what the marker lies on,
-and that is all that joint centres are found from (`centres`): a set of one's own needs no rules, only names.
+A set has no coordinates. Its segments say which joint carries a marker; its landmarks say what the marker lies on, and
+joint centres are predicted from these alone (`centres`): a custom set needs names, no rules.
 """
 
 from __future__ import annotations
@@ -19,19 +18,27 @@ from ..trial import MarkerTrial, list_some
 from .template import JOINTS, LANDMARKS
 
 UNLABELED = re.compile(r"^(\*\d+|[UuxX]_?\d+|C_\d+|[Uu]nlabell?ed.*|[Uu]nnamed.*)$")
-"""Labels that recording software gives to markers that nobody has named."""
-_MOST = 0.8  # of a set's markers
+"""Labels that recording software gives to unlabeled markers."""
+_MOST = 0.8  # share of a set's markers that a trial must contain
 
 
 @dataclass(frozen=True)
 class MarkerSet:
     """The markers of one protocol.
 
-    name: one word. segments: joint name (of `template.JOINTS`) -> labels of the markers that it carries.
-    landmarks: anatomical point (of `template.LANDMARKS`) -> labels; several mark it by their mean.
-    aliases: another label -> the set's own. static: markers that may be missing in all but the static trial.
-    optional: markers that may be missing anywhere. ball: markers on a ball. other: markers on things that are no body.
-    about: one line for people. InputError for unknown joints or landmarks and markers that lie on two segments."""
+    Attributes:
+        name: one word.
+        segments: joint name (of `template.JOINTS`) -> labels of the markers that it carries.
+        landmarks: anatomical point (of `template.LANDMARKS`) -> labels; of several, the mean is used.
+        aliases: another label -> the set's own.
+        static: markers that may be missing in all but the static trial.
+        optional: markers that may be missing anywhere.
+        ball: markers on a ball.
+        other: markers on other objects.
+        about: one line that describes the set.
+    Raises:
+        InputError: for unknown joints or landmarks, or a marker on two segments.
+    """
 
     name: str
     segments: Mapping[str, tuple[str, ...]]
@@ -55,6 +62,7 @@ class MarkerSet:
         self._check()
 
     def _check(self):
+        """Raise InputError for unknown joints, landmarks and markers, and for markers on two segments."""
         where = f"marker set {self.name}"
         for joint in self.segments:
             if joint not in JOINTS:
@@ -65,10 +73,10 @@ class MarkerSet:
         labels = self.labels
         twice = sorted({label for label in labels if labels.count(label) > 1})
         if twice:
-            raise InputError(where, f"marker {twice[0]!r} twice", "each marker on one segment")
+            raise InputError(where, f"marker {twice[0]!r} on two segments", "each marker on one segment")
         unknown = sorted({x for group in self.landmarks.values() for x in group} - set(labels))
         if unknown:
-            raise InputError(where, f"landmark on {unknown[0]!r}, which no segment carries", "a marker of a segment")
+            raise InputError(where, f"landmark on {unknown[0]!r}, which is on no segment", "a marker of a segment")
         if not labels:
             raise InputError(where, "no segment has a marker", "a line such as `segment Hips: LASI, RASI, SACR`")
 
@@ -79,20 +87,26 @@ class MarkerSet:
 
     @property
     def needed(self) -> frozenset[str]:
-        """Markers without which a trial is not of this set."""
+        """Markers that every trial of this set must contain."""
         return frozenset(self.labels) - self.static - self.optional
 
     def lacking(self, labels: Sequence[str]) -> tuple[str, ...]:
-        """Those of `needed` that are not among `labels`, in the set's order."""
+        """List the required markers that are not among `labels`, in the set's order."""
         present = {self.renaming(labels).get(label, label) for label in labels}
         return tuple(label for label in self.labels if label in self.needed and label not in present)
 
     def segment_of(self, label: str) -> str | None:
-        """The joint that carries a marker; None where it lies on nothing."""
+        """Find the joint that carries a marker; None where it lies on no segment."""
         return next((joint for joint, group in self.segments.items() if label in group), None)
 
     def renaming(self, labels: Sequence[str]) -> dict[str, str]:
-        """Old label -> the set's own, for those of `labels` that are called otherwise (alias, or another case)."""
+        """Map labels to the set's own.
+
+        Args:
+            labels: as recorded.
+        Returns:
+            {label: the set's label}, only for labels that differ (an alias, or another case).
+        """
         own = (*self.labels, *self.ball, *self.other)
         plain = {_plain(label): label for label in own} | {_plain(old): new for old, new in self.aliases.items()}
         present = set(labels)
@@ -104,18 +118,24 @@ class MarkerSet:
         return found
 
     def clusters(self, labels: Sequence[str]) -> dict[str, tuple[str, ...]]:
-        """Segment -> those of its markers that are among `labels`; segments without any are left out."""
+        """Select the markers of each segment that are among `labels`; segments without any are left out."""
         present = set(labels)
         found = {joint: tuple(x for x in group if x in present) for joint, group in self.segments.items()}
         return {joint: group for joint, group in found.items() if group}
 
 
 def recognise(labels: Sequence[str], sets: Iterable[MarkerSet]) -> MarkerSet:
-    """The set whose markers these are: of those of which most is there, the one that explains most of them.
+    """Choose the marker set that fits the labels: of the sets that are present enough, the one that explains most
+    labels.
 
-    labels: as recorded; those that nobody has named do not count. Up to a fifth of a set's markers may be missing, as
-    those of an arm that was never seen. InputError where every set lacks more: it names the nearest and what is
-    missing."""
+    Args:
+        labels: as recorded; unlabeled markers are ignored.
+        sets: the sets to choose from. Up to a fifth of a set's markers may be missing, as those of an arm out of view.
+    Returns:
+        The set.
+    Raises:
+        InputError: if every set lacks more; the message names the nearest set and its missing markers.
+    """
     sets = list(sets)
     named = [label for label in labels if not UNLABELED.match(label)]
     judged = [(marker_set, _present(marker_set, named)) for marker_set in sets]
@@ -124,7 +144,7 @@ def recognise(labels: Sequence[str], sets: Iterable[MarkerSet]) -> MarkerSet:
     if there:
         return max(there, key=lambda row: row[:3])[3]
     if not sets:
-        raise InputError("marker sets", "none given", "at least one")
+        raise InputError("marker sets", "no marker sets", "at least one")
     nearest, present = judged[share.index(max(share))]
     missing = sorted(nearest.needed - present)
     unknown = sorted(set(named) - set(nearest.renaming(named)) - set(nearest.labels))
@@ -132,24 +152,33 @@ def recognise(labels: Sequence[str], sets: Iterable[MarkerSet]) -> MarkerSet:
         "markers", f"no marker set fits; nearest is {nearest.name}, of which "
         + f"{list_some(missing, 8)} {'is' if len(missing) == 1 else 'are'} missing"
         + (f" ({list_some(unknown, 8)} not in it)" if unknown else ""),
-        "all markers of one set", "give a marker set of your own (--marker-set)",
+        "all markers of one set", "choose a marker set file that has these labels",
     )
 
 
 def _present(marker_set: MarkerSet, labels: Sequence[str]) -> set[str]:
+    """Return the set's markers that are among the labels."""
     renamed = marker_set.renaming(labels)
     return {renamed.get(label, label) for label in labels} & set(marker_set.labels)
 
 
 def _plain(label: str) -> str:
+    """Return the label in lower case, without separators."""
     return re.sub(r"[\s_\-.]", "", label).lower()
 
 
 def named_as(trial: MarkerTrial, marker_set: MarkerSet) -> MarkerTrial:
-    """The trial under the set's names.
+    """Convert a trial to the set's labels.
 
-    A set may say which unlabeled marker is which (`also LHAND: x52`), but recording software numbers these anew in
-    every trial: where both of a left and a right one have come so, each goes to the side whose markers it is near to.
+    A set may say which unlabeled marker is which (`also LHAND: x52`), but recording software numbers these differently
+    in every trial. Where both a left and a right marker were matched in this way, each goes to the side whose markers
+    are nearer.
+
+    Args:
+        trial: the recorded markers.
+        marker_set: the set.
+    Returns:
+        The trial with the set's labels.
     """
     names = marker_set.renaming(trial.labels)
     chance = {new: old for old, new in names.items() if UNLABELED.match(old)}
@@ -164,12 +193,13 @@ def named_as(trial: MarkerTrial, marker_set: MarkerSet) -> MarkerTrial:
 
 
 def _side(marker_set: MarkerSet, label: str) -> str:
+    """Return "Left", "Right" or "" for the segment that carries a marker."""
     segment = marker_set.segment_of(label) or ""
     return next((side for side in ("Left", "Right") if segment.startswith(side)), "")
 
 
 def _twin(label: str, marker_set: MarkerSet, among) -> str | None:
-    """The label on the other side's segment that is called alike."""
+    """Find the marker with the same name on the other side's segment, or None."""
     segment = marker_set.segment_of(label) or ""
     other = segment.replace("Left", "Right") if "Left" in segment else segment.replace("Right", "Left")
     there = [x for x in marker_set.segments.get(other, ()) if x in among and x[1:] == label[1:]]
@@ -177,7 +207,7 @@ def _twin(label: str, marker_set: MarkerSet, among) -> str | None:
 
 
 def _apart(trial: MarkerTrial, label: str, marker_set: MarkerSet, side: str) -> float:
-    """Metres on average from a marker to the nearest of the side's own."""
+    """Measure the mean distance in metres from a marker to the nearest marker of a side."""
     own = trial.positions[:, trial.index(label)]
     best = np.inf
     for segment, labels in marker_set.segments.items():

@@ -1,7 +1,7 @@
 """The model that is fitted to markers: a skeleton, where each marker lies on it, and how its joints may turn.
 
 Limits follow the ranges of living adults (Kapandji; Boone and Azen 1979) with a margin: they stop what no body does,
-and leave throwers what they do (an upper arm laid back far beyond a clinic's table).
+and allow what throwers do (an upper arm laid back far beyond a clinic's table).
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from ...motion.skeleton import Skeleton, frozen_array
 
 _ANY = (-np.inf, np.inf)
 _NONE = (0.0, 0.0)
-# joint (left side) -> axis order, limits in degrees of each of its three angles, pull in metres per radian
+# joint (left side) -> axis order, limits in degrees of its three angles, pull to the rest pose in metres per radian
 _TABLE = {"Hips": ("ZYX", (_ANY, _ANY, _ANY), 0.0), "Spine": ("YXZ", (_ANY, _ANY, _ANY), 0.01),
           "Spine1": ("YXZ", (_ANY, _ANY, _ANY), 0.01), "Chest": ("YXZ", (_ANY, _ANY, _ANY), 0.01),
           "Neck": ("YXZ", (_ANY, _ANY, _ANY), 0.01), "Neck1": ("YXZ", (_ANY, _ANY, _ANY), 0.01),
@@ -27,17 +27,23 @@ _TABLE = {"Hips": ("ZYX", (_ANY, _ANY, _ANY), 0.0), "Spine": ("YXZ", (_ANY, _ANY
           "UpLeg": ("YXZ", ((-160, 75), (-75, 75), (-80, 80)), 0.0),
           "Leg": ("YXZ", ((-25, 170), (-12, 12), (-60, 60)), 0.0),
           "Foot": ("YXZ", ((-75, 90), (-60, 60), (-60, 60)), 0.0), "ToeBase": ("YXZ", ((-80, 60), _NONE, _NONE), 0.002)}
-_WEAK = 0.004  # pull in metres per radian of a joint whose own markers are fewer than a technical frame needs
-_WEAK_FOOT = 0.01  # heel and toe lie nearly on a line with the ankle: a millimetre of skin would be 2 degrees of roll
+_WEAK = 0.004  # pull in metres per radian of a joint with fewer markers than a technical frame needs
+_WEAK_FOOT = 0.01  # heel, toe and ankle lie nearly on a line: a millimetre of skin would be 2 degrees of roll
 
 
 @dataclass(frozen=True, eq=False)
 class Freedom:
-    """How each of J joints may turn against its parent, as three angles one after the other.
+    """How each of J joints may turn relative to its parent, as three angles one after the other.
 
-    order: per joint a permutation of "XYZ": intrinsic turns about the joint's own axes, in that order (as
-    `quaternion.from_euler`). free: (J, 3) bool, in that order; an angle that is not free stays zero. low, high: (J, 3)
-    radians, -inf and inf where nothing stops it. The root's row speaks of its rotation; it may be anywhere."""
+    Attributes:
+        order: for each joint a permutation of "XYZ": intrinsic rotations about the joint's own axes, in that order (as
+            `quaternion.from_euler`).
+        free: (J, 3) bool, in that order; an angle that is not free stays zero.
+        low: (J, 3) radians, -inf where there is no limit.
+        high: (J, 3) radians, inf where there is no limit. The root's row limits its rotation; its place is free.
+    Raises:
+        InputError: if shapes do not match, an order is no permutation, or limits exclude zero.
+    """
 
     order: tuple[str, ...]
     free: np.ndarray
@@ -55,14 +61,19 @@ class Freedom:
         if any(sorted(order) != ["X", "Y", "Z"] for order in self.order):
             raise InputError("model", "an axis order that is no permutation of XYZ", "for instance ZXY")
         if not (self.low <= 0.0).all() or not (self.high >= 0.0).all():
-            raise InputError("model", "limits that leave out zero", "low <= 0 <= high, in radians")
+            raise InputError("model", "limits that exclude zero", "low <= 0 <= high, in radians")
 
 
 @dataclass(frozen=True)
 class BallMarker:
     """A marker on the surface of a ball that a hand holds.
 
-    label: the marker. joint: index of the hand. centre: (3,) m, the ball's centre in the hand's frame. radius: m."""
+    Attributes:
+        label: of the marker.
+        joint: index of the hand.
+        centre: (3,) metres, the ball's centre in the hand's frame.
+        radius: metres.
+    """
 
     label: str
     joint: int
@@ -74,16 +85,29 @@ class BallMarker:
 class MarkerModel:
     """A body of J joints with M markers on it.
 
-    skeleton: rest pose = T-pose facing +X, all frames the world's (`template`). markers: M labels. joint: (M,) index of
-    the joint that carries each. places: (M, 3) m in that joint's frame. sigma: (M,) m, how far a marker strays from its
-    place (root mean square a coordinate). edge_sigma: (M,), root of eq. 5.4 for the marker's cluster: how far, as a
-    share of their length, its edges stray (Fredriksson §5.3.2); NaN for a lone marker. freedom: how the joints turn.
-    stiffness: (J,) metres per radian, a pull towards the rest pose: the cost of a pose is the sum over the markers of
-    weight x distance^2, plus that over the joints of (stiffness x angle)^2. Zero for joints that markers tell; small
-    for spine and neck, whose joints share out evenly what only their ends show (§5.3.1). centre_sigma: (J,) m, how
-    uncertain the centre of the joint is. ball: how a ball with a marker lies in the hand, where that is known. subject,
-    sessions, set_name: whose model it is, out of which recordings and of which marker set. notes: lines for people on
-    how it was found."""
+    The cost of a pose is the sum over the markers of weight x distance^2, plus the sum over the joints of (stiffness x
+    angle)^2.
+
+    Attributes:
+        skeleton: rest pose is a T-pose facing +X, all joint frames equal the world's (`template`).
+        markers: M labels.
+        joint: (M,) index of the joint that carries each marker.
+        places: (M, 3) metres in that joint's frame.
+        sigma: (M,) metres by which a marker deviates from its place (root mean square per coordinate).
+        edge_sigma: (M,) root of eq. 5.4 for the marker's cluster: how far its edges deviate, as a share of their length
+            (Fredriksson section 5.3.2); NaN for a single marker.
+        freedom: how the joints may turn.
+        stiffness: (J,) metres per radian, pull towards the rest pose. Zero for joints that markers determine; small for
+            spine and neck, whose joints share evenly what only their ends show (section 5.3.1).
+        centre_sigma: (J,) metres, uncertainty of the joint's centre.
+        ball: how a ball with a marker lies in the hand, where that is known.
+        subject: whose model it is.
+        sessions: names of the recordings that it was built from.
+        set_name: name of its marker set.
+        notes: messages on how it was built.
+    Raises:
+        InputError: if shapes do not match, or a value is out of range.
+    """
 
     skeleton: Skeleton
     markers: tuple[str, ...]
@@ -110,6 +134,7 @@ class MarkerModel:
         self._check()
 
     def _check(self):
+        """Raise InputError for shapes, names and values that are not valid."""
         count, joints = len(self.markers), len(self.skeleton)
         if not count:
             raise InputError("model", "no markers", "at least three")
@@ -119,24 +144,31 @@ class MarkerModel:
             found = f"{joints} joints, {len(self.freedom.order)} freedoms, {len(self.stiffness)} pulls"
             raise InputError("model", found)
         if len(set(self.markers)) != count:
-            raise InputError("model", "two markers of one name", "unique labels")
+            raise InputError("model", "two markers with one name", "unique labels")
         if self.joint.min() < 0 or self.joint.max() >= joints:
-            raise InputError("model", "a marker on a joint that is not there", f"0 to {joints - 1}")
+            raise InputError("model", "a marker on a joint that does not exist", f"0 to {joints - 1}")
         if not np.isfinite(self.places).all() or not (self.sigma > 0.0).all():
-            raise InputError("model", "a marker's place or sigma is no number", "metres, sigma above 0")
+            raise InputError("model", "a marker's place or sigma is not a number", "metres, sigma above 0")
         if not (self.stiffness >= 0.0).all():
             raise InputError("model", "a stiffness below zero", "metres per radian")
 
     def clusters(self) -> dict[int, np.ndarray]:
-        """Joint -> indices of the markers that it carries."""
+        """Return joint -> indices of the markers that it carries."""
         return {int(joint): np.flatnonzero(self.joint == joint) for joint in np.unique(self.joint)}
 
 
 def freedom_of(joints: Sequence[str], parents: Sequence[int], counts: Mapping[str, int]) -> tuple[Freedom, np.ndarray]:
-    """Freedom and stiffness (J,) of these joints.
+    """Build freedom and stiffness of joints.
 
-    counts: joint -> number of markers it carries. A joint with no marker on it nor on anything below it is held."""
+    Args:
+        joints: J joint names, parents first.
+        parents: (J,) index of each joint's parent.
+        counts: joint -> number of markers that it carries. A joint without markers on it or below it cannot turn.
+    Returns:
+        The freedom, and (J,) metres per radian.
+    """
     below = [counts.get(name, 0) for name in joints]
+    # `below`: markers on each joint and all joints below it, summed from the tips to the root
     for index in range(len(joints) - 1, 0, -1):
         below[parents[index]] += below[index]
     orders, limits, pulls = [], [], []

@@ -1,14 +1,13 @@
-"""The skeleton that markers are fitted to, the anatomical points that markers lie on, and where both lie on a typical
-body. Every marker set translates its labels into these landmarks.
+"""The skeleton that markers are fitted to, the anatomical landmarks, and the place of both on a typical body.
 
-Joints are named as Mixamo and LAFAN1 do. In the rest pose the body stands in a T-pose facing +X, thumbs forward, and
-all joints' frames are the world's: X forward, Y left, Z up. Thus an arm's long axis is Y (left: outwards), a leg's -Z,
-knees and ankles bend about Y, elbows about Z.
+Every marker set translates its labels into these landmarks. Joints are named as Mixamo and LAFAN1 do. In the rest pose
+the body is in a T-pose facing +X, thumbs forward, and all joints' frames are the world's: X forward, Y left, Z up. An
+arm's long axis is therefore Y (left: outwards), a leg's -Z; knees and ankles bend about Y, elbows about Z.
 
 The typical body is an adult of 1.80 m: lengths after Drillis and Contini 1966 (in Winter 2009, fig. 4.1), hips behind
-and below the iliac spines after Harrington et al. 2007, the lumbar joint after Reed et al. 1999. It serves where a set
-of markers does not reach (a head without markers), to tell how a pelvis or a thorax is turned from whichever of its
-landmarks are marked, and as what joint centres are compared with.
+and below the iliac spines after Harrington et al. 2007, the lumbar joint after Reed et al. 1999. It is used where a
+marker set has no markers (a head without markers), to find the rotation of a pelvis or a thorax from any of its
+landmarks, and as a reference for joint centres.
 """
 
 from __future__ import annotations
@@ -17,7 +16,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-STATURE = 1.80
+STATURE = 1.80  # metres
 
 # joint, parent, place in the T-pose in metres (forward, left, up) from the middle between the hips; left side
 _TRUNK = (("Hips", None, (0.0, 0.0, 0.0)), ("Spine", "Hips", (0.005, 0.0, 0.114)),
@@ -65,7 +64,7 @@ _SIDES = (
     "asis", "psis", "iliac_crest",  # iliac spines; crest at the side
     "scapula",  # on the blade of the shoulder
     "acromion",
-    "elbow_lateral", "elbow_medial", "wrist_radial", "wrist_ulnar", "wrist",  # `wrist`: a lone marker on its back
+    "elbow_lateral", "elbow_medial", "wrist_radial", "wrist_ulnar", "wrist",  # `wrist`: a single marker on its back
     "knuckle",  # head of the second or third metacarpal, from the back
     "fingertip",
     "trochanter", "thigh",  # `thigh`, `shank`: markers in the plane of hip, knee and ankle, as on Plug-in Gait's wands
@@ -75,7 +74,7 @@ _SIDES = (
     "temple", "occiput",
 )
 LANDMARKS = frozenset((*_CENTRE, *(f"{side}_{name}" for side in ("left", "right") for name in _SIDES)))
-"""All landmarks; those of a limb or half begin with left_ or right_."""
+"""All landmarks; those of one side begin with left_ or right_."""
 
 
 def _other(name: str) -> str:
@@ -87,6 +86,7 @@ def _across(place) -> tuple[float, float, float]:
 
 
 def _joints() -> tuple[dict[str, str | None], dict[str, tuple]]:
+    """Build the parents and places of all joints, both sides."""
     parents, places = {}, {}
     for name, parent, place in _TRUNK:
         parents[name], places[name] = parent, place
@@ -99,6 +99,7 @@ def _joints() -> tuple[dict[str, str | None], dict[str, tuple]]:
 
 
 def _both(table):
+    """Return a table of the left side with its mirror image added."""
     out = dict(table)
     for name, value in table.items():
         if name.lower().startswith("left"):
@@ -109,7 +110,7 @@ def _both(table):
 
 _PARENTS, _PLACES = _joints()
 PARENTS = MappingProxyType(_PARENTS)
-"""Joint -> the joint above it, None for the root; parents stand first. Scapulae are left out of most skeletons."""
+"""Joint -> the joint above it, None for the root; parents come first. Most skeletons have no scapulae."""
 JOINTS = tuple(PARENTS)  # all joints that a segment may be carried by, parents first
 PLACES = MappingProxyType({name: np.array(place) for name, place in _PLACES.items()})
 """Joint -> its place (3,) m in the T-pose of the typical body, from the middle between the hips."""

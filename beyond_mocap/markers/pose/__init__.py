@@ -1,1 +1,1 @@
-"""The pose in every frame, and the filters behind it (Fredriksson §5.3, §5.4)."""
+"""Solve the pose of every frame, and filter the motion (Fredriksson sections 5.3 and 5.4)."""

@@ -1,18 +1,18 @@
-"""The chain of joints that carries the markers, and how its markers move with it (Fredriksson §3.5.2, §5.3.1).
+"""The chain of joints that carries the markers, and how its markers move with it (Fredriksson sections 3.5.2 and
+5.3.1).
 
-A pose is the place of the root and one rotation a joint (eq. 3.18). The paper writes rotations as Euler angles
-(eq. 3.19), which have poles: whatever the order, two of the directions that a thrower's upper arm passes lie on one
-line with the pole, and there the angles run away though the arm does not. So a joint that is free to turn all ways is
-kept as a quaternion and moved by small rotation vectors, which have no pole; its angles are read only where limits ask
-for them (`limits`). A joint with one or two free angles (a hinge) has no pole and is kept as these angles.
+A pose is the place of the root and one rotation for each joint (eq. 3.18). The paper writes rotations as Euler angles
+(eq. 3.19), which have poles: in any order, two of the directions that a thrower's upper arm passes lie on one line with
+the pole, and there the angles change fast though the arm does not. A joint that is free about all axes is therefore
+stored as a quaternion and changed by small rotation vectors, which have no pole; its angles are read only where limits
+need them (`limits`). A joint with one or two free angles (a hinge) has no pole and is stored as these angles.
 
-A small step of a pose is, for each joint, a turn about three axes through the joint (the parent's axes for a free
-joint, those of its angles for a hinge; an axis that is not free counts nothing), and for the root also a shift. All
-points below a joint follow as a rigid body, so that the derivative of a marker at x by a turn about axis a through p
-is a x (x - p): no other formula is needed, and the equations of a step are solved from the tips to the root
-(`elimination`).
+A small step of a pose is, for each joint, a rotation about three axes through the joint (the parent's axes for a free
+joint, those of its angles for a hinge; an axis that is not free has no effect), and a shift of the root. All points
+below a joint follow as a rigid body, so the derivative of a marker at x by a rotation about axis a through p is a x (x
+- p). No other formula is needed, and the equations of a step are solved from the tips to the root (`elimination`).
 
-Arrays run over F frames in their last axis: numpy then works on long runs, whatever library lies behind it.
+Arrays have F frames in their last axis, so that numpy works on long contiguous runs.
 """
 
 from __future__ import annotations
@@ -27,17 +27,24 @@ from ...motion import quaternion
 from ...motion.skeleton import Skeleton
 
 AXES = {"X": 0, "Y": 1, "Z": 2}
-CONJUGATE = np.array([1.0, -1.0, -1.0, -1.0])[:, None]  # times a quaternion (..., 4, F): its inverse
+CONJUGATE = np.array([1.0, -1.0, -1.0, -1.0])[:, None]  # a quaternion (..., 4, F) times this is its inverse
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Chain:
-    """J joints, M markers on them, and what each joint may do.
+    """J joints, M markers on them, and how each joint may turn.
 
-    joint: (M,) which joint carries the marker. places: (M, 3) m in its frame. order: J orders of intrinsic angles,
-    permutations of XYZ. free: (J, 3) bool by place in the order; an angle that is not free stays 0. low, high: (J, 3)
-    rad, -inf and inf where there is no limit, 0 where not free. stiffness: (J, 3) m per radian, how strongly a
-    joint is drawn to its rest pose: a radian away counts as much as a marker so many metres off."""
+    Attributes:
+        skeleton: the joints.
+        joint: (M,) index of the joint that carries each marker.
+        places: (M, 3) metres in that joint's frame.
+        order: J orders of intrinsic angles, permutations of XYZ.
+        free: (J, 3) bool, by position in the order; an angle that is not free stays 0.
+        low: (J, 3) radians, -inf where there is no limit, 0 where not free.
+        high: (J, 3) radians, inf where there is no limit, 0 where not free.
+        stiffness: (J, 3) metres per radian, pull to the rest pose: a radian costs as much as a marker off by so many
+            metres.
+    """
 
     skeleton: Skeleton
     joint: np.ndarray
@@ -50,23 +57,25 @@ class Chain:
 
     @cached_property
     def turning(self) -> tuple[bool, ...]:
-        """Per joint, whether it turns all ways (kept as a quaternion)."""
+        """Whether each joint is free about all axes (stored as a quaternion)."""
         return tuple(bool(all(row)) for row in self.free)
 
     @cached_property
     def hinges(self) -> tuple[int, ...]:
-        """The joints with fewer free angles (kept as angles)."""
+        """The joints with fewer free angles (stored as angles)."""
         return tuple(joint for joint, all_ways in enumerate(self.turning) if not all_ways)
 
     @cached_property
     def clusters(self) -> tuple[tuple[int, np.ndarray], ...]:
-        """Each joint that carries markers, and which."""
+        """Each joint that carries markers, with their indices."""
         return tuple((int(joint), np.flatnonzero(self.joint == joint)) for joint in np.unique(self.joint))
 
     @cached_property
     def runs(self) -> tuple[tuple[int, ...], ...]:
-        """Runs of joints down to one that carries markers, those before it without any: markers tell only what they do
-        together, as of a lumbar spine between pelvis and thorax."""
+        """Runs of joints that end at one with markers, the others without: markers determine only their joint rotation.
+
+        An example are the lumbar joints between pelvis and thorax.
+        """
         marked, found = set(self.joint.tolist()), []
         for joint in sorted(marked):
             run = [joint]
@@ -78,13 +87,22 @@ class Chain:
         return tuple(run for run in found if all(used.count(joint) == 1 for joint in run))
 
     def without_limits(self) -> "Chain":
-        """The same chain with joints that turn as far as they like."""
+        """Return the same chain without joint limits."""
         return replace(self, low=np.where(self.free, -np.inf, 0.0), high=np.where(self.free, np.inf, 0.0))
 
 
 def chain(skeleton: Skeleton, joint, places, order=None, free=None, low=None, high=None, stiffness=None) -> Chain:
-    """A chain of these arrays (see `Chain`), whatever is None free of limits and of stiffness. InputError where shapes
-    do not fit."""
+    """Build a chain.
+
+    Args:
+        skeleton: J joints.
+        joint, places, order, free, low, high: as the attributes of `Chain`; None for XYZ, all free and no limits.
+        stiffness: (J,) or (J, 3) metres per radian; None for none.
+    Returns:
+        The chain.
+    Raises:
+        InputError: if shapes do not match.
+    """
     count = len(skeleton)
     joint, places = np.asarray(joint, dtype=int), np.asarray(places, dtype=float)
     if places.shape != (*joint.shape, 3) or joint.ndim != 1 or np.any((joint < 0) | (joint >= count)):
@@ -103,30 +121,43 @@ def chain(skeleton: Skeleton, joint, places, order=None, free=None, low=None, hi
 
 @dataclass(frozen=True, eq=False)
 class Poses:
-    """F poses of a chain. root: (3, F) m, world. local: (J, 4, F) unit quaternions relative to the parent (the root's
-    to the world). angles: (J, 3, F) rad, of hinges; 0 for the other joints."""
+    """F poses of a chain.
+
+    Attributes:
+        root: (3, F) metres, world.
+        local: (J, 4, F) unit quaternions relative to the parent (the root's to the world).
+        angles: (J, 3, F) radians, of hinges; 0 for the other joints.
+    """
 
     root: np.ndarray
     local: np.ndarray
     angles: np.ndarray
 
     def frames(self, chosen) -> "Poses":
-        """These frames (indices, a mask or a slice) only."""
+        """Return the poses of these frames (indices, a mask or a slice)."""
         return Poses(self.root[:, chosen], self.local[..., chosen], self.angles[..., chosen])
 
     def put(self, chosen, other: "Poses") -> None:
-        """Write another's frames over these ones, in place."""
+        """Overwrite the frames `chosen` with other poses, in place."""
         self.root[:, chosen], self.local[..., chosen], self.angles[..., chosen] = other.root, other.local, other.angles
 
     def copy(self) -> "Poses":
-        """Poses of their own arrays."""
+        """Return poses with copied arrays."""
         return Poses(self.root.copy(), self.local.copy(), self.angles.copy())
 
 
 @dataclass(frozen=True, eq=False)
 class Placed:
-    """Where a pose puts things. world: (J, 3, 3, F) rotations. joints: (J, 3, F), markers: (M, 3, F) m, relative to
-    `origin` (3, F) m, which is the root: far from the capture space's origin no digits are lost."""
+    """Joints and markers in the world.
+
+    Places are relative to the root, so no digits are lost far from the origin of the capture space.
+
+    Attributes:
+        origin: (3, F) metres, the root.
+        world: (J, 3, 3, F) rotation matrices.
+        joints: (J, 3, F) metres, relative to `origin`.
+        markers: (M, 3, F) metres, relative to `origin`.
+    """
 
     origin: np.ndarray
     world: np.ndarray
@@ -135,8 +166,15 @@ class Placed:
 
 
 def poses(chain: Chain, root: np.ndarray, local: np.ndarray) -> Poses:
-    """Poses from root places (F, 3) m and local rotations (F, J, 4); hinges keep their free angles only, within their
-    limits."""
+    """Build poses from joint rotations; hinges keep their free angles only, within their limits.
+
+    Args:
+        chain: the chain.
+        root: (F, 3) metres, world.
+        local: (F, J, 4) rotations relative to the parent.
+    Returns:
+        The poses.
+    """
     rotations = np.ascontiguousarray(np.moveaxis(quaternion.normalized(local), 0, -1))
     angles = np.zeros((len(chain.skeleton), 3, len(root)))
     for joint in chain.hinges:
@@ -146,13 +184,17 @@ def poses(chain: Chain, root: np.ndarray, local: np.ndarray) -> Poses:
 
 
 def within(chain: Chain, joint: int, angles: np.ndarray) -> np.ndarray:
-    """A joint's angles (3, F) rad brought within its limits."""
+    """Limit a joint's angles (3, F) radians to its range."""
     return np.clip(angles, chain.low[joint][:, None], chain.high[joint][:, None])
 
 
 def angles_of(chain: Chain, joint: int, local: np.ndarray) -> np.ndarray:
-    """Angles (3, F) rad of a joint's rotations (4, F): of both triples the one within the limits, or nearer to them."""
+    """Read the angles (3, F) radians of a joint's rotations (4, F).
+
+    Two triples of angles describe each rotation; the one within the limits, or nearer to them, is returned.
+    """
     one = quaternion.to_euler(local.T, chain.order[joint]).T
+    # the second triple of angles of the same rotation
     other = np.stack([one[0] + np.pi, np.pi - one[1], one[2] + np.pi])
     one, other = (_near_the_middle(chain, joint, angles) for angles in (one, other))
     better = _offence(chain, joint, other) < _offence(chain, joint, one) - 1e-9
@@ -160,7 +202,7 @@ def angles_of(chain: Chain, joint: int, local: np.ndarray) -> np.ndarray:
 
 
 def _near_the_middle(chain: Chain, joint: int, angles: np.ndarray) -> np.ndarray:
-    """Angles without the full turns that separate them from the middle of their limits."""
+    """Remove full turns, so that the angles lie nearest to the middle of their limits."""
     low, high = chain.low[joint], chain.high[joint]
     bound = np.isfinite(low) & np.isfinite(high)
     middle = np.where(bound, 0.5 * (np.where(bound, low, 0.0) + np.where(bound, high, 0.0)), 0.0)[:, None]
@@ -168,12 +210,12 @@ def _near_the_middle(chain: Chain, joint: int, angles: np.ndarray) -> np.ndarray
 
 
 def _offence(chain: Chain, joint: int, angles: np.ndarray) -> np.ndarray:
-    """By how many radians (F,) angles (3, F) leave the limits, all together."""
+    """Measure by how many radians (F,) angles (3, F) exceed the limits, in total."""
     return np.abs(angles - within(chain, joint, angles)).sum(axis=0)
 
 
 def matrices(q: np.ndarray) -> np.ndarray:
-    """Rotation matrices (..., 3, 3, F) of unit quaternions (..., 4, F)."""
+    """Convert unit quaternions (..., 4, F) to rotation matrices (..., 3, 3, F)."""
     w, x, y, z = (q[..., component, :] for component in range(4))
     out = np.empty((*q.shape[:-2], 3, 3, q.shape[-1]))
     out[..., 0, 0, :], out[..., 1, 1, :] = 1 - 2 * (y * y + z * z), 1 - 2 * (x * x + z * z)
@@ -185,7 +227,14 @@ def matrices(q: np.ndarray) -> np.ndarray:
 
 
 def place(chain: Chain, at: Poses) -> Placed:
-    """Forward kinematics (eq. 3.18): where joints and markers stand."""
+    """Compute joints and markers in the world: forward kinematics (eq. 3.18).
+
+    Args:
+        chain: the chain.
+        poses: F poses.
+    Returns:
+        Joints and markers, relative to the root.
+    """
     turns = matrices(at.local)
     world, joints = np.empty_like(turns), np.zeros((len(turns), 3, turns.shape[-1]))
     for joint, parent in enumerate(chain.skeleton.parents):
@@ -201,7 +250,11 @@ def place(chain: Chain, at: Poses) -> Placed:
 
 
 def axes(chain: Chain, at: Poses, placed: Placed) -> np.ndarray:
-    """The world axes (J, 3, 3, F) about which a step turns each joint: [joint, component, axis]; 0 where not free."""
+    """Compute the world axes about which a step rotates each joint.
+
+    Returns:
+        (J, 3, 3, F), indexed [joint, component, axis]; 0 where an angle is not free.
+    """
     out = np.empty_like(placed.world)
     for joint, parent in enumerate(chain.skeleton.parents):
         above = np.eye(3)[:, :, None] if parent < 0 else placed.world[parent]
@@ -214,7 +267,15 @@ def axes(chain: Chain, at: Poses, placed: Placed) -> np.ndarray:
 
 
 def own_axes(chain: Chain, joint: int, angles: np.ndarray) -> np.ndarray:
-    """The axes of a hinge's angles (3, F) in its parent's frame: (3 components, 3 angles, F); zero where not free."""
+    """Compute the axes of a hinge's angles in its parent's frame.
+
+    Args:
+        chain: the chain.
+        joint: index of the joint.
+        angles: (3, F) radians.
+    Returns:
+        (3 components, 3 angles, F); zero where an angle is not free.
+    """
     out = np.zeros((3, 3, angles.shape[-1]))
     turned = np.broadcast_to(np.eye(3)[:, :, None], out.shape)
     for angle, letter in enumerate(chain.order[joint]):
@@ -222,12 +283,22 @@ def own_axes(chain: Chain, joint: int, angles: np.ndarray) -> np.ndarray:
             out[:, angle] = turned[:, AXES[letter]]
         one = np.zeros((4, angles.shape[-1]))
         one[0], one[1 + AXES[letter]] = np.cos(0.5 * angles[angle]), np.sin(0.5 * angles[angle])
+        # the axes of later angles are rotated by the earlier angles
         turned = np.einsum("abf,bcf->acf", turned, matrices(one))
     return out
 
 
 def moved(chain: Chain, at: Poses, shift: np.ndarray, turns: np.ndarray) -> Poses:
-    """Poses a step further: the root shifted by (3, F) m, joints turned by (J, 3, F) rad about their `axes`."""
+    """Apply a step to poses.
+
+    Args:
+        chain: the chain.
+        poses: F poses.
+        shift: (3, F) metres, of the root.
+        rotations: (J, 3, F) radians about the axes of `compute_step_axes`.
+    Returns:
+        The new poses; hinges stay within their limits.
+    """
     local = multiply(exponential(turns), at.local)
     angles = at.angles.copy()
     for joint in chain.hinges:
@@ -237,23 +308,24 @@ def moved(chain: Chain, at: Poses, shift: np.ndarray, turns: np.ndarray) -> Pose
 
 
 def exponential(v: np.ndarray) -> np.ndarray:
-    """Unit quaternions (..., 4, F) of rotation vectors (..., 3, F) rad."""
+    """Convert rotation vectors (..., 3, F) radians to unit quaternions (..., 4, F)."""
     square = np.einsum("...af,...af->...f", v, v)
     angle = np.sqrt(square)
     out = np.empty((*v.shape[:-2], 4, v.shape[-1]))
     out[..., 0, :] = np.cos(0.5 * angle)
+    # sin(angle / 2) / angle, by its series near 0
     scale = np.where(angle > 1e-6, np.sin(0.5 * angle) / np.maximum(angle, 1e-6), 0.5 - square / 48.0)
     out[..., 1:, :] = scale[..., None, :] * v
     return out
 
 
 def logarithm(q: np.ndarray) -> np.ndarray:
-    """Rotation vectors (..., 3, F) rad, on the short way, of unit quaternions (..., 4, F)."""
+    """Convert unit quaternions (..., 4, F) to rotation vectors (..., 3, F) radians, the shorter ones."""
     return np.moveaxis(quaternion.to_rotation_vector(np.moveaxis(q, -2, -1)), -1, -2)
 
 
 def multiply(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """The rotations b followed by a, made unit again: (..., 4, F) each."""
+    """Multiply quaternions: the rotations b followed by a, normalized, (..., 4, F) each."""
     aw, ax, ay, az = (a[..., component, :] for component in range(4))
     bw, bx, by, bz = (b[..., component, :] for component in range(4))
     out = np.empty(np.broadcast_shapes(a.shape, b.shape))
@@ -265,7 +337,7 @@ def multiply(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Cross products along the first axis: (3, ...) each."""
+    """Compute cross products along the first axis, (3, ...) each."""
     out = np.empty(np.broadcast_shapes(a.shape, b.shape))
     for x, y, z in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
         np.subtract(a[y] * b[z], a[z] * b[y], out=out[x])
@@ -273,9 +345,16 @@ def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def marker_derivative(chain: Chain, at: Poses) -> np.ndarray:
-    """How all markers move with the pose: (F, M, 3, 3 + 3 J), by the root's shift and each joint's three turns.
+    """Compute the derivative of all markers by the pose, as a whole matrix.
 
-    The whole matrix, for those who want to look at it; the solver never builds it."""
+    Only `smooth` and tests need it; the frame-wise solver never builds it.
+
+    Args:
+        chain: the chain.
+        poses: F poses.
+    Returns:
+        (F, M, 3, 3 + 3 J): by the root's shift and each joint's three rotations.
+    """
     placed = place(chain, at)
     about = axes(chain, at, placed)
     count, frames = len(chain.skeleton), at.root.shape[-1]

@@ -1,8 +1,8 @@
-"""From a pose near by to the one whose markers lie nearest to the seen ones: many frames at once, each by itself.
+"""Descend from an initial pose to the nearest one whose markers fit best: many frames at once, each independent.
 
-Levenberg and Marquardt's method on the weighted squares of eq. 5.1 (Fredriksson §5.3.2), with the exact derivative of
-all markers (`chain`), steps solved from the tips to the root (`elimination`) and limits held exactly (`limits`). The
-paper gave the sum to a general solver (SLSQP, §5.3.4), which needed seconds a frame.
+Levenberg-Marquardt on the weighted squares of eq. 5.1 (Fredriksson section 5.3.2), with the exact derivative of all
+markers (`chain`), steps solved from the tips to the root (`elimination`) and exact joint limits (`limits`). The paper
+used a general solver (SLSQP, section 5.3.4), which needed seconds per frame.
 """
 
 from __future__ import annotations
@@ -14,20 +14,26 @@ import numpy as np
 from . import elimination, limits
 from .chain import CONJUGATE, Chain, Placed, Poses, axes, cross, logarithm, moved, multiply, place
 
-MOST_STEPS = 24
-_NEAR = 0.1  # a step that gains a smaller part of the cost is near enough for second derivatives to help
-_STILL = 1e-5  # radians (and metres): a frame whose step is smaller has arrived
-_NO_GAIN = 1e-7  # as has one whose cost falls by a smaller part
-_TRUSTED = 1e-3  # m2: with more damping a small step says nothing
+MOST_STEPS = 24  # steps at most
+_NEAR = 0.1  # a step that gains a smaller share of the cost is near enough for second derivatives to help
+_STILL = 1e-5  # radians (and metres): a frame with a smaller step has converged
+_NO_GAIN = 1e-7  # as has one whose cost falls by a smaller share
+_TRUSTED = 1e-3  # m2: with more damping a small step is no sign of convergence
 _FIRST_DAMPING, _LEAST_DAMPING, _MOST_DAMPING = 1e-5, 1e-9, 1e3  # m2
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class HeldPoint:
-    """A point of a joint's body that stands at a given distance from a seen point: a ball's centre in the hand, from a
-    marker on the ball.
+    """A point of a joint's body that keeps a given distance from a recorded point.
 
-    joint: which body. place: (3,) m in its frame. radius: m. seen: (3, F) m. weight: (F,), 0 where it does not count.
+    An example is a ball's centre in the hand, at its radius from a marker on the ball.
+
+    Attributes:
+        joint: index of the joint.
+        place: (3,) metres in its frame.
+        radius: metres.
+        seen: (3, F) metres, the recorded point.
+        weight: (F,), 0 where it has no effect.
     """
 
     joint: int
@@ -37,18 +43,24 @@ class HeldPoint:
     weight: np.ndarray
 
     def frames(self, chosen) -> "HeldPoint":
-        """These frames only."""
+        """Return the point for these frames only."""
         return replace(self, seen=self.seen[:, chosen], weight=self.weight[chosen])
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Task:
-    """What F poses are to come near to.
+    """What F poses should fit.
 
-    seen: (M, 3, F) m, any numbers where the weight (M, F) is 0. drawn: (J, 3) m per radian, how strongly a joint is
-    drawn to its rest pose (in place of the chain's stiffness). lean: poses to be drawn to besides, or None; leaning:
-    (J, F) m per radian, how strongly. point: a held point, or None.
-    even: m per radian, how strongly the joints of a run (`Chain.runs`) are held to turn alike."""
+    Attributes:
+        chain: the chain.
+        seen: (M, 3, F) metres, any numbers where the weight is 0.
+        weights: (M, F).
+        stiffness: (J, 3) metres per radian, pull of each joint to its rest pose (replaces the chain's stiffness).
+        target_poses: poses to which joints are pulled in addition, or None.
+        target_strength: (J, F) metres per radian, strength of that pull.
+        point: a held point, or None.
+        run_stiffness: metres per radian, how strongly the joints of a run (`Chain.runs`) should turn alike.
+    """
 
     chain: Chain
     seen: np.ndarray
@@ -60,7 +72,7 @@ class Task:
     even: float = 0.0
 
     def frames(self, chosen) -> "Task":
-        """These frames only."""
+        """Return the task for these frames only."""
         return replace(self, seen=self.seen[..., chosen], weights=self.weights[:, chosen],
                        lean=self.lean and self.lean.frames(chosen), point=self.point and self.point.frames(chosen),
                        leaning=None if self.leaning is None else self.leaning[:, chosen])
@@ -68,8 +80,14 @@ class Task:
 
 @dataclass(frozen=True, eq=False)
 class Arrived:
-    """Poses; cost: (F,) m2, half the weighted squares; steps: (F,) how many were taken; held: (J, F) whether a joint
-    stands at a limit against the markers."""
+    """The result of a descent.
+
+    Attributes:
+        poses: F poses.
+        cost: (F,) m2, half the weighted squares.
+        steps: (F,) number of steps.
+        held: (J, F) bool, joints that are at a limit against the markers.
+    """
 
     poses: Poses
     cost: np.ndarray
@@ -79,7 +97,17 @@ class Arrived:
 
 @dataclass(eq=False)
 class State:
-    """Poses with what follows from them, kept while they are the best known."""
+    """The best known poses with everything computed from them.
+
+    Attributes:
+        poses: F poses.
+        placed: joints and markers in the world.
+        away: (M, 3, F) metres, model minus recorded markers.
+        bend: (J, 3, F) radians from rest.
+        uneven: (joints of runs, 2, 3, F) radians, see `_measure_unevenness`.
+        from_target: (J, 3, F) radians from the target poses; empty without them.
+        cost: (F,) m2.
+    """
 
     poses: Poses
     placed: Placed
@@ -90,12 +118,12 @@ class State:
     cost: np.ndarray
 
     def take(self, other: "State", where: np.ndarray) -> None:
-        """Take the other's frames where (F,) is true, in place."""
+        """Take the other state's frames where (F,) is true, in place."""
         for mine, its in zip(self._arrays(), other._arrays()):
             np.copyto(mine, its, where=where)
 
     def frames(self, chosen) -> "State":
-        """These frames only."""
+        """Return the state for these frames only."""
         at, put = self.poses.frames(chosen), self.placed
         placed = Placed(at.root, *(a[..., chosen] for a in (put.world, put.joints, put.markers)))
         more = (a[..., chosen] for a in (self.away, self.bend, self.uneven, self.gone, self.cost))
@@ -108,7 +136,15 @@ class State:
 
 
 def descend(task: Task, start: Poses, most_steps: int = MOST_STEPS) -> Arrived:
-    """The poses nearest to the seen markers that lie downhill of `start`."""
+    """Find the poses nearest to the recorded markers, downhill from the initial poses.
+
+    Args:
+        task: what to fit, F frames.
+        start: F initial poses.
+        max_steps: steps at most.
+    Returns:
+        Poses, costs, steps and held joints.
+    """
     total = start.root.shape[-1]
     stops = limits.limited(task.chain)
     best = state_of(task, limits.held_back(task.chain, stops, start)[0])
@@ -123,10 +159,12 @@ def descend(task: Task, start: Poses, most_steps: int = MOST_STEPS) -> Arrived:
         arrived = (size < _STILL) | (gain <= _NO_GAIN * best.cost)
         done |= better & arrived & (damping < _TRUSTED) | (damping > _MOST_DAMPING)
         best.take(trial, better)
+        # a rejected step is repeated with ten times the damping; after a curved one first without second derivatives
         harder = np.where(curved, damping, np.maximum(10.0 * damping, _FIRST_DAMPING))
         damping = np.where(better, np.maximum(0.1 * damping, _LEAST_DAMPING), harder)
         curved = better & (gain < _NEAR * (best.cost + gain))
         out.steps[live] += 1
+        # drop converged frames once they are a fifth, so that copies stay rare
         if done.any() and (done.all() or done.mean() > 0.2):
             _write(out, live[done], best.frames(done), held[:, done])
             if done.all():
@@ -139,13 +177,13 @@ def descend(task: Task, start: Poses, most_steps: int = MOST_STEPS) -> Arrived:
 
 
 def _write(out: Arrived, frames: np.ndarray, state: State, held: np.ndarray) -> None:
-    """Put finished frames into the result."""
+    """Store finished frames in the result."""
     out.poses.put(frames, state.poses)
     out.cost[frames], out.held[:, frames] = state.cost, held
 
 
 def state_of(task: Task, at: Poses) -> State:
-    """Poses and what follows from them."""
+    """Compute everything that follows from poses, and their cost."""
     placed = place(task.chain, at)
     away = placed.markers + (at.root - task.seen)
     bend, uneven, gone = _bend(task.chain, at), _uneven(task, at), _gone(task, at)
@@ -160,7 +198,7 @@ def state_of(task: Task, at: Poses) -> State:
 
 
 def _bend(chain: Chain, at: Poses) -> np.ndarray:
-    """How far (J, 3, F) rad each joint is turned from rest: as a rotation vector, a hinge as angles."""
+    """Measure how far (J, 3, F) radians each joint is rotated from rest: as a rotation vector, a hinge as angles."""
     bend = logarithm(at.local)
     for joint in chain.hinges:
         bend[joint] = at.angles[joint]
@@ -168,7 +206,9 @@ def _bend(chain: Chain, at: Poses) -> np.ndarray:
 
 
 def _gone(task: Task, at: Poses) -> np.ndarray:
-    """How far (J, 3, F) rad each joint is turned from where it leans to, in the same form; nothing without."""
+    """Measure how far (J, 3, F) radians each joint is rotated from its target pose, in the same form; empty without
+    one.
+    """
     if task.lean is None:
         return np.zeros((0, 3, at.root.shape[-1]))
     gone = logarithm(multiply(at.local, task.lean.local * CONJUGATE))
@@ -178,10 +218,12 @@ def _gone(task: Task, at: Poses) -> np.ndarray:
 
 
 def _uneven(task: Task, at: Poses) -> np.ndarray:
-    """Of every joint of a run how far its rotation vector is from the run's mean, and the derivative of half its square
-    by the joint's turns: (joints, 2, 3, F) rad.
+    """Measure how far the joints of runs deviate from their run's mean rotation.
 
-    The mean's own derivative adds nothing, since the distances from it cancel out."""
+    For each joint: the difference of its rotation vector from the run's mean, and the derivative of half its square by
+    the joint's rotations, (joints, 2, 3, F) radians. The derivative of the mean adds nothing, since the differences sum
+    to zero.
+    """
     out = []
     for run in task.chain.runs:
         vectors = logarithm(at.local[list(run)])
@@ -191,16 +233,31 @@ def _uneven(task: Task, at: Poses) -> np.ndarray:
 
 
 def carried_to_turns(vector: np.ndarray, slope: np.ndarray) -> np.ndarray:
-    """A slope (3, F) by a joint's rotation vector (3, F) as one by small turns put before it."""
+    """Convert a slope by a rotation vector to a slope by small rotations applied after it.
+
+    Args:
+        vector: (3, F) radians, the joint's rotation vector.
+        slope: (3, F), derivative by it.
+    Returns:
+        (3, F), the derivative by small rotations.
+    """
     angle = np.sqrt(np.einsum("af,af->f", vector, vector))
     near = np.maximum(angle, 1e-3)
+    # coefficient of the inverse left Jacobian of SO(3), by its limit 1/12 near 0
     factor = np.where(angle > 1e-3, 1.0 / near**2 - 0.5 / (near * np.tan(0.5 * near)), 1.0 / 12.0)
     once = cross(vector, slope)
     return slope + 0.5 * once + factor * cross(vector, once)
 
 
 def distance(point: HeldPoint, placed: Placed) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Where the held point is (3, F), the unit direction (3, F) from the seen point to it, how much too far it is (F,).
+    """Measure the distance of the held point from the recorded point.
+
+    Args:
+        point: the held point.
+        placed: joints in the world.
+    Returns:
+        The held point (3, F) relative to the root, the unit direction (3, F) from the recorded point to it, and by how
+        much it is too far (F,) metres.
     """
     x = placed.joints[point.joint] + np.einsum("abf,b->af", placed.world[point.joint], point.place)
     gap = x + placed.origin - point.seen
@@ -209,21 +266,30 @@ def distance(point: HeldPoint, placed: Placed) -> tuple[np.ndarray, np.ndarray, 
 
 
 def crosswise(away: np.ndarray, radius: float) -> np.ndarray:
-    """What a distance that is `away` (F,) m too long weighs crosswise, as a part of what it weighs along: as a rope
-    does that is pulled."""
+    """Compute the weight across a distance, as a share of the weight along it (like a rope under tension).
+
+    Args:
+        away: (F,) metres by which the distance is too long.
+        radius: metres.
+    Returns:
+        (F,) shares, 0 to 1.
+    """
     return np.maximum(away, 0.0) / np.maximum(away + radius, 1e-9)
 
 
 def _step(task: Task, best: State, stops: dict, damping: np.ndarray,
           curved: np.ndarray) -> tuple[np.ndarray, np.ndarray, State]:
-    """One damped step, with second derivatives where `curved` (F,): its size (F,), what limits held still (J, F), and
-    the state it leads to."""
+    """Take one damped step, with second derivatives where `curved` (F,).
+
+    Returns its size (F,), the joints held by limits (J, F), and the new state.
+    """
     shift, turns, held = _solved(task, best, stops, damping, curved)
     further = limits.along(task.chain, held, best.poses, turns, moved(task.chain, best.poses, shift, turns))
     further, ahead = limits.held_back(task.chain, stops, further)
     for joint in task.chain.hinges:
         ahead[joint] = best.poses.angles[joint] + turns[joint]
     outside = (ahead > task.chain.high[..., None]) | (ahead < task.chain.low[..., None])
+    # frames whose step exceeds a limit are solved again so that the step ends at the limit
     over = np.flatnonzero(outside.any(axis=(0, 1)))
     if len(over):
         part = best.frames(over)
@@ -237,7 +303,10 @@ def _step(task: Task, best: State, stops: dict, damping: np.ndarray,
 
 
 def _solved(task: Task, best: State, stops: dict, damping: np.ndarray, curved: np.ndarray, ahead=None):
-    """The root's shift (3, F), all turns (J, 3, F), and what limits held still (J, F); `ahead` as in `limits.hold`."""
+    """Solve a step: the root's shift (3, F), all rotations (J, 3, F), and the joints held by limits (J, F).
+
+    `ahead` is as in `limits.hold_at_limits`.
+    """
     about = axes(task.chain, best.poses, best.placed)
     asked = elimination.bodies(task.chain, best.placed, best.away, task.weights)
     if task.point:
@@ -255,9 +324,10 @@ def _solved(task: Task, best: State, stops: dict, damping: np.ndarray, curved: n
 
 
 def wishes(task: Task, best: State) -> elimination.Own:
-    """What the pull to the rest pose, and that to even runs, asks of each joint's turns.
+    """Build the terms of each joint's own rotations: pulls to rest, to even runs and to target poses.
 
-    The derivative of half the squared length of a rotation vector by a small turn is the vector itself."""
+    The derivative of half the squared length of a rotation vector by a small rotation is the vector itself.
+    """
     strength = task.drawn**2
     curvature = np.zeros((len(strength), 3, 3, best.cost.shape[-1]))
     pull = strength[..., None] * best.bend

@@ -1,17 +1,16 @@
-"""One Gauss-Newton step of a whole chain, from the tips to the root, without the big matrix.
+"""One Gauss-Newton step of a whole chain, solved from the tips to the root without the full matrix.
 
-The markers of a body enter its equations only as a rigid body would: a turn w and a shift v of all space move a marker
-at x by w x x + v, so that what they ask of (w, v) is one 6x6 matrix and one vector, as the inertia and force of a body.
-A joint passes on to its parent what is left when its own turns are free to follow: the elimination of Featherstone's
-articulated bodies (Rigid Body Dynamics Algorithms, 2008, ch. 7), with the second derivative of squared distances in the
-place of masses. The cost grows with the number of joints, not with its cube, and every operation is one on long
-runs of frames.
+The markers of a body enter its equations only as a rigid body: a rotation w and a shift v of space move a marker at x
+by w x x + v, so their terms in (w, v) are one 6x6 matrix and one vector, like the inertia and force of a body. A joint
+passes on to its parent what remains when its own rotations are eliminated: Featherstone's articulated-body algorithm
+(Rigid Body Dynamics Algorithms, 2008, ch. 7), with the second derivative of squared distances in place of masses. The
+cost grows with the number of joints, not with its cube, and every operation runs over many frames.
 
-Beside the products of first derivatives (Gauss and Newton) there are the second derivatives: a turn about a carries on
-what a turn further out has moved, a x (b x y). Summed over all markers below a joint they are one 3x3 matrix (`Bends`).
-They matter where a chain is stretched or pressed along itself, as a nearly straight spine is.
+Beside the products of first derivatives (Gauss-Newton) there are the second derivatives: a rotation about a carries
+along what a rotation further out has moved, a x (b x y). Summed over all markers below a joint they form one 3x3 matrix
+(`SecondDerivatives`). They matter where a chain is stretched or pressed along itself, as a nearly straight spine is.
 
-"About the origin" is about each frame's own origin (`Placed.origin`).
+"The origin" is each frame's own origin (`WorldPoses.origin`).
 """
 
 from __future__ import annotations
@@ -24,30 +23,52 @@ from .chain import Chain, Placed, cross
 
 
 class Bodies(NamedTuple):
-    """What is asked of each joint's body. curvature: (J, 6, 6, F), pull: (J, 6, F), of turn and shift about the origin:
-    second and first derivative of half the weighted squared distances."""
+    """The terms of each joint's body: second and first derivative of half the weighted squared distances.
+
+    Attributes:
+        curvature: (J, 6, 6, F), by rotation and shift about the origin.
+        pull: (J, 6, F), likewise.
+    """
 
     curvature: np.ndarray
     pull: np.ndarray
 
 
 class Bends(NamedTuple):
-    """The second derivatives. inner: (J, 3, 3, F), between a joint's own turns; above: (J, 3, 3, F), between a turn of
-    all that is above it (rows) and its own turns."""
+    """The second derivatives of the distances.
+
+    Attributes:
+        inner: (J, 3, 3, F), between a joint's own rotations.
+        above: (J, 3, 3, F), between a rotation of everything above it (rows) and its own rotations.
+    """
 
     inner: np.ndarray
     above: np.ndarray
 
 
 class Own(NamedTuple):
-    """What is asked of each joint's own turns about its axes. curvature: (J, 3, 3, F), pull: (J, 3, F)."""
+    """The terms of each joint's own rotations about its axes.
+
+    Attributes:
+        curvature: (J, 3, 3, F).
+        pull: (J, 3, F).
+    """
 
     curvature: np.ndarray
     pull: np.ndarray
 
 
 def bodies(chain: Chain, placed: Placed, away: np.ndarray, weights: np.ndarray) -> Bodies:
-    """What the markers ask: they lie `away` (M, 3, F) m from where they were seen and count (M, F), 0 where unseen."""
+    """Build the terms of the markers.
+
+    Args:
+        chain: the chain.
+        placed: joints and markers in the world.
+        away: (M, 3, F) metres, model minus recorded markers.
+        weights: (M, F), 0 where not visible.
+    Returns:
+        The terms of each joint's body.
+    """
     count, frames = len(chain.skeleton), weights.shape[-1]
     curvature, pull = np.zeros((count, 6, 6, frames)), np.zeros((count, 6, frames))
     for joint, own in chain.clusters:
@@ -56,17 +77,18 @@ def bodies(chain: Chain, placed: Placed, away: np.ndarray, weights: np.ndarray) 
 
 
 def _add_points(curvature, pull, x, w, r) -> None:
-    """Add points x (N, 3, F) of weights (N, F), each r (N, 3, F) away from where it should be."""
+    """Add points x (N, 3, F) of weights w (N, F), each r (N, 3, F) away from its target, in place."""
     wx, wr = w[:, None] * x, w[:, None] * r
     mass, first, force = w.sum(axis=0), wx.sum(axis=0), wr.sum(axis=0)
     second = np.einsum("naf,nbf->abf", wx, x)
     square = second[0, 0] + second[1, 1] + second[2, 2]
+    # rotation block: sum of w (|x|^2 I - x x'), as a tensor of inertia
     curvature[:3, :3] -= second
     for axis in range(3):
         curvature[axis, axis] += square
         curvature[3 + axis, 3 + axis] += mass
     for a, b, c in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-        # the matrix of the cross product with the weighted sum of places
+        # blocks between rotation and shift: the skew matrix of the weighted sum of places
         curvature[a, 3 + b] -= first[c]
         curvature[b, 3 + a] += first[c]
         curvature[3 + b, a] -= first[c]
@@ -76,8 +98,17 @@ def _add_points(curvature, pull, x, w, r) -> None:
 
 
 def add_distance(asked: Bodies, joint: int, x: np.ndarray, along: np.ndarray, weight, away, across) -> None:
-    """Add to what is asked, in place: a point x (3, F) of a joint's body is `away` (F,) m too far along unit directions
-    (3, F), of weight (F,); `across` (F,) is what it weighs crosswise, where the direction turns with it."""
+    """Add the terms of a point that should keep a distance, in place.
+
+    Args:
+        terms: the terms to add to.
+        joint: whose body the point belongs to.
+        x: (3, F) metres, the point.
+        along: (3, F) unit direction of the distance.
+        weight: (F,).
+        away: (F,) metres by which the point is too far along.
+        across: (F,) weight at right angles, where the direction rotates with the point.
+    """
     arm = np.zeros((3, 6, x.shape[-1]))
     for a, b, c in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
         arm[b, a], arm[a, b] = -x[c], x[c]
@@ -89,17 +120,38 @@ def add_distance(asked: Bodies, joint: int, x: np.ndarray, along: np.ndarray, we
 
 
 def gradient(chain: Chain, placed: Placed, axes: np.ndarray, asked: Bodies, own: Own) -> np.ndarray:
-    """The derivative (J, 3, F) of half the cost by each joint's turns."""
+    """Compute the derivative of half the cost by each joint's rotations.
+
+    Args:
+        chain: the chain.
+        placed: joints in the world.
+        axes: (J, 3, 3, F) of `compute_step_axes`.
+        body_terms: the terms of the bodies.
+        joint_terms: the terms of the joints.
+    Returns:
+        (J, 3, F).
+    """
     total = asked.pull.copy()
     for joint in range(len(chain.skeleton) - 1, 0, -1):
         total[chain.skeleton.parents[joint]] += total[joint]
-    # a turn about axis a through p: a on the moment, p x a on the force
+    # a rotation about axis a through p: a acts on the moment, p x a on the force
     moment = total[:, :3] - np.moveaxis(cross(np.moveaxis(placed.joints, 1, 0), np.moveaxis(total[:, 3:], 1, 0)), 0, 1)
     return own.pull + np.einsum("jacf,jaf->jcf", axes, moment)
 
 
 def bends(chain: Chain, placed: Placed, axes: np.ndarray, away: np.ndarray, weights: np.ndarray, share) -> Bends:
-    """The second derivatives of half the weighted squared distances, times `share` (F,); arrays as for `bodies`."""
+    """Compute the second derivatives of half the weighted squared distances.
+
+    Args:
+        chain: the chain.
+        placed: joints and markers in the world.
+        axes: (J, 3, 3, F) of `compute_step_axes`.
+        away: (M, 3, F) metres, model minus recorded markers.
+        weights: (M, F).
+        share: (F,) factor of the result.
+    Returns:
+        The second derivatives.
+    """
     count, frames = len(chain.skeleton), weights.shape[-1]
     moment, force = np.zeros((count, 3, 3, frames)), np.zeros((count, 3, frames))
     pulled = (weights * share)[:, None] * away
@@ -117,7 +169,7 @@ def bends(chain: Chain, placed: Placed, axes: np.ndarray, away: np.ndarray, weig
     for joint, all_ways in enumerate(chain.turning):
         if all_ways:
             inner[joint] = 0.5 * (inner[joint] + inner[joint].swapaxes(0, 1))
-        else:  # of two angles of a hinge the earlier carries on the later
+        else:  # of two angles of a hinge, the earlier carries the later
             for a, b in ((1, 0), (2, 0), (2, 1)):
                 inner[joint, a, b] = inner[joint, b, a]
     return Bends(inner, above)
@@ -125,11 +177,21 @@ def bends(chain: Chain, placed: Placed, axes: np.ndarray, away: np.ndarray, weig
 
 def step(chain: Chain, placed: Placed, axes: np.ndarray, asked: Bodies, own: Own, damping: np.ndarray,
          bent: Bends | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """The damped step: the root's shift (3, F) m and all joints' turns (J, 3, F) rad about their axes (J, 3, 3, F).
+    """Solve one damped step.
 
-    damping: (F,) >= 0, added to the curvature of every turn (and of the root's shift). bent: second derivatives to go
-    with; None: without. `asked` is used up."""
+    Args:
+        chain: the chain.
+        placed: joints in the world.
+        axes: (J, 3, 3, F) of `compute_step_axes`.
+        body_terms: the terms of the bodies; overwritten.
+        joint_terms: the terms of the joints.
+        damping: (F,) >= 0, added to the curvature of every rotation (and of the root's shift).
+        second_derivatives: to add, or None.
+    Returns:
+        The root's shift (3, F) metres, and all joints' rotations (J, 3, F) radians about their axes.
+    """
     parents = chain.skeleton.parents
+    # inward pass, tips to root: eliminate each joint's rotations and add the remainder to its parent
     passed, rest = {}, {}
     for joint in range(len(parents) - 1, 0, -1):
         lever = np.concatenate([axes[joint], cross(placed.joints[joint][:, None], axes[joint])])
@@ -148,6 +210,7 @@ def step(chain: Chain, placed: Placed, axes: np.ndarray, asked: Bodies, own: Own
         rest[joint] = (rest[joint], lever)
     if bent is not None:
         asked.curvature[0][:3, :3] += bent.inner[0]
+    # outward pass: the root's motion, then each joint's rotations given the motion above it
     motions = {0: _root_step(asked, own, damping)}
     turns = np.empty((len(parents), 3, damping.shape[-1]))
     turns[0] = motions[0][:3]
@@ -166,7 +229,7 @@ def _add_diagonal(inner: np.ndarray, damping: np.ndarray, free: np.ndarray) -> N
 
 
 def _root_step(asked: Bodies, own: Own, damping: np.ndarray) -> np.ndarray:
-    """Turn and shift (6, F) of the root."""
+    """Solve rotation and shift (6, F) of the root."""
     curvature, pull = asked.curvature[0], asked.pull[0]
     curvature[:3, :3] += own.curvature[0]
     pull[:3] += own.pull[0]
@@ -176,7 +239,7 @@ def _root_step(asked: Bodies, own: Own, damping: np.ndarray) -> np.ndarray:
 
 
 def inverse_of(m: np.ndarray) -> np.ndarray:
-    """Inverses of symmetric positive matrices (3, 3, F)."""
+    """Invert symmetric positive definite matrices (3, 3, F)."""
     out = np.empty_like(m)
     a, b, c, d, e, f = m[0, 0], m[0, 1], m[0, 2], m[1, 1], m[1, 2], m[2, 2]
     out[0, 0], out[1, 1], out[2, 2] = d * f - e * e, a * f - c * c, a * d - b * b

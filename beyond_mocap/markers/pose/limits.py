@@ -1,13 +1,13 @@
-"""How far joints turn: limits on the angles of a chain's joints, held exactly (Fredriksson §5.3.1).
+"""Exact limits on the angles of a chain's joints (Fredriksson section 5.3.1).
 
-A hinge is kept as angles and cannot leave its limits. A joint that turns all ways is kept as a quaternion; its angles
-are read here, of the two triples that mean the same rotation the one that offends less, and brought back to the limits
-after each step. A step that would lead over a limit is solved again so that it ends on it, with the turn in that
-direction held still: the other directions then find their best beside it. At a limit a joint stays held as long as the
-markers pull over it (an active set, as in Bertsekas 1982, projected Newton methods).
+A hinge is stored as angles and cannot leave its limits. A joint that is free about all axes is stored as a quaternion;
+its angles are read here (of two triples for the same rotation, the one that exceeds the limits less) and limited after
+each step. A step that would exceed a limit is solved again so that it ends at the limit, with the rotation in that
+direction fixed; the other directions then find their optimum. At a limit a joint stays fixed as long as the markers
+pull beyond it (an active set, as in Bertsekas 1982, projected Newton methods).
 
-Within some degrees of the pole of its axis order a joint's outer angles mean nothing; only the middle one's limit
-counts there.
+Within some degrees of the pole of its axis order, a joint's outer angles are meaningless; only the middle one is
+limited there.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from ...motion import quaternion
 from .chain import AXES, Chain, Poses, angles_of, cross, own_axes, within
 from .elimination import Own
 
-_NEAR_POLE = 0.12  # cosine of the middle angle below which the outer ones mean nothing: 7 degrees
-_AT = 1e-7  # radians
-_HELD = 1e6  # curvature, m2 per radian2, of a turn that is held still
+_NEAR_POLE = 0.12  # cosine of the middle angle below which the outer ones are meaningless (7 degrees)
+_AT = 1e-7  # radians from a limit within which an angle is at it
+_HELD = 1e6  # curvature, m2 per radian2, of a rotation that is fixed
 
 
 def limited(chain: Chain) -> dict[str, np.ndarray]:
-    """The joints that turn all ways and have limits, by their axis order; the root has none."""
+    """Find the joints that are free about all axes and have limits, by their axis order; the root has none."""
     bound = np.isfinite(chain.low).any(axis=1) | np.isfinite(chain.high).any(axis=1)
     found: dict[str, list[int]] = {}
     for joint in range(1, len(chain.skeleton)):
@@ -35,8 +35,15 @@ def limited(chain: Chain) -> dict[str, np.ndarray]:
 
 
 def held_back(chain: Chain, joints: dict[str, np.ndarray], at: Poses) -> tuple[Poses, np.ndarray]:
-    """The poses with these joints (of `limited`) brought back to their limits and their angles noted; the angles
-    (J, 3, F) that count as they were before."""
+    """Limit the angles of these joints.
+
+    Args:
+        chain: the chain.
+        joints: as `find_limited_joints` returns them.
+        poses: F poses.
+    Returns:
+        The limited poses with the angles of these joints, and the angles (J, 3, F) before.
+    """
     local, angles = at.local.copy(), at.angles.copy()
     before = angles.copy()
     for order, group in joints.items():
@@ -49,7 +56,7 @@ def held_back(chain: Chain, joints: dict[str, np.ndarray], at: Poses) -> tuple[P
 
 
 def _bring_back(chain, joint, frames, local, angles, before) -> None:
-    """Bring one joint back in these frames, where it truly offends, in place."""
+    """Limit one joint in these frames, where it really exceeds its limits, in place."""
     read = angles_of(chain, joint, local[joint][:, frames])
     kept = np.where(_counts(read), within(chain, joint, read), read)
     angles[joint][:, frames] = kept
@@ -59,7 +66,7 @@ def _bring_back(chain, joint, frames, local, angles, before) -> None:
 
 
 def _read(q: np.ndarray, order: str) -> np.ndarray:
-    """Angles (..., 3, F) rad of rotations (..., 4, F), the middle within a quarter turn; at the pole as they come."""
+    """Read angles (..., 3, F) radians of rotations (..., 4, F), the middle one within a quarter turn."""
     i, j, k = (AXES[letter] for letter in order)
     sign = 1.0 if (j - i) % 3 == 1 else -1.0
     w, v = q[..., 0, :], [q[..., 1 + axis, :] for axis in (i, j, k)]
@@ -71,20 +78,28 @@ def _read(q: np.ndarray, order: str) -> np.ndarray:
 
 
 def _counts(angles: np.ndarray) -> np.ndarray:
-    """Which angles (3, F) mean something: all, but near the pole the middle one alone."""
+    """Return which angles (3, F) are meaningful: all, but near the pole only the middle one."""
     away = np.abs(np.cos(angles[1])) >= _NEAR_POLE
     return np.stack([away, np.ones_like(away), away])
 
 
 def hold(chain: Chain, joints: dict[str, np.ndarray], at: Poses, slope: np.ndarray, own: Own,
          ahead: np.ndarray | None = None) -> np.ndarray:
-    """Hold still, in place in what is asked of the turns, the angles at a limit that would go on, and let those that a
-    first step led over a limit end on it; which joints are held: (J, F) bool.
+    """Fix the angles that are at a limit and pulled beyond it, and let those that exceeded a limit end at it.
 
-    slope: (J, 3, F), the derivative of half the cost by each joint's turns. ahead: the angles (J, 3, F) to which that
-    first step led, or None."""
+    Args:
+        chain: the chain.
+        joints: as `find_limited_joints` returns them.
+        poses: F poses.
+        slope: (J, 3, F), the derivative of half the cost by each joint's rotations.
+        joint_terms: the terms of the joints; changed in place.
+        next_angles: (J, 3, F) the angles to which a first step led, or None.
+    Returns:
+        (J, F) bool, joints that are fixed.
+    """
     low, high = chain.low[..., None], chain.high[..., None]
     stops = np.zeros(at.angles.shape, dtype=bool)
+    # the nearer limit of each angle; an infinite one counts as beyond any angle (9 rad)
     bound = np.where(at.angles > 0.5 * (np.maximum(low, -9.0) + np.minimum(high, 9.0)), high, low)
     touching = ((at.angles >= high - _AT) | (at.angles <= low + _AT)) & chain.free[..., None]
     if ahead is not None:
@@ -102,7 +117,7 @@ def hold(chain: Chain, joints: dict[str, np.ndarray], at: Poses, slope: np.ndarr
 
 
 def _hold_joint(chain, joint, angles, touching, bound, slope, stops, own) -> None:
-    """`hold` for one joint: `stops` (3, F) is completed, `own` changed, in place."""
+    """Do `hold_at_limits` for one joint: complete `is_fixed` (3, F) and change `joint_terms`, in place."""
     frames = np.flatnonzero((touching | stops).any(axis=0))
     here = angles[:, frames]
     if chain.turning[joint]:
@@ -112,9 +127,11 @@ def _hold_joint(chain, joint, angles, touching, bound, slope, stops, own) -> Non
     else:
         basis = rates = np.broadcast_to(np.eye(3)[:, :, None], (3, 3, len(frames)))
         means = np.broadcast_to(chain.free[joint][:, None], here.shape)
+    # derivative of the cost by each angle: pulled outwards if it falls beyond the limit
     along = np.einsum("abf,af->bf", basis, slope[:, frames])
     outward = np.where(here >= chain.high[joint][:, None] - _AT, along < 0.0, along > 0.0)
     stops[:, frames] = ((touching[:, frames] & outward) | stops[:, frames]) & means
+    # fix an angle by a very stiff term that moves it onto its limit
     strength = np.where(stops[:, frames], _HELD, 0.0)
     short = np.where(stops[:, frames], here - bound[:, frames], 0.0)
     own.curvature[joint][..., frames] += np.einsum("naf,nbf,nf->abf", rates, rates, strength)
@@ -122,8 +139,19 @@ def _hold_joint(chain, joint, angles, touching, bound, slope, stops, own) -> Non
 
 
 def along(chain: Chain, held: np.ndarray, at: Poses, turns: np.ndarray, further: Poses) -> Poses:
-    """`further`, in place, with joints that limits hold (J, F) moved along the limit: their angles grow by what the
-    turns (J, 3, F) rad say, where a turn about a fixed axis would leave it."""
+    """Move joints that limits fix along their limit, in place.
+
+    Their angles change by the solved rotations; a rotation about a fixed axis would leave the limit.
+
+    Args:
+        chain: the chain.
+        held: (J, F) bool, joints that are fixed.
+        poses: F poses before the step.
+        rotations: (J, 3, F) radians, the solved rotations.
+        next_poses: F poses after the step; changed in place.
+    Returns:
+        The poses after the step.
+    """
     for joint in np.flatnonzero(held.any(axis=1)):
         if chain.turning[joint]:
             frames = np.flatnonzero(held[joint])
@@ -135,8 +163,9 @@ def along(chain: Chain, held: np.ndarray, at: Poses, turns: np.ndarray, further:
 
 
 def _inverse(basis: np.ndarray) -> np.ndarray:
-    """How each angle grows with a turn: (3 angles, 3 components, F), the inverse of the axes (3 components, 3, F)."""
+    """Invert the axes (3 components, 3, F): how each angle grows with a rotation, (3 angles, 3 components, F)."""
     columns = basis[:, 0], basis[:, 1], basis[:, 2]
+    # inverse of a 3x3 matrix by cross products of its columns, over their determinant
     rows = np.stack([cross(columns[1], columns[2]), cross(columns[2], columns[0]), cross(columns[0], columns[1])])
     size = np.einsum("af,af->f", columns[0], rows[0])
     return rows / np.where(np.abs(size) < 1e-3, np.copysign(1e-3, size), size)

@@ -1,16 +1,17 @@
-"""The low-pass filters of a solved motion (Fredriksson §5.4): Butterworth of fourth order, run forth and back, and
-Kalman smoothing, the alternative (§10.2; De Groote et al. 2008).
+"""Low-pass filters of a solved motion (Fredriksson section 5.4): Butterworth of fourth order, forwards and backwards,
+and
+Kalman smoothing, the alternative (section 10.2; De Groote et al. 2008).
 
-Butterworth: two passes of a second order filter make one of fourth order without any delay. Each pass alone lets half
-of the power through at its own cutoff, both together only a quarter, so that each is given a somewhat higher one
-(Winter 2009, "Biomechanics and Motor Control of Human Movement", §3.4.4.2): what is asked for is where both together
-let half of it through.
+Butterworth: two passes of a second-order filter form one of fourth order without delay. Each pass alone lets half of
+the power through at its own cutoff, both together only a quarter, so each gets a somewhat higher one (Winter 2009,
+"Biomechanics and Motor Control of Human Movement", section 3.4.4.2). The requested cutoff is where both together let
+half of the power through.
 
-Kalman: the state of every coordinate is its last three values. It goes on with the same acceleration but for a random
-jerk, and is seen with noise. The smoothed curve is the most likely one given all frames, before and after: a least
-squares problem, sum w_t |x_t - seen_t|^2 + q sum |x_t - 3 x_t-1 + 3 x_t-2 - x_t-3|^2, solved as one banded system a
-joint, whose Cholesky factor is the filter's pass and whose back substitution that of Rauch, Tung and Striebel. It
-knows how much each frame is worth: a joint whose markers are not seen is told by the frames around.
+Kalman: the state of every coordinate is its last three values. It continues with the same acceleration plus a random
+jerk, and is observed with noise. The smoothed curve is the most likely one given all frames: a least-squares problem,
+sum w_t |x_t - seen_t|^2 + q sum |x_t - 3 x_t-1 + 3 x_t-2 - x_t-3|^2, solved as one banded system for each joint, whose
+Cholesky factor is the filter's pass and whose back substitution is that of Rauch, Tung and Striebel. It knows the
+weight of each frame: a joint whose markers are occluded follows the frames around.
 """
 
 from __future__ import annotations
@@ -26,32 +27,44 @@ from ...motion import quaternion
 from ...motion.motion import Motion
 
 CUTOFF = setting("markers", "cutoff").default  # hertz; Fredriksson §5.4
-LEAST_RATE = 2.2  # frames per second for each hertz of cutoff: below twice the cutoff there is nothing to filter out
+LEAST_RATE = 2.2  # frames per second for each hertz of cutoff; below twice the cutoff there is nothing to remove
 
-_EACH_PASS = (2.0**0.5 - 1.0) ** 0.25  # a pass's cutoff is the asked one divided by this, on the bilinear scale
-_PADDED = 2.0  # periods of the cutoff by which both ends are continued before the passes
-_LEAST_FRAMES = 4
+_EACH_PASS = (2.0**0.5 - 1.0) ** 0.25  # a pass's cutoff is the requested one divided by this, on the bilinear scale
+_PADDED = 2.0  # periods of the cutoff by which both ends are extended before the passes
+_LEAST_FRAMES = 4  # frames that can be filtered at least
 
 _ORDER = 3  # of the difference that is noise: the jerk
-_LEAST_WORTH = 1e-4  # an unseen frame's: the system stays solvable where few are seen
+_LEAST_WORTH = 1e-4  # weight of an occluded frame: the system stays solvable where few are visible
 
 
 @dataclass(frozen=True, eq=False)
 class Filtered:
-    """motion: the filtered motion. notes: a line where it could not be filtered, else ()."""
+    """A filtered motion.
+
+    Attributes:
+        motion: the motion.
+        notes: a message where it could not be filtered, else ().
+    """
 
     motion: Motion
     notes: tuple[str, ...] = ()
 
 
 def butterworth(motion: Motion, cutoff: float = CUTOFF) -> Filtered:
-    """A motion without what swings faster than `cutoff` hertz: the root's place and every joint's rotation.
+    """Remove what oscillates faster than a cutoff from the root's place and every joint's rotation.
 
-    Rotations are filtered as quaternions of steady sign and brought back to length one: joints turn little between two
-    frames, so the four numbers go along the same smooth curve as the rotation itself, through any angle.
-    A motion of fewer than 4 frames, or of fewer than LEAST_RATE frames per second for each hertz, comes back unchanged
-    with a note. Raises InputError where the cutoff is no positive number or the motion holds one that is none.
-    Source: Fredriksson §5.4.
+    Rotations are filtered as quaternions of continuous sign and normalized: joints rotate little between two frames, so
+    the four numbers follow the same smooth curve as the rotation itself, through any angle.
+
+    Args:
+        motion: the motion. With fewer than 4 frames, or fewer than MIN_RATE frames per second for each hertz, it is
+            returned unchanged with a message.
+        cutoff: hertz.
+    Returns:
+        The filtered motion and messages.
+    Raises:
+        InputError: if the cutoff is not a positive number, or the motion contains NaN or infinite values.
+    Source: Fredriksson section 5.4.
     """
     check_numbers(motion, cutoff)
     note = unfit(motion, cutoff)
@@ -63,27 +76,36 @@ def butterworth(motion: Motion, cutoff: float = CUTOFF) -> Filtered:
 
 
 def unfit(motion: Motion, cutoff: float) -> str:
-    """Why a motion cannot be filtered at this cutoff, or ""."""
+    """Return why a motion cannot be filtered at this cutoff, or ""."""
     if len(motion) < _LEAST_FRAMES:
-        return f"{len(motion)} frames are too few to filter"
+        return f"not filtered: {len(motion)} frames are too few"
     if motion.fps < LEAST_RATE * cutoff:
         most = motion.fps / LEAST_RATE
-        return (f"not filtered: {motion.fps:g} frames per second hold nothing above {motion.fps / 2:g} Hz; a cutoff of "
-                f"{most:.3g} Hz or less would change something")
+        return (f"not filtered: {motion.fps:g} frames per second contain nothing above {motion.fps / 2:g} Hz; use a "
+                f"cutoff of {most:.3g} Hz or less")
     return ""
 
 
 def check_numbers(motion: Motion, cutoff: float) -> None:
-    """Raises InputError where the cutoff is no positive number or the motion holds one that is none."""
+    """Raise InputError if the cutoff is not a positive number, or the motion contains NaN or infinite values."""
     if not (np.isfinite(cutoff) and cutoff > 0):
         raise InputError("cutoff", f"{cutoff} hertz", "a positive number")
     if not (np.isfinite(motion.root_positions).all() and np.isfinite(motion.rotations).all()):
-        raise InputError("motion", "places or rotations that are no numbers", "finite ones", "fill its gaps first")
+        raise InputError("motion", "NaN or infinite places or rotations", "finite numbers", "fill its gaps first")
 
 
 def low_pass(values: np.ndarray, fps: float, cutoff: float) -> np.ndarray:
-    """Values (T, ...) without what swings faster than `cutoff` hertz, zero phase, fourth order, -3 dB at the cutoff;
-    both ends are continued by turning them about their last value."""
+    """Filter values with a zero-phase low-pass of fourth order, -3 dB at the cutoff.
+
+    Both ends are extended by reflecting them about their last value.
+
+    Args:
+        values: (T, ...).
+        fps: frames per second.
+        cutoff: hertz.
+    Returns:
+        The filtered values, same shape.
+    """
     from scipy.signal import butter, sosfiltfilt
 
     half = np.tan(np.pi * cutoff / fps) / _EACH_PASS  # the bilinear scale, on which the correction is exact
@@ -93,13 +115,21 @@ def low_pass(values: np.ndarray, fps: float, cutoff: float) -> np.ndarray:
 
 
 def kalman(motion: Motion, worth: np.ndarray | None = None, cutoff: float = CUTOFF) -> Filtered:
-    """The most likely course of the root's place and of every joint's rotation.
+    """Estimate the most likely curve of the root's place and of every joint's rotation.
 
-    worth: (T, J) how much a frame tells of a joint, 1 as usual, 0 nothing (the inverse of its noise's variance); None
-    for 1. cutoff: hertz at which half the power is let through where all frames are worth 1, by which the jerk's share
-    of the noise is set, so that it stands beside `butterworth` at the same figure.
-    A motion that is too short or too slow comes back unchanged with a note. Raises InputError for a worth of another
-    shape or below 0, for a cutoff that is no positive number, and for a motion that holds numbers that are none."""
+    Args:
+        motion: the motion. If it is too short or too slow, it is returned unchanged with a message.
+        weights: (T, J) weight of each frame for each joint, 1 as usual, 0 for none (the inverse variance of its noise);
+            None for 1.
+        cutoff: hertz at which half the power passes where all weights are 1. It sets the jerk's share of the noise, so
+            that it is comparable with the cutoff of `filter_butterworth`.
+    Returns:
+        The smoothed motion and messages.
+    Raises:
+        InputError: if weights have another shape or are below 0, the cutoff is not a positive number, or the motion
+            contains NaN or infinite values.
+    Source: De Groote et al. 2008; Fredriksson section 10.2.
+    """
     check_numbers(motion, cutoff)
     worth = _checked(worth, motion)
     note = unfit(motion, cutoff)
@@ -113,26 +143,41 @@ def kalman(motion: Motion, worth: np.ndarray | None = None, cutoff: float = CUTO
 
 
 def _checked(worth: np.ndarray | None, motion: Motion) -> np.ndarray:
+    """Return the weights (T, J), all positive; raise InputError where they are not valid."""
     shape = motion.rotations.shape[:2]
     if worth is None:
         return np.ones(shape)
     worth = np.asarray(worth, dtype=float)
     if worth.shape != shape or not np.isfinite(worth).all() or (worth < 0).any():
-        raise InputError("worth", f"shape {worth.shape}", f"{shape}, finite and not below 0")
+        raise InputError("weights", f"shape {worth.shape}", f"{shape}, finite and not below 0")
     return np.maximum(worth, _LEAST_WORTH)
 
 
 def jerk_price(fps: float, cutoff: float) -> float:
-    """q, the variance of what is seen over that of the jerk, for which half of the power at `cutoff` hertz passes:
-    a wave of w radians a frame comes through as 1 / (1 + q (2 sin w/2)^6)."""
+    """Compute the cost of the jerk for which half of the power passes at the cutoff.
+
+    It is q, the variance of the observations over that of the jerk: a wave of w radians per frame passes with the
+    factor 1 / (1 + q (2 sin w/2)^6).
+
+    Args:
+        fps: frames per second.
+        cutoff: hertz.
+    """
     wave = 2.0 * np.sin(np.pi * cutoff / fps)
     return (2.0**0.5 - 1.0) / wave ** (2 * _ORDER)
 
 
 def smoothed(seen: np.ndarray, worth: np.ndarray, price: float) -> np.ndarray:
-    """The course (T, K) that minimizes sum worth |x - seen|^2 + price |its third difference|^2; seen (T, K), worth
-    (T,) above 0."""
-    origin = seen.mean(axis=0)  # what is far from the origin loses no digits
+    """Minimise sum weight |x - seen|^2 + cost |third difference of x|^2.
+
+    Args:
+        seen: (T, K) observed values.
+        weights: (T,) above 0.
+        jerk_cost: cost of the jerk.
+    Returns:
+        (T, K) the smoothed curve.
+    """
+    origin = seen.mean(axis=0)  # centred, so that no digits are lost far from the origin
     squares = BandedLeastSquares(len(seen), reach=_ORDER, columns=seen.shape[1])
     squares.add_value(worth, goal=seen - origin)
     squares.add_difference(_ORDER, price)

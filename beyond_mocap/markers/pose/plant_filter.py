@@ -1,12 +1,13 @@
-"""The foot-plant filter (Fredriksson §5.4): feet that stand are held at one place, without their slow floating.
+"""The foot-plant filter (Fredriksson section 5.4): feet in contact with the ground are held in place, without slow
+drift.
 
-A window goes over the recording; where an ankle or a toe is on average at the same place in its first half as in its
-second, it stands. It is held there at its mean place, is let go along a Bezier curve, and the leg follows by IK, so
+A window passes over the recording. Where an ankle or a toe has the same mean place in the window's first half as in its
+second, it is in contact. It is held at its mean place and released along a Bezier curve, and the leg follows by IK, so
 that no bone changes its length.
 
-Two things are corrected. A foot that swings forth and back is also at the same mean place in both halves: it stands
-only where it also keeps near that place. And a body that shifts its feet by less than can be seen in one window goes
-decimetres in a minute: what is held at one place is ended where it has gone further than `apart` from it.
+Two things are corrected here. A foot that swings back and forth also has the same mean place in both halves: it is in
+contact only where it also stays near that place. And a body that shifts its feet by less than one window shows moves
+decimetres in a minute: a contact ends where the foot has moved further than `max_distance` from its place.
 """
 
 from __future__ import annotations
@@ -24,16 +25,22 @@ from ...motion.limb import bent_limb
 from ...motion.motion import Motion, pose_kinematics
 
 WINDOW, STILL, EASE, APART = 0.5, 0.0015, 0.1, 0.01
-"""Seconds (his 100 frames, at his 200 per second), metres between the halves' means, seconds of easing in and out, and
-metres from the held place beyond which a point does not stand there."""
+"""Seconds of the window (100 frames at 200 per second in the source), metres between the halves' means, seconds of
+easing in and out, and metres from the held place beyond which a point is not in contact."""
 
-_SOFT = 0.002  # metres below full length from which a leg eases where its foot is held
+_SOFT = 0.002  # metres below full length at which a leg with a held foot begins to ease
 
 
 @dataclass(frozen=True, eq=False)
 class PlantFiltered:
-    """motion: the motion with its feet held. held: (T, 2, 2) bool, left and right, ankle and toe. moved: (T, 2) metres
-    by which each ankle was moved. miss: (T, 2) metres that a leg was short of its held ankle."""
+    """The result of the foot-plant filter.
+
+    Attributes:
+        motion: the motion with its feet held.
+        held: (T, 2, 2) bool, left and right, ankle and toe.
+        ankle_shift: (T, 2) metres by which each ankle was moved.
+        miss: (T, 2) metres that a leg was short of its held ankle.
+    """
 
     motion: Motion
     held: np.ndarray
@@ -43,11 +50,21 @@ class PlantFiltered:
 
 def plant_filter(motion: Motion, window: float = WINDOW, still: float = STILL, ease: float = EASE,
                  apart: float = APART) -> PlantFiltered:
-    """A motion whose ankles and toes stay where they stand.
+    """Hold ankles and toes in place where they are in contact.
 
-    window, ease: seconds. still, apart: metres, see the module. Only the joints of the legs of frames in which
-    something is held or let go are changed. Raises InputError for a skeleton without two legs or numbers that are not
-    positive. Source: Fredriksson §5.4.
+    Only leg joints change, in frames in which something is held or released.
+
+    Args:
+        motion: T frames.
+        window: seconds.
+        max_drift: metres between the means of both halves of the window, up to which a point is in contact.
+        ease: seconds of easing in and out.
+        max_distance: metres from the held place beyond which a contact ends.
+    Returns:
+        The motion, what is held, and the corrections.
+    Raises:
+        InputError: if the skeleton has no two legs, or a number is not positive.
+    Source: Fredriksson section 5.4.
     """
     if min(window, still, ease, apart) <= 0:
         raise InputError("foot plant", f"{window} s, {still} m, {ease} s, {apart} m", "positive numbers")
@@ -73,10 +90,20 @@ def plant_filter(motion: Motion, window: float = WINDOW, still: float = STILL, e
 
 
 def stances(place: np.ndarray, half: int, still: float, apart: float) -> list[tuple[int, int]]:
-    """(first, end) frames in which a point stands; place (T, 3) metres, `half` a window's frames."""
+    """Detect the contacts of a point.
+
+    Args:
+        place: (T, 3) metres.
+        half: frames of half a window.
+        max_drift: metres between the means of both halves.
+        max_distance: metres from the contact's mean place.
+    Returns:
+        (first, end) frames of each contact.
+    """
     count = len(place)
     if count < 2 * half:
         return []
+    # cumulative sums give the mean over any half window: `mean[i]` is that of frames i to i + half
     total = np.concatenate([np.zeros((1, 3)), np.cumsum(place - place[0], axis=0)])
     mean = (total[half:] - total[:-half]) / half
     begins = np.flatnonzero(np.linalg.norm(mean[half:] - mean[:-half], axis=1) <= still)
@@ -91,7 +118,7 @@ def stances(place: np.ndarray, half: int, still: float, apart: float) -> list[tu
 
 
 def _near_one_place(place: np.ndarray, first: int, end: int, apart: float) -> list[tuple[int, int]]:
-    """A stretch, halved where it drifts until no frame of a piece is further than `apart` from the piece's mean."""
+    """Halve a stretch that drifts until no frame of a piece is further than `max_distance` from the piece's mean."""
     inside = place[first:end]
     off = np.linalg.norm(inside - inside.mean(axis=0), axis=1).max()
     if off <= apart or end - first < 2:
@@ -101,9 +128,16 @@ def _near_one_place(place: np.ndarray, first: int, end: int, apart: float) -> li
 
 
 def hold(place: np.ndarray, spans: list[tuple[int, int]], ease: int) -> tuple[np.ndarray, np.ndarray]:
-    """Shift (T, 3) metres that brings a point to its mean place in every span, and its weight (T,): 1 inside, along a
-    Bezier curve to 0 within `ease` frames on either side. Between two spans nearer than that it goes from one to the
-    other."""
+    """Compute the shift that brings a point to its mean place in every contact.
+
+    Args:
+        place: (T, 3) metres.
+        spans: (first, end) frames of the contacts.
+        ease: frames of easing before and after.
+    Returns:
+        The shift (T, 3) metres, and its weight (T,): 1 in contact, along a Bezier curve to 0 within `ease` frames.
+        Between contacts that are closer, the point moves from one place to the other.
+    """
     shift, weight = np.zeros_like(place), np.zeros(len(place))
     share, frames = np.zeros(len(place)), np.arange(len(place))
     for first, end in spans:
@@ -123,8 +157,11 @@ def _covered(spans: list[tuple[int, int]], count: int) -> np.ndarray:
 
 
 class _Foot:
-    """One foot and where it is to be: each point goes where it is held, and where only one is held the foot goes along
-    with it as a whole, so that it rolls over a held toe as before."""
+    """One foot and its targets.
+
+    Each point moves to where it is held; where only one is held, the foot moves with it as a whole, so that it still
+    rolls over a held toe.
+    """
 
     def __init__(self, limb: Limb, places: np.ndarray, world: np.ndarray, of_ankle, of_toe):
         self.limb, self.places, self.world = limb, places, world
@@ -134,7 +171,14 @@ class _Foot:
         self.weight = np.maximum(ankle_weight, toe_weight)
 
     def reached(self, skeleton, now: np.ndarray) -> tuple[dict[int, np.ndarray], np.ndarray]:
-        """Local rotations (N, 4) by joint at frames `now` (N,), and metres (N,) by which the ankle was missed."""
+        """Solve the leg for its targets.
+
+        Args:
+            skeleton: the skeleton.
+            frames: (N,) frames.
+        Returns:
+            Local rotations (N, 4) by joint, and metres (N,) by which the ankle was missed.
+        """
         limb, places, world = self.limb, self.places[now], self.world[now]
         ankle = places[:, limb.foot]
         turned = world[:, limb.foot]

@@ -1,7 +1,7 @@
-"""The pose in every frame: the whole chain laid through all markers at once (Fredriksson §3.5.1, §5.3).
+"""Solve the pose of every frame: the whole chain is fitted to all markers at once (Fredriksson sections 3.5.1 and 5.3).
 
-Every frame is solved from the solution beside it (§5.3.3): some frames first, from their own markers and again from
-their solved neighbours, whichever comes out nearer; then those between, from both.
+Every frame starts from a solved neighbour (section 5.3.3). Some frames are solved first, from their own markers and
+again from their solved neighbours, and the better solution is kept; then those between, from both neighbours.
 """
 
 from __future__ import annotations
@@ -22,21 +22,29 @@ from .residuals import marker_weights, seen_markers
 from .smooth import smooth
 from .start import first_poses
 
-_CHUNK = 512
-_COARSE_SECONDS = 1.0 / 60.0
-_ENOUGH = 0.3  # part of the markers that a frame must show to be solved
-_FEWEST = 4
-_DEAR, _FAR = 1.5, np.radians(40.0)  # doubted: costs so many times its neighbour, or turns a joint so far
-_FLIP, _FLIP_SECONDS = np.radians(45.0), 0.1  # a jump in one frame; how long what lies between two of them may last
-_EVEN = 0.05  # m per radian: how strongly joints between which no marker stands are held to turn alike
-_LEANING = 0.02  # m per radian: how strongly a joint that misses markers leans on how it stands before and after
-_LEAST_STIFFNESS = 1e-3  # m per radian: what no marker tells stays at rest
-_NEAR = 2  # a joint is told by its own markers and by those of so many joints below it
+_CHUNK = 512  # frames solved together
+_COARSE_SECONDS = 1.0 / 60.0  # spacing of the frames that are solved first
+_ENOUGH = 0.3  # share of the markers that a frame must show to be solved
+_FEWEST = 4  # markers that it must show at least
+_DEAR, _FAR = 1.5, np.radians(40.0)  # a solution is doubtful at so many times its neighbour's cost, or rotation
+_FLIP, _FLIP_SECONDS = np.radians(45.0), 0.1  # rotation of a jump in one frame; longest stretch between two jumps
+_EVEN = 0.05  # metres per radian: how strongly joints without a marker between them should turn alike
+_LEANING = 0.02  # metres per radian: pull of a joint with occluded markers to its poses before and after
+_LEAST_STIFFNESS = 1e-3  # metres per radian: keeps angles that no marker determines at rest
+_NEAR = 2  # a joint is determined by its own markers and by those of so many joints below it
 
 
 def missing(chain: Chain, there: np.ndarray) -> np.ndarray:
-    """Of which joints markers are hidden that the recording shows elsewhere: (T, J) bool. there: (T, M) bool. These
-    follow what is solved before and after, not the rest pose."""
+    """Find the joints with occluded markers that the recording shows elsewhere.
+
+    These joints follow the poses before and after, not the rest pose.
+
+    Args:
+        chain: the chain.
+        visible: (T, M) bool, visible markers.
+    Returns:
+        (T, J) bool.
+    """
     usual = there.any(axis=0)
     out = np.zeros((len(there), len(chain.skeleton)), dtype=bool)
     for marker, joint in enumerate(chain.joint):
@@ -51,11 +59,19 @@ def missing(chain: Chain, there: np.ndarray) -> np.ndarray:
 
 def between(chain: Chain, solved: Poses, known: np.ndarray, told: np.ndarray,
             frames: np.ndarray) -> tuple[Poses, np.ndarray]:
-    """The poses of `frames` (N,) that lie between solved ones, each joint between those that tell it, and of which
-    joints any do: (J,) bool.
+    """Interpolate poses between solved frames, each joint between the frames that determine it.
 
-    solved: poses of all T frames, of which `known` (K,) count. told: (K, J) bool. Before the first and after the last
-    telling frame a joint stays as it is there."""
+    Before the first and after the last such frame, a joint stays as it is there.
+
+    Args:
+        chain: the chain.
+        solved: poses of all T frames.
+        known: (K,) the frames that are solved.
+        determined: (K, J) bool, joints that are determined in them.
+        frames: (N,) the frames to interpolate.
+    Returns:
+        N poses, and (J,) bool, joints that any frame determines.
+    """
     places, (before, after, part) = solved.root[:, known].T, _around(known, frames)
     root = places[before] + part[:, None] * (places[after] - places[before])
     local = np.empty((len(frames), len(chain.skeleton), 4))
@@ -68,7 +84,7 @@ def between(chain: Chain, solved: Poses, known: np.ndarray, told: np.ndarray,
 
 
 def _around(known: np.ndarray, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Which known frames lie before and after each frame (indices), and how far between."""
+    """Find the known frames before and after each frame (indices), and its relative position between them (0 to 1)."""
     after = np.clip(np.searchsorted(known, frames), min(1, len(known) - 1), len(known) - 1)
     before = np.maximum(after - 1, 0)
     span = np.maximum(known[after] - known[before], 1)
@@ -77,10 +93,16 @@ def _around(known: np.ndarray, frames: np.ndarray) -> tuple[np.ndarray, np.ndarr
 
 @dataclass(frozen=True, kw_only=True)
 class HeldBall:
-    """A ball in the hand: its centre stands still in the hand, and a seen marker lies on its surface.
+    """A ball in the hand: its centre is fixed in the hand, and a recorded marker lies on its surface.
 
-    joint: the hand's name. centre: (3,) m in its frame. radius: m. seen: (T, 3) m, the marker, NaN where not seen.
-    held: (T,) bool. weight: what it counts beside a body's marker."""
+    Attributes:
+        joint: name of the hand.
+        centre: (3,) metres in its frame.
+        radius: metres.
+        seen: (T, 3) metres, the marker, NaN where not visible.
+        held: (T,) bool, frames in which the ball is held.
+        weight: relative to a body marker.
+    """
 
     joint: str
     centre: np.ndarray
@@ -92,8 +114,14 @@ class HeldBall:
 
 @dataclass(frozen=True)
 class PoseSettings:
-    """weights: count deformed clusters' markers less (eq. 5.2). limits: keep joints within them. smoothness: seconds,
-    as `smooth` understands them; 0: each frame by itself. ball: a held ball that takes part."""
+    """Options of the pose solver.
+
+    Attributes:
+        weights: give markers of deformed clusters less weight (eq. 5.2).
+        limits: keep joints within their limits.
+        smoothness: seconds, see `smooth_poses`; 0 solves each frame separately.
+        ball: a held ball that takes part, or None.
+    """
 
     weights: bool = True
     limits: bool = True
@@ -103,12 +131,18 @@ class PoseSettings:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Solved:
-    """What came out, for T frames of the model's M markers and J joints.
+    """The solved poses of T frames, for the model's M markers and J joints.
 
-    motion: the skeleton moving. residual: (T, M) m between the model's marker and the seen one, NaN where not seen.
-    weights: (T, M). single: (T, M) m, the same when each segment is laid through its own markers alone, NaN where it
-    has fewer than three. iterations: (T,) steps taken, 0 where a frame was not solved. at_limit: (T, J) bool. seconds:
-    the time it took. notes: lines for people."""
+    Attributes:
+        motion: the moving skeleton.
+        residual: (T, M) metres between the model's marker and the recorded one, NaN where not visible.
+        weights: (T, M).
+        single: (T, M) metres, the same with each segment fitted to its own markers alone, NaN with fewer than three.
+        iterations: (T,) number of steps, 0 where a frame was not solved.
+        at_limit: (T, J) bool.
+        seconds: computing time.
+        notes: messages for people.
+    """
 
     motion: Motion
     residual: np.ndarray
@@ -121,10 +155,20 @@ class Solved:
 
 
 def solve(model, trial, settings: PoseSettings = PoseSettings(), progress=None, cancelled=None) -> Solved:
-    """The model's motion through a trial's markers.
+    """Solve the model's poses for a trial's markers.
 
-    model: a `MarkerModel`; trial: a `MarkerTrial` with its labels. progress(fraction, text) and cancelled() as
-    everywhere. InputError where the trial has hardly any of the model's markers."""
+    Args:
+        model: a `MarkerModel`.
+        trial: a `MarkerTrial` with its labels.
+        settings: the options.
+        progress: called with the share that is done and a text.
+        cancelled: returns True when the user stops the job.
+    Returns:
+        The motion with residuals and weights.
+    Raises:
+        InputError: if the trial contains hardly any of the model's markers.
+        Cancelled: if the user stops the job.
+    """
     began = time.perf_counter()
     seen = _positions(model, trial)
     solving = _Solving(_chain(model, settings.limits), seen, settings, fps=trial.fps, usual=model.edge_sigma,
@@ -134,7 +178,7 @@ def solve(model, trial, settings: PoseSettings = PoseSettings(), progress=None, 
 
 
 def _chain(model, limited: bool) -> Chain:
-    """The chain of a model."""
+    """Build the chain of a model, with or without joint limits."""
     freedom = model.freedom
     made = chain(model.skeleton, model.joint, model.places, order=freedom.order, free=freedom.free, low=freedom.low,
                  high=freedom.high, stiffness=model.stiffness)
@@ -142,7 +186,7 @@ def _chain(model, limited: bool) -> Chain:
 
 
 def _positions(model, trial) -> np.ndarray:
-    """The model's markers as seen: (T, M, 3) m, NaN where the trial does not have them."""
+    """Return the model's markers as recorded, (T, M, 3) metres; raise InputError if there are fewer than four."""
     out = seen_markers(model, trial)
     seen = int(np.isfinite(out).any(axis=(0, 2)).sum())
     if seen < _FEWEST:
@@ -152,7 +196,7 @@ def _positions(model, trial) -> np.ndarray:
 
 
 class _Solving:
-    """One run: the arrays (frames last) and what is known so far."""
+    """One run of the solver: the arrays (frames last) and the solutions so far."""
 
     def __init__(self, chain, seen, settings, fps, usual, progress, cancelled):
         self.chain, self.settings, self.fps = chain, settings, fps
@@ -173,26 +217,29 @@ class _Solving:
         self.missing = missing(chain, self.there)
         self.notes: list[str] = []
         self.work_done, self.work = 0, 1
-        self.alone = 0.5 if settings.smoothness > 0.0 else 1.0  # share of the work before all frames are smoothed
+        self.alone = 0.5 if settings.smoothness > 0.0 else 1.0  # share of the progress before all frames are smoothed
 
     def run(self) -> None:
-        """Solve the frames that show enough, fill in the others."""
+        """Solve the frames that show enough markers, and interpolate the others."""
         ever = self.there.any(axis=0).sum()
         known = np.flatnonzero(self.there.sum(axis=1) >= max(_FEWEST, int(np.ceil(_ENOUGH * ever))))
         if not len(known):
             raise InputError("trial", "no frame shows enough markers", f"{_ENOUGH:.0%} of {ever}", "clean it first")
+        # frames solved first: every sixtieth of a second, and the last one
         spacing = max(1, int(round(self.fps * _COARSE_SECONDS)))
         coarse = np.unique(np.append(known[::spacing], known[-1]))
         self.work = len(known)
         start = first_poses(self.chain, self.seen[..., coarse], self.weights[coarse].T)
         for part in self._chunks(coarse):
             self._keep(coarse[part], descend(self._task(coarse[part]), start.frames(part)))
+        # retry doubtful frames from the neighbour before, then from the neighbour after
         for source, frames in ((coarse[:-1], coarse[1:]), (coarse[1:], coarse[:-1])):
             doubtful = self._doubtful(frames, source)
             self._better_from(source[doubtful], frames[doubtful])
         unsure = np.flatnonzero(self.missing[coarse].any(axis=1))
         if len(unsure):
             self._solve_between(coarse[unsure], coarse)
+        # then all frames between, from both solved neighbours
         others = np.setdiff1d(known, coarse)
         if len(others):
             self._solve_between(others, coarse)
@@ -202,10 +249,13 @@ class _Solving:
             self._smooth()
 
     def _unflip(self, known: np.ndarray) -> None:
-        """Short stretches that jump away and back again (a straight elbow can be turned out two ways) are solved again
-        from the frames around them, and kept where that costs about as little."""
+        """Solve short stretches again that jump away and back, from the frames around them.
+
+        A straight elbow, for example, can be rotated in two ways. The new solution is kept if it costs about as little.
+        """
         local = self.poses.local[..., known]
         near = np.abs(np.einsum("jaf,jaf->jf", local[..., 1:], local[..., :-1]))
+        # |dot product| of quaternions is the cosine of half the rotation between two frames
         jumps = np.flatnonzero(np.any(near < np.cos(0.5 * _FLIP), axis=0))
         suspect = np.zeros(len(known), dtype=bool)
         for first, last in zip(jumps[:-1], jumps[1:]):
@@ -224,7 +274,7 @@ class _Solving:
             self._accept(here, descend(task, start.frames(part)), 1.5, 1e-5)
 
     def _smooth(self) -> None:
-        """All frames together."""
+        """Smooth all frames together."""
         def watch(part):
             if self.cancelled():
                 raise Cancelled("reconstruction cancelled")
@@ -235,7 +285,7 @@ class _Solving:
         self.poses.put(everything, at)
 
     def _solve_between(self, frames: np.ndarray, known: np.ndarray) -> None:
-        """Solve frames from how those beside them stand; joints that miss markers lean on it."""
+        """Solve frames from interpolated neighbours; joints with occluded markers are pulled to the interpolation."""
         start, some = between(self.chain, self.poses, known, ~self.missing[known], frames)
         leaning = np.where(self.missing[frames].T & some[:, None], _LEANING, 0.0)
         for part in self._chunks(frames):
@@ -244,7 +294,7 @@ class _Solving:
             self._keep(here, descend(self._task(here, lean, leaning[:, part]), start.frames(part)))
 
     def _task(self, frames: np.ndarray, lean: Poses | None = None, leaning: np.ndarray | None = None) -> Task:
-        """What these frames are to come near to."""
+        """Build the task of these frames."""
         point, ball = None, self.settings.ball
         if ball is not None:
             there = np.isfinite(ball.seen).all(axis=-1) & ball.held
@@ -255,7 +305,7 @@ class _Solving:
                     lean=lean, leaning=leaning, point=point, even=_EVEN)
 
     def _chunks(self, frames: np.ndarray):
-        """Slices of a list of frames, with a look at the clock between."""
+        """Iterate over slices of a list of frames; report progress and check for cancellation between them."""
         for first in range(0, len(frames), _CHUNK):
             if self.cancelled():
                 raise Cancelled("reconstruction cancelled")
@@ -269,19 +319,21 @@ class _Solving:
         self.held[:, frames] = arrived.held
 
     def _doubtful(self, frames: np.ndarray, source: np.ndarray) -> np.ndarray:
-        """Which frames may have come out in another valley than those beside them: dearer, or far turned."""
+        """Find frames that may have reached another local minimum than their neighbours: higher cost, or large
+        rotations.
+        """
         turned = np.abs(np.einsum("jaf,jaf->jf", self.poses.local[..., frames], self.poses.local[..., source]))
         dear = self.cost[frames] > _DEAR * self.cost[source] + 1e-6
         return np.flatnonzero(dear | np.any(turned < np.cos(0.5 * _FAR), axis=0))
 
     def _better_from(self, source: np.ndarray, frames: np.ndarray) -> None:
-        """Solve frames again from other frames' solutions, and keep what comes out clearly nearer."""
+        """Solve frames again from other frames' solutions, and keep those that cost clearly less."""
         for part in self._chunks(frames):
             arrived = descend(self._task(frames[part]), self.poses.frames(source[part]))
             self._accept(frames[part], arrived, 0.999, -1e-9)
 
     def _accept(self, frames: np.ndarray, arrived, share: float, more: float) -> None:
-        """Keep what costs less than this share of what is there, and a little more."""
+        """Store solutions that cost less than this share of the present cost, plus `margin`."""
         better = arrived.cost < share * self.cost[frames] + more
         if better.any():
             chosen = frames[better]
@@ -290,7 +342,7 @@ class _Solving:
         self.steps[frames] += arrived.steps
 
     def _fill(self, known: np.ndarray) -> None:
-        """Frames with hardly any markers lie between those beside them."""
+        """Interpolate the frames with too few markers."""
         blind = np.setdiff1d(np.arange(len(self.cost)), known)
         if len(blind):
             told = np.ones((len(known), len(self.chain.skeleton)), dtype=bool)
@@ -298,7 +350,7 @@ class _Solving:
             self.notes.append(f"{len(blind)} of {len(self.cost)} frames show too few markers and are interpolated")
 
     def result(self, seconds: float) -> Solved:
-        """What came out."""
+        """Return the solution of all frames."""
         motion = Motion(self.chain.skeleton, self.poses.root.T, np.moveaxis(self.poses.local, -1, 0), self.fps)
         put = place(self.chain, self.poses)
         away = (put.markers + put.origin).transpose(2, 0, 1) - self.positions
@@ -309,8 +361,14 @@ class _Solving:
 
 
 def single_residual(chain: Chain, seen: np.ndarray) -> np.ndarray:
-    """Residuals (T, M) m when every segment is laid through its own markers alone (§3.4.2); NaN where it has fewer
-    than three seen. seen: (T, M, 3) m."""
+    """Measure residuals when every segment is fitted to its own markers alone (section 3.4.2).
+
+    Args:
+        chain: the chain.
+        seen: (T, M, 3) metres, NaN where not visible.
+    Returns:
+        (T, M) metres; NaN where the segment has fewer than three visible markers.
+    """
     out = np.full(seen.shape[:2], np.nan)
     for joint in np.unique(chain.joint):
         own = np.flatnonzero(chain.joint == joint)

@@ -1,9 +1,9 @@
-"""The whole sequence at once: poses near to the seen markers whose joints speed up and slow down little.
+"""Smooth the whole sequence at once: poses near the recorded markers whose joints accelerate little.
 
-Beside what each frame asks (`descent`) every second difference over time of the root's place and of each joint's turn
-costs something. All frames then hang together, each with the two before and after it: one banded system a step, whose
-blocks are the frames' own (Gauss and Newton's, with limits held as there). Long recordings go window by window; each
-sets out from the last two frames of the one before and looks ahead, so that no seam is seen.
+In addition to the cost of each frame (`descent`), every second difference over time of the root's place and of each
+joint's rotation has a cost. Each frame is then coupled with the two before and after it: one banded system for each
+step, with the frames' own matrices as blocks (Gauss-Newton, with limits as there). Long recordings are solved window by
+window; each starts from the last two frames of the one before and looks ahead, so that no transition is visible.
 """
 
 from __future__ import annotations
@@ -16,17 +16,26 @@ from . import limits
 from .chain import CONJUGATE, Chain, Poses, logarithm, marker_derivative, moved, multiply
 from .descent import State, Task, carried_to_turns, crosswise, distance, state_of, wishes
 
-ARM = 0.1  # metres: a turn counts as much as a marker so far from the joint moves by it
-_KEPT, _AHEAD, _GIVEN = 240, 60, 2  # frames of a window, of its outlook, and of what was solved before it
+ARM = 0.1  # metres: a rotation costs as much as the movement of a marker at this distance from the joint
+# Frames of a window, of the look-ahead that is discarded, and of the solved window before that stay fixed.
+_KEPT, _AHEAD, _GIVEN = 240, 60, 2
 _MOST_STEPS = 8
-_STILL = 1e-4  # radians and metres
+_STILL = 1e-4  # radians and metres; a smaller step has converged
 
 
 def smooth(task: Task, start: Poses, seconds: float, fps: float, watch=lambda part: None) -> tuple[Poses, np.ndarray]:
-    """Smooth poses near `start`, and which joints limits hold: (J, T) bool.
+    """Smooth poses of all T frames.
 
-    seconds: how strongly: an acceleration counts as much as a marker that is off by what the acceleration covers in
-    half of the square of that time. watch: called with the part done before each window."""
+    Args:
+        task: what the poses should fit.
+        start: T solved poses.
+        seconds: strength: an acceleration costs as much as a marker that is off by what the acceleration covers in half
+            of the square of that time.
+        fps: frames per second.
+        watch: called with the share that is done before each window; it may raise.
+    Returns:
+        T smooth poses, and (J, T) bool, joints that limits hold.
+    """
     at, total = start.copy(), start.root.shape[-1]
     held = np.zeros((len(task.chain.skeleton), total), dtype=bool)
     strength = (seconds * fps) ** 2
@@ -36,12 +45,13 @@ def smooth(task: Task, start: Poses, seconds: float, fps: float, watch=lambda pa
         window = np.arange(first - given, min(first + _KEPT + _AHEAD, total))
         solved, stopped = _window(task.frames(window), at.frames(window), strength, given)
         at.put(window, solved)
+        # the look-ahead is overwritten by the next window
         held[:, window[given:]] = stopped[:, given:]
     return at, held
 
 
 def _window(task: Task, at: Poses, strength: float, given: int) -> tuple[Poses, np.ndarray]:
-    """One window's poses, of which the first `given` stay as they are."""
+    """Smooth one window, of which the first `fixed` frames stay unchanged."""
     stops = limits.limited(task.chain)
     best, damping = state_of(task, at), 1e-6
     cost = _cost(best, strength, task.chain, given)
@@ -62,7 +72,9 @@ def _window(task: Task, at: Poses, strength: float, given: int) -> tuple[Poses, 
 
 
 def _rates(chain: Chain, at: Poses) -> np.ndarray:
-    """What joints turn (rows 1 and on, rad) and the root moves (row 0, m) from frame to frame: (1 + J, 3, F - 1)."""
+    """Compute the change from frame to frame, (1 + J, 3, F - 1): of the root (row 0, metres) and of joints
+    (radians).
+    """
     turns = logarithm(multiply(at.local[..., 1:], at.local[..., :-1] * CONJUGATE))
     for joint in chain.hinges:
         turns[joint] = np.diff(at.angles[joint], axis=-1)
@@ -70,18 +82,18 @@ def _rates(chain: Chain, at: Poses) -> np.ndarray:
 
 
 def _scales(chain: Chain, strength: float) -> np.ndarray:
-    """What a unit of each row of `_rates` counts as, (1 + J, 1, 1) m."""
+    """Compute the factor of each row of the rates, (1 + J, 1, 1), which makes them metres."""
     return 0.5 * strength * np.concatenate([[1.0], np.full(len(chain.skeleton), ARM)])[:, None, None]
 
 
 def _cost(state: State, strength: float, chain: Chain, given: int) -> float:
-    """Half the weighted squares of the frames that are to be found, and of all second differences."""
+    """Compute half the weighted squares of the frames that are solved, and of all second differences."""
     bent = _scales(chain, strength) * np.diff(_rates(chain, state.poses), axis=-1)
     return float(state.cost[given:].sum() + 0.5 * np.sum(bent**2))
 
 
 def _unsteady(chain: Chain, at: Poses, strength: float) -> np.ndarray:
-    """The derivative of the second differences' part of the cost by shift (row 0) and turns: (1 + J, 3, F)."""
+    """Compute the derivative of the second differences' cost by shift (row 0) and rotations, (1 + J, 3, F)."""
     rates = _rates(chain, at)
     scale = _scales(chain, strength) ** 2
     pull = np.zeros((*rates.shape[:2], rates.shape[2] + 1))
@@ -89,6 +101,7 @@ def _unsteady(chain: Chain, at: Poses, strength: float) -> np.ndarray:
     bent = scale * np.diff(rates, axis=-1)
     forces[..., 1:] += bent
     forces[..., :-1] -= bent
+    # each rate depends on the later and the earlier frame; rotations need the conversion to small rotations
     later, earlier = forces.copy(), forces.copy()
     for joint in range(len(chain.skeleton)):
         if chain.turning[joint]:
@@ -100,10 +113,10 @@ def _unsteady(chain: Chain, at: Poses, strength: float) -> np.ndarray:
 
 
 def _step(task: Task, best: State, stops: dict, strength: float, given: int, damping: float):
-    """Shift (3, F) and turns (J, 3, F) of one step, and which joints limits hold (J, F)."""
+    """Solve one step: shift (3, F), rotations (J, 3, F), and the joints that limits hold (J, F)."""
     chain, own = task.chain, wishes(task, best)
     columns, away, weight = _columns(task, best)
-    own.curvature[~chain.free[:, :, None] & np.eye(3, dtype=bool)] = 1.0
+    own.curvature[~chain.free[:, :, None] & np.eye(3, dtype=bool)] = 1.0  # fixed angles: a solvable equation
     unsteady = _unsteady(chain, best.poses, strength)
     slope = np.einsum("fra,fr->af", columns, weight * away)
     slope[3:] += own.pull.reshape(-1, own.pull.shape[-1])
@@ -122,7 +135,10 @@ def _step(task: Task, best: State, stops: dict, strength: float, given: int, dam
 
 
 def _columns(task: Task, best: State) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The derivative of all distances (F, R, columns), the distances (F, R) m and what they count (F, R)."""
+    """Build the derivative of all distances (F, R, columns), the distances (F, R) metres and their weights (F, R).
+
+    Three rows for each marker; with a held point one row along its distance and three across it.
+    """
     chain, at = task.chain, best.poses
     point = task.point
     if point is not None:
@@ -145,18 +161,28 @@ def _columns(task: Task, best: State) -> tuple[np.ndarray, np.ndarray, np.ndarra
 
 
 def _banded(blocks: np.ndarray, right: np.ndarray, strength: np.ndarray, given: int) -> np.ndarray:
-    """Solve the frames' blocks (F, N, N) together with the second differences of each of the N coordinates: (F, N),
-    zero for the first `given` frames."""
+    """Solve the frames' blocks together with the second differences of each of the N coordinates.
+
+    Args:
+        blocks: (F, N, N), one for each frame.
+        right: (F, N), the right-hand side.
+        strength: (N,) weight of the second differences.
+        fixed: number of first frames that stay unchanged.
+    Returns:
+        (F, N), zero for the first `fixed` frames.
+    """
     from scipy.linalg import solveh_banded
 
     frames, size = right.shape
     band = np.zeros((frames, 2 * size + 1, size))
+    # lower band storage: row k of a column holds the entry k below the diagonal, so one block is `size` rows
     for off in range(size):
         band[:, off, : size - off] = np.diagonal(blocks, offset=-off, axis1=1, axis2=2)
+    # squares of the coefficients 1, -2, 1 of all differences that contain a frame: 1, 5, 6, 6, ..., 5, 1
     inside = np.convolve(np.ones(frames - 2), [1.0, 4.0, 1.0]) if frames > 2 else np.zeros(frames)
     band[:, 0] += inside[:, None] * strength
     if frames > 2:
-        # how often two frames, and two with one between, stand in one second difference 1, -2, 1
+        # products of the coefficients 1, -2, 1 for neighbouring frames, and for frames two apart
         band[:-1, size] += np.convolve(np.ones(frames - 2), [-2.0, -2.0])[:, None] * strength
         band[:-2, 2 * size] += strength
     band = band.transpose(1, 0, 2)

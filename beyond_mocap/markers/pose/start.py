@@ -1,7 +1,8 @@
-"""A first pose from the markers of one frame alone: from the root outward, each joint as its own markers say.
+"""Estimate an initial pose from the markers of one frame alone: from the root outwards, each joint by its own markers.
 
-It only has to lie in the right valley: `pose` goes on from there. The paper found poses by single segments too uneven
-to start every frame from (§5.3.3); here they start some frames, and the others start from what is solved beside them.
+The pose only needs to lie near the right minimum; `pose` continues from there. The paper found poses by single segments
+too uneven to start every frame from (section 5.3.3); here they start some frames, and the others start from solved
+neighbours.
 """
 
 from __future__ import annotations
@@ -11,21 +12,28 @@ import numpy as np
 from ...motion import quaternion
 from .chain import CONJUGATE, Chain, Poses, angles_of, matrices, multiply, within
 
-_BEYOND = 0.01  # how much the next joint's markers count beside a joint's own; those behind it this much less again
-_FAITH = 4e-4  # m2: how much the parent's direction counts, for what markers leave open
+_BEYOND = 0.01  # weight of the next joint's markers relative to a joint's own; again this factor for each joint below
+_FAITH = 4e-4  # m2, weight of the parent's direction, for angles that markers do not determine
 
 
 def first_poses(chain: Chain, seen: np.ndarray, weights: np.ndarray, guess: Poses | None = None) -> Poses:
-    """Poses of frames by themselves.
+    """Estimate poses of frames, each from its own markers.
 
-    seen: (M, 3, F) m, anything where the weight (M, F) is 0. guess: local rotations to lean on where markers leave a
-    joint open; None: the rest pose."""
+    Args:
+        chain: the chain.
+        seen: (M, 3, F) metres, any numbers where the weight is 0.
+        weights: (M, F).
+        guess: local rotations for what markers leave undetermined; None for the rest pose.
+    Returns:
+        F poses.
+    """
     skeleton, frames = chain.skeleton, weights.shape[-1]
     rest, distance = _rest(chain)
     local = np.zeros((len(skeleton), 4, frames))
     local[:, 0] = 1.0
     lean = local.copy() if guess is None else guess.local
     angles = np.zeros((len(skeleton), 3, frames))
+    # markers have less weight the more joints they lie below
     share = weights * _BEYOND ** distance[0][:, None]
     world = [_whole(rest, seen, share)]
     middle = _mean(rest, share), _mean(seen, share)
@@ -48,7 +56,9 @@ def first_poses(chain: Chain, seen: np.ndarray, weights: np.ndarray, guess: Pose
 
 
 def _rest(chain: Chain) -> tuple[np.ndarray, np.ndarray]:
-    """Markers in the rest pose (M, 3) m, and how many joints (J, M) they lie below each joint, inf where not."""
+    """Return the markers in the rest pose (M, 3) metres, and how many joints (J, M) they lie below each joint, else
+    inf.
+    """
     distance = np.full((len(chain.skeleton), len(chain.joint)), np.inf)
     for marker, joint in enumerate(chain.joint):
         steps = 0
@@ -59,26 +69,29 @@ def _rest(chain: Chain) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _mean(points: np.ndarray, share: np.ndarray) -> np.ndarray:
-    """Weighted mean (3, F) of points (M, 3) or (M, 3, F) by shares (M, F)."""
+    """Compute the weighted mean (3, F) of points (M, 3) or (M, 3, F) by shares (M, F)."""
     points = points[..., None] if points.ndim == 2 else points
     return (share[:, None] * points).sum(axis=0) / np.maximum(share.sum(axis=0), 1e-12)
 
 
 def _whole(rest: np.ndarray, seen: np.ndarray, share: np.ndarray) -> np.ndarray:
-    """Rotations (4, F) that turn the resting markers (M, 3) about their mean onto the seen ones (M, 3, F)."""
+    """Fit the rotations (4, F) of the resting markers (M, 3) about their mean to the recorded ones (M, 3, F)."""
     arms = rest[..., None] - _mean(rest, share)
     return _best(np.einsum("mf,maf,mbf->abf", share, seen - _mean(seen, share), arms))
 
 
 def _about(arms: np.ndarray, seen: np.ndarray, share: np.ndarray, before: np.ndarray) -> np.ndarray:
-    """Rotations (4, F) about a joint that turn arms (N, 3) onto seen ones (N, 3, F), leaning on `before` (4, F)."""
+    """Fit the rotations (4, F) about a joint of arms (N, 3) to recorded ones (N, 3, F), with a pull to `prior`
+    (4, F).
+    """
     return _best(np.einsum("mf,maf,mb->abf", share, seen, arms) + _FAITH * matrices(before))
 
 
 def _best(profile: np.ndarray) -> np.ndarray:
-    """The rotations (4, F) with the largest sum of products with these matrices (3, 3, F).
+    """Find the rotations (4, F) with the largest sum of products with these matrices (3, 3, F).
 
-    Davenport's method: the dominant eigenvector of a symmetric 4x4 matrix, which cannot come out mirrored."""
+    Davenport's q-method: the dominant eigenvector of a symmetric 4x4 matrix, which cannot be a reflection.
+    """
     b = np.moveaxis(profile, -1, 0)
     k = np.empty((len(b), 4, 4))
     trace = np.trace(b, axis1=1, axis2=2)

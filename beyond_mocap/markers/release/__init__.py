@@ -1,5 +1,5 @@
-"""The moment in which a ball leaves a hand, and how it leaves (Fredriksson ch. 6).
+"""Estimate when a ball leaves a hand, and how it leaves (Fredriksson chapter 6).
 
-With a marker on the ball, its flight is fitted together with the time of release (`launch_fit`); without one, the hand
-tells (`without_ball`). Everything in metres, seconds, Z up, on the trial's frames.
+With a marker on the ball, its flight is fitted together with the release time (`launch_fit`); without one, the motion
+of the hand is the evidence (`without_ball`). Units are metres and seconds, Z up, on the trial's frames.
 """

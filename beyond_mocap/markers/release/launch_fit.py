@@ -1,14 +1,14 @@
-"""The launch of a ball from a marker on its surface: release time, way and spin fitted together (eq. 6.2-6.4).
+"""Fit the launch of a ball to a marker on its surface: release time, trajectory and spin together (eq. 6.2-6.4).
 
-Before the release the marker stands still in the hand's frame; after it, it goes round the centre of a ball that flies:
+Before the release the marker is fixed in the hand's frame; after it, it circles the centre of a flying ball:
 
     y(t) = p + v (t - t0) + g (t - t0)^2 / 2 + air + cos(w (t - t0)) a + sin(w (t - t0)) b
 
-which is eq. 6.3 with the turning marker written as the circle that it goes on (a, b: where it starts and where it is a
-quarter turn later; what it has along the spin's axis goes into p). For a given rate w it is linear in p, v, a and b, so
-that all release times, on both sides of the first guess, and all rates are tried at once. The paper searched before the
-guess alone, with the hand's velocity as the ball's: its throws came out 1.15 m/s too slow (§8.2.2). Here the flight
-says how fast the ball is, and the hand only when.
+This is eq. 6.3 with the rotating marker written as its circle (a, b: where it starts and where it is a quarter turn
+later; its part along the spin axis is included in p). For a given rate w the equation is linear in p, v, a and b, so
+all release times, on both sides of the first guess, and all rates are tried at once. The paper searched before the
+guess alone, with the hand's velocity as the ball's: its throws came out 1.15 m/s too slow (section 8.2.2). Here the
+speed follows from the flight, and only the time from the hand.
 """
 
 from __future__ import annotations
@@ -20,25 +20,29 @@ import numpy as np
 from ...ball.physics import Ball, in_air
 from ...base.time_series import interpolate
 
-FASTEST_SPIN = 2.0 * np.pi * 50.0  # rad/s: 3000 turns a minute, the most that pitched baseballs have
-_RATES = 60
-_LEAST = 2  # frames of flight
-_FIRST = 0.11  # s of flight with which release and spin are searched; the rest follows from there
-_MORE = (0.17, 0.25, 0.35)  # s of flight that are taken as long as the ball flies on
-_FURTHER = 0.03  # m by which a flight may be elsewhere a moment later, before air and turning are known
-_HELD = 0.12  # s before the release in which the marker stands still in the hand
-_HAND_SPEED = 0.2  # of the hand's speed, how uncertain it is as the ball's
-_NOISE = 0.0015  # m, of a marker
-_FAR = 5.0  # noise beyond which a marker counts less
-_FINE = 0.125  # frames, the last steps of the release time
+FASTEST_SPIN = 2.0 * np.pi * 50.0  # rad/s: 3000 revolutions per minute, the maximum of pitched baseballs
+_RATES = 60  # spin rates that are tried
+_LEAST = 2  # frames of flight that must be visible
+_FIRST = 0.11  # s of flight with which release and spin are searched
+_MORE = (0.17, 0.25, 0.35)  # s of flight that are used next, as long as the ball still flies
+_FURTHER = 0.03  # metres by which a flight may deviate a moment later, before air and spin are known
+_HELD = 0.12  # s before the release in which the marker is fixed in the hand
+_HAND_SPEED = 0.2  # uncertainty of the hand's speed as the ball's, as a share of it
+_NOISE = 0.0015  # metres, noise of a marker
+_FAR = 5.0  # multiples of the noise beyond which a marker has less weight
+_FINE = 0.125  # frames, the finest step of the release time
 
 
 @dataclass(frozen=True, eq=False)
 class Held:
-    """What the hand says, T frames.
+    """The evidence of the hand over T frames.
 
-    marker: (T, 3) m, where the ball's marker would be, were it held on and on. centre: (T, 3) m of the ball and
-    velocity: (T, 3) m/s, likewise. sigma: m, how sure the marker's place is."""
+    Attributes:
+        marker: (T, 3) metres, where the ball's marker would be if the ball were held throughout.
+        centre: (T, 3) metres, the ball's centre, likewise.
+        velocity: (T, 3) m/s of the ball, likewise.
+        sigma: metres, uncertainty of the marker's place.
+    """
 
     marker: np.ndarray
     centre: np.ndarray
@@ -48,12 +52,21 @@ class Held:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class LaunchFit:
-    """How the ball left.
+    """How the ball left the hand.
 
-    time: s from frame 0. position: (3,) m of its centre then. velocity: (3,) m/s. spin: (3,) rad/s, zero where not
-    told. offset: (3,) m, from centre to marker at the release. circle: m, of the circle on which the marker goes round:
-    no ball is smaller. residual: m, root mean square of the marker in flight. time_sigma: s and speed_sigma: m/s, one
-    standard deviation each. frames: of flight that were seen. seconds: of flight that were used."""
+    Attributes:
+        time: s from frame 0.
+        position: (3,) metres, its centre at that time.
+        velocity: (3,) m/s.
+        spin: (3,) rad/s, zero where unknown.
+        offset: (3,) metres from centre to marker at the release.
+        circle: metres, radius of the marker's circle; no ball is smaller.
+        residual: metres, root mean square of the marker in flight.
+        time_sigma: s, one standard deviation.
+        speed_sigma: m/s, one standard deviation.
+        frames: visible frames of flight.
+        seconds: s of flight that were used.
+    """
 
     time: float
     position: np.ndarray
@@ -70,10 +83,20 @@ class LaunchFit:
 
 def fit_launch(marker: np.ndarray, held: Held, fps: float, guess: float, ball: Ball, radius: float,
                window: float = 0.12) -> LaunchFit | None:
-    """The launch that explains the ball's marker (T, 3) m, NaN where it is not seen.
+    """Fit the launch that explains the ball's marker.
 
-    guess: s, the first guess; release times up to `window` s before and after it are tried. ball: what acts on it in
-    the air. None where the marker is not seen away from the hand in at least two frames."""
+    Args:
+        marker: (T, 3) metres, NaN where not visible.
+        held: the evidence of the hand.
+        fps: frames per second.
+        guess: s, first guess of the release time.
+        ball: says what acts on it in the air.
+        radius: metres, of the ball.
+        window: s before and after the guess in which release times are tried.
+    Returns:
+        The launch; None where the marker is not visible away from the hand in at least two frames.
+    Source: Fredriksson section 6.2, equations (6.2) to (6.4).
+    """
     search = _Search(marker, held, fps, ball, radius)
     first, last = max(guess - window, search.times[1]), min(guess + window, search.times[-2])
     tried = np.arange(np.ceil(first * fps), np.floor(last * fps) + 1) / fps
@@ -84,6 +107,7 @@ def fit_launch(marker: np.ndarray, held: Held, fps: float, guess: float, ball: B
     best, at = min(flights, key=lambda found: found[0].cost + search.further_on(*found))
     best, at = search.refined(best, at, rates[1] - rates[0], _FIRST)
     seconds = _FIRST
+    # use more of the flight as long as it brings more frames and the residual stays small
     for longer in _MORE:
         further, when = search.refined(best, at, 2.0 / longer, longer)
         if further.frames == best.frames or further.residual > max(1.5 * best.residual, 2.0 * _NOISE):
@@ -94,7 +118,18 @@ def fit_launch(marker: np.ndarray, held: Held, fps: float, guess: float, ball: B
 
 @dataclass(eq=False, kw_only=True)
 class _Flight:
-    """One solved flight: its cost with the held frames before it, velocity, place and circle (a, b) of eq. 6.3."""
+    """One solved flight.
+
+    Attributes:
+        cost: with the held frames before it.
+        velocity: (3,) m/s.
+        place: (3,) metres, p of eq. 6.3.
+        circle: a and b of eq. 6.3, (3,) metres each.
+        rate: rad/s of spin.
+        residual: metres, root mean square.
+        speed_sigma: m/s, one standard deviation.
+        frames: frames of flight.
+    """
 
     cost: float
     velocity: np.ndarray
@@ -107,7 +142,7 @@ class _Flight:
 
 
 class _Search:
-    """Flights for one throw; `air` is what drag and lift do to the marker, once a launch is known."""
+    """Flights for one throw. `air` is the effect of drag and lift on the marker, once a launch is known."""
 
     def __init__(self, marker, held: Held, fps: float, ball: Ball, radius: float):
         self.marker, self.held, self.fps, self.ball, self.radius = marker, held, fps, ball, radius
@@ -116,7 +151,11 @@ class _Search:
         self.air = np.zeros_like(marker)
 
     def flight(self, t0: float, end: float, rates: np.ndarray) -> _Flight | None:
-        """The flight from `t0` up to `end` for the best of `rates` (R,) rad/s of spin; None without frames."""
+        """Solve the flight from `t0` to `end` for the best of `rates` (R,) rad/s; None without frames.
+
+        For each rate a linear least-squares problem in p, v, a and b (4 x 3 unknowns), with the prior as four more
+        rows.
+        """
         used = self.seen & (self.times > t0) & (self.times <= end)
         count = int(np.count_nonzero(used))
         if count < _LEAST:
@@ -124,6 +163,7 @@ class _Search:
         tau = self.times[used] - t0
         wanted = self.marker[used] - self.air[used]
         wanted[:, 2] += 0.5 * self.ball.gravity * tau**2
+        # columns 1, t, cos(w t) and sin(w t) of eq. 6.3 for each spin rate w
         basis = np.empty((len(rates), count, 4))
         basis[..., 0], basis[..., 1] = 1.0, tau
         basis[..., 2], basis[..., 3] = np.cos(rates[:, None] * tau), np.sin(rates[:, None] * tau)
@@ -136,6 +176,7 @@ class _Search:
         prior = np.einsum("ki,ric->rkc", known, solved) - values
         cost = _robust(miss).sum(axis=-1) + np.sum(prior**2, axis=(-1, -2))
         k = int(np.argmin(cost))
+        # degrees of freedom: 3 coordinates a frame minus 12 unknowns
         excess = max(float(miss[k].sum()) / max(3 * count - 12, 1), 1.0)
         sigma = float(np.sqrt(np.linalg.inv(normal[k])[1, 1] * excess))
         residual = float(np.sqrt(miss[k].mean())) * _NOISE
@@ -145,14 +186,16 @@ class _Search:
                        residual=residual, speed_sigma=sigma, frames=count)
 
     def leaves(self, last: float) -> bool:
-        """Whether the marker is seen away from where the hand would have it, up to a first flight after `last`."""
+        """Return whether the marker is seen away from its held place, up to a first flight after `last`."""
         used = self.seen & (self.times <= last + _FIRST)
         away = np.linalg.norm(self.marker[used] - self.held.marker[used], axis=-1)
         return np.count_nonzero(away[-_LEAST:] > 3.0 * self.held.sigma) >= _LEAST
 
     def further_on(self, flight: _Flight, t0: float) -> float:
-        """What it costs that the marker is elsewhere in the next stretch than where this flight would be: a hand that
-        hardly moves yet also looks like a flight, but does not fly on."""
+        """Compute the cost of the marker's deviation from this flight in the next stretch.
+
+        A hand that hardly moves yet also looks like a flight, but does not continue as one.
+        """
         end = t0 + _FIRST
         used = self.seen & (self.times > end) & (self.times <= end + _FIRST)
         tau = (self.times[used] - t0)[:, None]
@@ -161,8 +204,7 @@ class _Search:
         return float(np.sum(_robust(away)))
 
     def _known(self, t0: float) -> tuple[np.ndarray, np.ndarray]:
-        """What is known beforehand, as four rows: where the marker leaves, how fast the hand is, how large the circle
-        can be."""
+        """Build the prior as four rows: where the marker leaves, the hand's speed, and the size of the circle."""
         there, velocity = _at(self.held.marker, self.fps, t0), _at(self.held.velocity, self.fps, t0)
         hand = max(_HAND_SPEED * float(np.linalg.norm(velocity)), 1.0)
         sure = 1.0 / self.held.sigma
@@ -171,30 +213,35 @@ class _Search:
         return known, np.stack([there * sure, velocity / hand, np.zeros(3), np.zeros(3)])
 
     def _held_cost(self, t0: float) -> float:
-        """What it costs that the marker is not where the hand would have it, up to `t0`."""
+        """Compute the cost of the marker's deviation from its held place, up to `t0`."""
         used = self.seen & (self.times > t0 - _HELD) & (self.times <= t0)
         away = np.sum((self.marker[used] - self.held.marker[used]) ** 2, axis=-1) / (0.5 * self.held.sigma) ** 2
         return float(np.sum(_robust(away)))
 
     def refined(self, flight: _Flight, t0: float, width: float, seconds: float) -> tuple[_Flight, float]:
-        """The flight with `seconds` of samples, its spin's rate and release time between those tried, and the air that
-        it meets; and its release time."""
+        """Refine a flight with `seconds` of samples: spin rate, release time and the effect of air.
+
+        Returns the flight and its release time.
+        """
         end = t0 + seconds
         for turn in range(4):
             self.air = _air(self.times, t0, flight.velocity, self._turning(flight, t0)[0], self.ball)
             rates = np.maximum(flight.rate + np.linspace(-width, width, 21), 1e-3)
             flight = self.flight(t0, end, rates) or flight
             width = max(width / 5.0, 0.05)
+            # release times are refined in ever smaller steps around the best
             step = (1.0, 0.5, 0.25, _FINE)[turn] / self.fps
             tried = [(self.flight(t, end, np.array([flight.rate])), t) for t in t0 + step * np.arange(-3, 4)]
             flight, t0 = min(((f, t) for f, t in [*tried, (flight, t0)] if f is not None), key=lambda ft: ft[0].cost)
         return flight, t0
 
     def _turning(self, flight: _Flight, t0: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Spin (3,) rad/s, offset (3,) m of the marker from the centre, and the centre (3,) m, at the release.
+        """Compute spin (3,) rad/s, offset (3,) metres of the marker from the centre, and the centre (3,) metres at the
+        release.
 
-        The circle's own plane gives the axis; what the marker has along it has two signs, of which the one is taken
-        that puts the centre nearer to where the hand has it."""
+        The plane of the circle gives the axis. The offset along it may have either sign; the one is taken that puts the
+        centre nearer to where the hand has it.
+        """
         a, b = flight.circle
         there, usual, radius = flight.place + a, _at(self.held.centre, self.fps, t0), self.radius
         axis = np.cross(a, b)
@@ -209,7 +256,7 @@ class _Search:
         return axis * flight.rate, offset, there - offset
 
     def told(self, flight: _Flight, t0: float, seconds: float) -> LaunchFit:
-        """The launch in its final form, with how uncertain its time is: as far as the cost grows by one."""
+        """Build the final launch; the uncertainty of its time is the shift at which the cost grows by one."""
         rate, end = np.array([flight.rate]), t0 + seconds
         sides = []
         for sign in (-1.0, 1.0):
@@ -224,13 +271,13 @@ class _Search:
 
 
 def _robust(squares: np.ndarray) -> np.ndarray:
-    """Squared misses, in noise, of which single large ones count less."""
+    """Reduce the weight of large squared misses (in units of noise)."""
     limit = _FAR**2
     return np.where(squares < limit, squares, limit * (1.0 + np.log(np.maximum(squares, limit) / limit)))
 
 
 def _at(values: np.ndarray, fps: float, t: float) -> np.ndarray:
-    """(3,): values (T, 3) at one time, by the parabola through the three frames nearest to it."""
+    """Interpolate values (T, 3) at one time, by the parabola through the three nearest frames."""
     k = int(np.clip(round(t * fps), 1, len(values) - 2))
     x = t * fps - k
     low, mid, high = values[k - 1], values[k], values[k + 1]
@@ -238,7 +285,9 @@ def _at(values: np.ndarray, fps: float, t: float) -> np.ndarray:
 
 
 def _air(times: np.ndarray, t0: float, velocity: np.ndarray, spin: np.ndarray, ball: Ball) -> np.ndarray:
-    """(T, 3) m by which the air moves a ball off the parabola, launched at `t0` with `velocity` (3,) and `spin`."""
+    """Simulate by how much air moves a ball off the parabola, (T, 3) metres, launched at `t0` with `velocity` and
+    `spin`.
+    """
     step = 0.002
     count = int(min(max(times[-1] - t0, step), 2.0 * _MORE[-1]) / step) + 2
     v, off, drift = np.array(velocity, float), np.zeros((count, 3)), np.zeros(3)

@@ -1,8 +1,8 @@
-"""The recipe: when and how a ball left the hand of a recorded throw (Fredriksson ch. 6).
+"""Estimate when and how a ball left the hand in a recorded throw (Fredriksson chapter 6).
 
-`release(trial, motion)` takes the markers and the motion that was solved from them. Where a marker sits on the ball and
-is seen in flight, time, way and spin are fitted to it; else the hand tells, less surely. Neither looks at the speed
-that the file's name may give: that stands beside the result, for comparison.
+`estimate_release(trial, motion)` takes the markers and the motion that was solved from them. Where a marker on the ball
+is visible in flight, release time, trajectory and spin are fitted to it; else the hand is the evidence, with more
+uncertainty. Neither uses the speed that the file name may give: that is reported beside the result, for comparison.
 """
 
 from __future__ import annotations
@@ -26,20 +26,23 @@ from .launch_fit import Held, fit_launch
 from .throwing_hand import HandBall, ball_in_hand, by_distance, fastest, place_ball, sharpened, speeds, steady_speeds
 from .without_ball import HOLD, release_by_hand
 
-FEWEST = 12  # frames without which no throw is looked for
-SLOWEST = 1.5  # m/s: a hand that is never faster throws nothing
+FEWEST = 12  # frames that a trial with a throw must have
+SLOWEST = 1.5  # m/s that a throwing hand must reach
 _BALL_LABEL = re.compile(r"^(base|tennis|hand|foot|soft)?[ _-]?ball[ _-]?\d*$", re.I)
-_HELD = (0.15, 0.015)  # s before the first guess: the marker stands still in the hand
-_NEARBY = 0.3  # s before a hand is fastest: the ball is in it
-_TELLS, _LARGER = 10, 1.25  # frames of flight that tell a circle, and radii beyond which it is another ball's
-_AIR = 0.25  # of what the air makes, how uncertain it is
-_REACHES = 0.35  # m from the palm, within which a marker may be on a ball that the hand holds
-_BESIDE = 1.5  # m, between the middle of the markers and that of the joints
+_HELD = (0.15, 0.015)  # s before the first guess, between which the marker is fixed in the hand
+_NEARBY = 0.3  # s before a hand is fastest in which it holds the ball
+# Frames of flight that determine the marker's circle, and radii from which on it is another ball's.
+_TELLS, _LARGER = 10, 1.25
+_AIR = 0.25  # uncertainty of the effect of air, as a share of it
+_REACHES = 0.35  # metres from the palm, within which a marker may be on a held ball
+_BESIDE = 1.5  # metres between the middle of the markers and that of the joints, at most
 _LONGEST = 8.0  # s of flight until the ground
-_SURE, _UNSURE = 0.006, 0.05  # m, where the marker leaves: held and seen, or never seen in the hand
+# Uncertainty in metres of where the marker leaves: visible in the hand, or never visible there.
+_SURE, _UNSURE = 0.006, 0.05
 
 MPH, KMH = 0.44704, 1.0 / 3.6
-SLOWEST_THROW, FASTEST_THROW = 2.0, 55.0  # m/s: what a ball out of a hand can have; a number outside is something else
+# m/s that a thrown ball can have; a number outside is no speed.
+SLOWEST_THROW, FASTEST_THROW = 2.0, 55.0
 
 # pitcher_session_height(in)_weight(lb)_number_kind_speed(tenths of mph), as in the OpenBiomechanics Project
 _PITCH = re.compile(r"^\d{5,6}_\d{5,6}_\d{2,3}_\d{2,3}_\d{1,3}_[A-Za-z]{2}_(\d{3,4})$")
@@ -51,9 +54,13 @@ _UNITS = {"mph": MPH, "kmh": KMH, "kph": KMH, "km_h": KMH, "mps": 1.0, "m_s": 1.
 class ReleaseSettings:
     """What is known beforehand.
 
-    ball_marker: label, None to find one named as a ball, "" for none. radius: m, None for the kind's, or fitted where
-    the markers tell it. hand: "left", "right" or None for the one that throws. ball: one of `THROWN`. window: s about
-    the first guess that are searched. centre: (3,) m, the ball's centre in the hand's frame where other throws told it.
+    Attributes:
+        ball_marker: label; None to find one named as a ball, "" for none.
+        radius: metres; None for that of the ball's kind, or fitted where the markers determine it.
+        hand: "left" or "right"; None for the one that throws.
+        ball: one of `THROWN`.
+        window: s before and after the first guess that are searched.
+        centre: (3,) metres, the ball's centre in the hand's frame, where known from other throws.
     """
 
     ball_marker: str | None = None
@@ -66,15 +73,31 @@ class ReleaseSettings:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Release:
-    """How the ball left.
+    """How the ball left the hand.
 
-    time: s from the trial's first frame. frame: the nearest one. position (3,) m and velocity (3,) m/s of its centre,
-    spin (3,) rad/s, zero where nothing tells it. time_sigma: s, speed_sigma: m/s and way_sigma: rad of the direction,
-    one standard deviation each. side: of the hand. how: "ball" where its marker told, "hand" where only the hand did.
-    residual: m of its marker in flight, NaN without. flight_frames: in which it was seen to fly. radar: m/s that the
-    file's name tells, or None. centre: (3,) m in the hand's frame, radius: m. path: the ball in all frames. impact:
-    (3,) m, where it first meets the ground, or None. hips: (3,) m in the first frame. notes: lines for people. All
-    places are in the motion's space, over its own floor; markers may be shifted from it."""
+    All places are in the motion's space, above its own floor; markers may be shifted from it.
+
+    Attributes:
+        time: s from the trial's first frame.
+        frame: the nearest frame.
+        position: (3,) metres, the ball's centre at the release.
+        velocity: (3,) m/s.
+        spin: (3,) rad/s, zero where unknown.
+        time_sigma: s, one standard deviation.
+        speed_sigma: m/s, one standard deviation.
+        direction_sigma: rad, one standard deviation.
+        side: of the hand, "left" or "right".
+        method: "ball" if estimated from the ball's marker, "hand" if from the hand alone.
+        residual: metres of the ball's marker in flight, NaN without.
+        flight_frames: frames in which the marker is visible in flight.
+        radar: m/s from the file name, or None.
+        centre: (3,) metres, the ball's centre in the hand's frame.
+        radius: metres.
+        path: the ball in all frames.
+        impact: (3,) metres, where it first meets the ground, or None.
+        hips: (3,) metres in the first frame.
+        notes: messages for people.
+    """
 
     time: float
     frame: int
@@ -98,16 +121,16 @@ class Release:
 
     @property
     def speed(self) -> float:
-        """m/s at the release."""
+        """Speed at the release, m/s."""
         return float(np.linalg.norm(self.velocity))
 
     @property
     def direction(self) -> np.ndarray:
-        """Unit (3,)."""
+        """Direction of the release, unit (3,)."""
         return self.velocity / max(self.speed, 1e-9)
 
     def report(self) -> dict:
-        """The figures, for JSON."""
+        """Return the figures of the release, as values for JSON."""
         return {"release_time_s": self.time, "release_frame": self.frame, "speed_m_s": self.speed,
                 "direction": self.direction.tolist(), "uncertainty_s": self.time_sigma,
                 "uncertainty_m_s": self.speed_sigma, "uncertainty_deg": float(np.degrees(self.way_sigma)),
@@ -121,10 +144,18 @@ class Release:
 
 
 def release(trial: MarkerTrial, motion: Motion, settings: ReleaseSettings = ReleaseSettings()) -> Release:
-    """When and how the ball left the hand.
+    """Estimate when and how the ball left the hand.
 
-    motion: solved from the trial, frame for frame, or at another rate over the same time. InputError: a motion of
-    another length, a skeleton without hands, a ball's marker that is not there, a kind of ball that is not known."""
+    Args:
+        trial: the recorded markers.
+        motion: solved from the trial, frame by frame, or at another rate over the same time.
+        settings: what is known beforehand.
+    Returns:
+        The release.
+    Raises:
+        InputError: if the motion has another length, the skeleton has no hands, the ball's marker does not exist, the
+            kind of ball is unknown, or no throw is found.
+    """
     ball = THROWN.get(settings.ball)
     if ball is None:
         raise InputError("release", f"ball {settings.ball!r}", f"one of {', '.join(THROWN)}")
@@ -153,26 +184,29 @@ def release(trial: MarkerTrial, motion: Motion, settings: ReleaseSettings = Rele
 
 
 def _believed(found: _Found | None, hand: Hand, marker, label, radius, settings: ReleaseSettings, name: str, notes):
-    """What the marker told, None where it was on no ball in this hand. InputError where the user said that it was."""
+    """Return the launch fitted to the marker; None where the marker was on no ball in this hand.
+
+    Raises InputError where the user chose that marker or hand.
+    """
     away = _away(hand, marker, found)
     if away <= _REACHES:
         if found is None:
-            notes.append(f"{label} is not seen in flight: the hand alone tells of the release")
+            notes.append(f"{label} is not visible in flight: the release is estimated from the hand alone")
         elif found.frames >= _TELLS and found.circle > _LARGER * radius:
             notes.append(
-                f"{label} goes round {1000.0 * found.circle:.0f} mm from the ball's centre, and a {settings.ball} is "
-                "smaller: say its radius or kind"
+                f"{label} circles {1000.0 * found.circle:.0f} mm from the ball's centre, but a {settings.ball} is "
+                "smaller: set its radius or kind"
             )
         return found
     said = f"{label} is {away:.2f} m from the {hand.side} hand"
     if settings.ball_marker or settings.hand:
         raise InputError(name, said, "a marker on the ball in that hand", "check the marker and the hand")
-    notes.append(f"{said}: the hand alone tells of the release")
+    notes.append(f"{said}: the release is estimated from the hand alone")
     return None
 
 
 def _check_throws(hand: Hand, name: str) -> None:
-    """InputError where the hand is never fast enough to throw."""
+    """Raise InputError if the hand is never fast enough for a throw."""
     pace = float(np.max(steady_speeds(hand.origin, hand.fps)))
     if pace < SLOWEST:
         raise InputError(name, f"a {hand.side} hand of at most {pace:.1f} m/s", "a throw",
@@ -180,7 +214,7 @@ def _check_throws(hand: Hand, name: str) -> None:
 
 
 def _check_near(trial: MarkerTrial, motion: Motion) -> None:
-    """InputError where the markers are elsewhere than the motion's body."""
+    """Raise InputError if the markers are elsewhere than the motion's body."""
     places, _ = forward_kinematics(motion)
     often = trial.seen.mean(axis=0) > 0.5
     markers = trial.positions[:, often]
@@ -188,12 +222,14 @@ def _check_near(trial: MarkerTrial, motion: Motion) -> None:
         return
     away = np.linalg.norm(np.nanmedian(markers, axis=(0, 1)) - np.median(places, axis=(0, 1)))
     if away > _BESIDE:
-        raise InputError(trial.name, f"markers {away:.1f} m beside the motion",
-                         "the motion that was made from this trial", "reconstruct the trial first")
+        raise InputError(trial.name, f"markers {away:.1f} m away from the motion",
+                         "the motion of this trial", "reconstruct the trial first")
 
 
 def _away(hand: Hand, marker: np.ndarray, found: _Found | None) -> float:
-    """m from the hand to the ball's marker: while it is held where it is seen then, else to where the flight begins."""
+    """Measure the distance in metres from hand to ball marker: while held if visible then, else at the start of the
+    flight.
+    """
     held = _held_frames(hand, marker)
     palm = hand.carried(HOLD * hand.reach * hand.finger)
     if held.sum() >= 3:
@@ -206,7 +242,7 @@ def _away(hand: Hand, marker: np.ndarray, found: _Found | None) -> float:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class _Found:
-    """A launch, in the markers' space, and how sure it is."""
+    """A launch in the markers' space, with its uncertainties."""
 
     launch: Launch
     ball: Ball
@@ -220,7 +256,7 @@ class _Found:
 
 
 def _result(found: _Found, hand: Hand, motion: Motion, lies: HandBall, seen, name: str, notes) -> Release:
-    """The launch in the motion's space, with all that follows from it."""
+    """Build the release: the launch in the motion's space, with ball path and impact."""
     launch = replace(found.launch, position=found.launch.position - hand.shift)
     home = replace(hand, origin=hand.origin - hand.shift)
     ground = ground_height(motion)
@@ -237,6 +273,7 @@ def _result(found: _Found, hand: Hand, motion: Motion, lies: HandBall, seen, nam
 
 
 def _frame_for_frame(trial: MarkerTrial, motion: Motion) -> Motion:
+    """Return the motion with one frame for each frame of the trial; raise InputError where the lengths do not match."""
     if len(motion) == len(trial):
         return Motion(motion.skeleton, motion.root_positions, motion.rotations, trial.fps)
     if abs(motion.fps - trial.fps) > 0.01 * trial.fps:
@@ -246,12 +283,12 @@ def _frame_for_frame(trial: MarkerTrial, motion: Motion) -> Motion:
             return Motion(other.skeleton, other.root_positions[at], other.rotations[at], other.fps)
     raise InputError(
         trial.name, f"{len(trial)} frames at {trial.fps:g} per second, and a motion of {len(motion)} at {motion.fps:g}",
-        "the motion that was made from this trial", "reconstruct the trial first",
+        "the motion of this trial", "reconstruct the trial first",
     )  # fmt: skip
 
 
 def _ball_label(trial: MarkerTrial, asked: str | None) -> str | None:
-    """The ball's marker: the one asked for, else the most often seen that is named as a ball."""
+    """Return the ball's marker: the requested one, else the most often visible one with the name of a ball, or None."""
     if asked:
         trial.index(asked)
         return asked
@@ -262,7 +299,7 @@ def _ball_label(trial: MarkerTrial, asked: str | None) -> str | None:
 
 
 def _throwing(hands: list[Hand], marker: np.ndarray | None) -> Hand:
-    """The hand in which the ball's marker is before it flies; without a marker the faster one."""
+    """Choose the hand in which the ball's marker is before the flight; without a marker the faster one."""
     peaks = [fastest(hand.origin, hand.fps) for hand in hands]
     fast = max(range(len(hands)), key=lambda i: speeds(hands[i].origin, hands[i].fps)[peaks[i]])
     if marker is None or len(hands) == 1:
@@ -272,7 +309,9 @@ def _throwing(hands: list[Hand], marker: np.ndarray | None) -> Hand:
 
 
 def _distance(hand: Hand, marker: np.ndarray, peak: int) -> float:
-    """m between hand and marker shortly before the hand is fastest; infinite where it is hardly seen then."""
+    """Measure the distance in metres between hand and marker shortly before the hand is fastest; inf where hardly
+    visible.
+    """
     away = np.linalg.norm(marker - hand.carried(HOLD * hand.reach * hand.finger), axis=-1)
     away = away[max(peak - int(_NEARBY * hand.fps), 0) : peak + 1]
     away = away[np.isfinite(away)]
@@ -280,8 +319,8 @@ def _distance(hand: Hand, marker: np.ndarray, peak: int) -> float:
 
 
 def _in_hand(hand: Hand, marker, settings: ReleaseSettings, ball: Ball) -> tuple[HandBall, list[str]]:
-    """Where the ball lies in the hand, and what is to be told of it."""
-    # out of the palm, at rest: downwards for arms that are spread at rest, unknown otherwise
+    """Estimate where the ball lies in the hand; return it with messages."""
+    # direction out of the palm at rest: downwards if the rest pose spreads the arms, else unknown
     palm = np.array([0.0, 0.0, -1.0]) if abs(hand.finger[1]) > 0.9 else None
     usual = usual_centre(hand.finger, hand.reach, palm)
     radius = settings.radius or ball.radius
@@ -291,25 +330,26 @@ def _in_hand(hand: Hand, marker, settings: ReleaseSettings, ball: Ball) -> tuple
         return HandBall(usual, radius, 0.03), []
     held = _held_frames(hand, marker)
     lies = ball_in_hand(hand.taken_back(marker)[held], radius, usual, fit_radius=settings.radius is None)
-    told = [f"the ball's radius is {1000.0 * lies.radius:.0f} mm by its marker"] if lies.fitted else []
+    told = [f"the ball's radius is {1000.0 * lies.radius:.0f} mm, fitted to its marker"] if lies.fitted else []
     return lies, told
 
 
 def _held_frames(hand: Hand, marker: np.ndarray) -> np.ndarray:
-    """(T,) bool: shortly before the first guess, where the marker is seen."""
+    """Return (T,) bool: the frames shortly before the first guess in which the marker is visible."""
     last = _guess(hand, marker)
     times = hand.times
     return np.isfinite(marker).all(axis=-1) & (times > last - _HELD[0]) & (times < last - _HELD[1])
 
 
 def _guess(hand: Hand, marker: np.ndarray) -> float:
+    """Guess the release time in s, from the marker's distance, else from the hand's speed."""
     knuckles = hand.carried(HOLD * hand.reach * hand.finger)
     frame = by_distance(knuckles, marker, hand.fps)
     return (fastest(knuckles, hand.fps) if frame is None else frame) / hand.fps
 
 
 def _by_ball(hand: Hand, marker, lies: HandBall, ball: Ball, settings: ReleaseSettings, notes) -> _Found | None:
-    """By the marker on the ball; None where it is not seen to fly."""
+    """Fit the launch to the marker on the ball; None where it is not visible in flight."""
     held = _held_frames(hand, marker)
     sure = bool(held.sum() >= 3)
     place = np.nanmedian(hand.taken_back(marker)[held], axis=0) if sure else lies.centre
@@ -317,7 +357,7 @@ def _by_ball(hand: Hand, marker, lies: HandBall, ball: Ball, settings: ReleaseSe
     velocity = np.gradient(centre, 1.0 / hand.fps, axis=0)
     course = Held(hand.carried(place), centre, velocity, _SURE if sure else _UNSURE)
     guess = _guess(hand, marker)
-    # without air as eq. 6.2 has it; which of both is nearer to what was seen is taken
+    # also without air, as in eq. 6.2; the fit with the smaller residual is taken
     without_air = replace(ball, drag=0.0, lift=(0.0, *ball.lift[1:]))
     fits = [(fit_launch(marker, course, hand.fps, guess=guess, ball=air, radius=lies.radius,
                         window=settings.window), air)
@@ -326,7 +366,7 @@ def _by_ball(hand: Hand, marker, lies: HandBall, ball: Ball, settings: ReleaseSe
         return None
     fit, ball = min(fits, key=lambda found: (-round(found[0].seconds, 3), found[0].residual))
     if not sure:
-        notes.append("the ball's marker is not seen in the hand: the release is where the flight meets the hand")
+        notes.append("the ball's marker is not visible in the hand: the release is where the flight meets the hand")
     launch = Launch(fit.time, fit.position, fit.velocity, fit.spin)
     air = float(np.linalg.norm(fits[0][0].velocity - fits[1][0].velocity))
     speed_sigma = float(np.hypot(fit.speed_sigma, _AIR * air))
@@ -336,26 +376,33 @@ def _by_ball(hand: Hand, marker, lies: HandBall, ball: Ball, settings: ReleaseSe
 
 
 def _by_hand(hand: Hand, motion: Motion, lies: HandBall, ball: Ball, notes) -> _Found:
+    """Estimate the launch from the hand alone."""
     found = release_by_hand(hand, lies.radius, _stride(motion))
     if not hand.markers:
-        notes.append("no markers near the hand: the motion tells alone, which its filter has made slower")
+        notes.append("no markers near the hand: only the filtered motion is used, so the speed comes out too low")
     launch = Launch(found.time, found.position, found.velocity)
     return _Found(launch=launch, ball=ball, how="hand", time_sigma=found.time_sigma, speed_sigma=found.speed_sigma,
                   way_sigma=found.way_sigma)
 
 
 def _stride(motion: Motion) -> np.ndarray:
-    """(T, 2) m, level: from one foot to the other."""
+    """Compute the level vector from the right foot to the left, (T, 2) metres."""
     body = identify(motion.skeleton)
     places, _ = forward_kinematics(motion)
     return places[:, body.left.foot, :2] - places[:, body.right.foot, :2]
 
 
 def radar_speed(name: str) -> float | None:
-    """m/s out of a file's name without its ending, or None where it tells no speed for certain.
+    """Parse a measured speed from a file name.
 
-    `000000_000000_74_195_002_FF_808` is a pitch of 80.8 mph; `throw_130kmh`, `throw-36.1mps`, `ff_81mph` say it with a
-    unit. Two different speeds in one name are none."""
+    `000000_000000_74_195_002_FF_808` is a pitch of 80.8 mph; `throw_130kmh`, `throw-36.1mps`, `ff_81mph` contain a
+    unit.
+
+    Args:
+        name: the file name without its ending.
+    Returns:
+        m/s; None where there is no clear speed, or two different ones.
+    """
     pitch = _PITCH.match(name)
     if pitch:
         return _possible_speed(int(pitch[1]) / 10.0 * MPH)

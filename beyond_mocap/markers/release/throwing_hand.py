@@ -1,11 +1,9 @@
-"""The hand that throws, frame by frame: sharper by the markers that it carries than its joint of a solved motion; how
-the ball lies in it and goes with it, and a first guess of when it leaves.
+"""The throwing hand, frame by frame, from its own markers; where the ball lies in it, and a first guess of the release.
 
-A solved motion is filtered, which takes off the very peak that a throw is about; the hand's markers are not. Where at
-least three markers near the wrist are seen, the hand's frame is the one that carries them (eq. 3.14), else the
-motion's. The ball's centre in that frame follows from a marker on its surface (eq. 6.1). The paper prints a radius of
-0.37, which is 0.037 m in decimetres; here it is a parameter, and is fitted where the marker was at enough different
-places of the ball.
+A solved motion is filtered, which removes the very peak of a throw; the hand's markers are not filtered. Where at least
+three markers near the wrist are visible, they give the hand's frame (eq. 3.14), else the motion does. The ball's centre
+in that frame follows from a marker on its surface (eq. 6.1). The paper prints a radius of 0.37, which is 0.037 m in
+decimetres; here it is a parameter, and is fitted where the marker was at enough different places of the ball.
 """
 
 from __future__ import annotations
@@ -22,34 +20,41 @@ from ...motion.hand import Hand
 from ..frames import rigid_fit
 from ..trial import MarkerTrial
 
-NEAR = 0.14  # m from the wrist within which a marker belongs to the hand
-_PASSES = 4
-_LIFTS = sorted(np.arange(-40, 41) / 100.0, key=abs)  # m
-_BEHIND = 0.02  # m nearer to the elbow than the wrist is, where the forearm's markers begin
-_KNUCKLES = (0.055, 0.115)  # m from the wrist: a marker there sits on the metacarpals' heads
+NEAR = 0.14  # metres from the wrist within which a marker belongs to the hand
+_PASSES = 4  # iterations of places and shift
+_LIFTS = sorted(np.arange(-40, 41) / 100.0, key=abs)  # metres, vertical shifts that are tried, small ones first
+_BEHIND = 0.02  # metres nearer to the elbow than the wrist; from there on markers belong to the forearm
+_KNUCKLES = (0.055, 0.115)  # metres from the wrist, where a marker is on the heads of the metacarpals
 _REACH_OF_KNUCKLES = 2.22  # fingers are 1.22 times the third metacarpal, Buchholz et al. 1992 (see `without_ball`)
-_TORN = 4.0  # times the usual misfit of the hand's markers, above which one of them is not where it should be
-_STEADY = 0.012  # m, spread in the hand's frame below which a marker is the hand's
+_TORN = 4.0  # multiples of the usual misfit of the hand's markers, above which one of them is misplaced
+_STEADY = 0.012  # metres of spread in the hand's frame, below which a marker belongs to the hand
 
-_USUAL_SIGMA = 0.03  # m, how sure that is
-_SIGMA = 0.003  # m, a marker's distance from the centre against the radius
-_LEAST_SPREAD = 0.5  # of the radius, the smallest spread of the markers that tells it
-_SIZES = (0.5, 2.0)  # of the expected radius
-_ROUNDS = 40
+_USUAL_SIGMA = 0.03  # metres, uncertainty of the usual place of a ball's centre
+_SIGMA = 0.003  # metres, deviation of a marker's distance from the centre from the radius
+_LEAST_SPREAD = 0.5  # spread of the marker's places, as a share of the radius, from which on it is fitted
+_SIZES = (0.5, 2.0)  # range of a fitted radius, as shares of the expected one
+_ROUNDS = 40  # Gauss-Newton steps at most
 
-_SETTLES = 0.10  # s before the release from which on the ball moves from its usual place to where it leaves
+_SETTLES = 0.10  # s before the release in which the ball moves from its usual place to where it leaves
 _FOLLOWED = 10.0  # s of flight, bounces and rolling at most
 
-GROWS = 1.1  # the ball has left once its marker is that much further from the hand than while held (Fredriksson §6.2)
-_BEFORE = (0.30, 0.05)  # s before the hand is fastest: the ball is held there
-_STAYS = 3  # frames for which it is further away
+GROWS = 1.1  # distance from hand to marker, relative to the held one, at which the ball has left (section 6.2)
+_BEFORE = (0.30, 0.05)  # s before the hand is fastest, between which the ball is held
+_STAYS = 3  # frames for which the distance must stay larger
 
 
 def sharpened(hand: Hand, trial: MarkerTrial, never: tuple[str, ...] = ()) -> Hand:
-    """The hand as its own markers have it, in every frame in which they tell.
+    """Replace the hand's motion by that of its own markers, in every frame in which they determine it.
 
-    trial: as many frames, at even times. never: labels that are no part of the hand (the ball's). A constant shift of
-    the motion against the markers, as setting feet on the floor makes, is found and taken off."""
+    A constant shift of the motion against the markers, as from placing feet on the floor, is found and removed.
+
+    Args:
+        hand: the hand of a solved motion, T frames.
+        trial: T frames, evenly spaced.
+        excluded: labels that are not on the hand (the ball's).
+    Returns:
+        The hand with origin, rotation and reach from its markers.
+    """
     lift = _lift(hand, trial, never)
     names, seen = _near(replace(hand, origin=hand.origin + lift, elbow=hand.elbow + lift), trial, never)
     if not names:
@@ -64,7 +69,7 @@ def sharpened(hand: Hand, trial: MarkerTrial, never: tuple[str, ...] = ()) -> Ha
     tells = fit.sound & (fit.rms < max(_TORN * _usual(fit.rms), _STEADY))
     known = np.isfinite(seen).all(axis=-1) & ~(fit.sound & ~tells)[:, None]
     off = np.where(known[..., None], seen - _placed(hand, shift, places), 0.0).sum(axis=1)
-    off = off / np.maximum(known.sum(axis=1), 1)[:, None]  # one or two markers move it, and cannot turn it
+    off = off / np.maximum(known.sum(axis=1), 1)[:, None]  # one or two markers can move the hand, but not rotate it
     return replace(moved, reach=_reach(hand, places), origin=np.where(tells[:, None], fit.shift, moved.origin + off),
                    rotation=np.where(tells[:, None, None], fit.rotation, moved.rotation), markers=names)
 
@@ -75,7 +80,7 @@ def _usual(values: np.ndarray) -> float:
 
 
 def _reach(hand: Hand, places: np.ndarray) -> float:
-    """m from wrist to fingertip: the skeleton's, and what a marker on the knuckles tells, each as good as the other."""
+    """Estimate the length in metres from wrist to fingertip: mean of the skeleton's and that from a knuckle marker."""
     along = places @ hand.finger
     knuckles = along[(along > _KNUCKLES[0]) & (along < _KNUCKLES[1])]
     return hand.reach if not len(knuckles) else 0.5 * (hand.reach + _REACH_OF_KNUCKLES * float(np.median(knuckles)))
@@ -86,8 +91,10 @@ def _placed(hand: Hand, shift: np.ndarray, places: np.ndarray) -> np.ndarray:
 
 
 def _lift(hand: Hand, trial: MarkerTrial, never: tuple[str, ...]) -> np.ndarray:
-    """(3,) m, upwards: by what the motion stands too low for the markers, as far as their distances from the wrist
-    tell: those of the hand's own markers do not change."""
+    """Find the vertical shift (3,) metres between motion and markers.
+
+    With the right shift, the distances of the hand's own markers from the wrist do not change over time.
+    """
     often = np.count_nonzero(trial.seen[:: max(len(trial) // 300, 1)], axis=0) > 2
     kept = [number for number, label in enumerate(trial.labels) if label not in never and often[number]]
     few = trial.positions[:: max(len(trial) // 300, 1), kept]
@@ -105,7 +112,7 @@ def _lift(hand: Hand, trial: MarkerTrial, never: tuple[str, ...]) -> np.ndarray:
 
 
 def _near(hand: Hand, trial: MarkerTrial, never: tuple[str, ...]) -> tuple[tuple[str, ...], np.ndarray]:
-    """Labels of the markers that stay with the hand, and their places (T, M, 3) m."""
+    """Select the markers that stay with the hand: labels and places (T, M, 3) metres."""
     away = np.linalg.norm(trial.positions - hand.origin[:, None, :], axis=-1)
     forearm = float(np.median(np.linalg.norm(hand.origin - hand.elbow, axis=-1)))
     kept = []
@@ -123,8 +130,14 @@ def _near(hand: Hand, trial: MarkerTrial, never: tuple[str, ...]) -> tuple[tuple
 
 @dataclass(frozen=True, eq=False)
 class HandBall:
-    """centre: (3,) m in the hand's frame. radius: m. sigma: m, how uncertain the centre is. fitted: whether the radius
-    is."""
+    """Where a ball lies in the hand.
+
+    Attributes:
+        centre: (3,) metres in the hand's frame.
+        radius: metres.
+        sigma: metres, uncertainty of the centre.
+        is_radius_fitted: whether the radius was fitted.
+    """
 
     centre: np.ndarray
     radius: float
@@ -133,37 +146,45 @@ class HandBall:
 
 
 def ball_in_hand(points: np.ndarray, radius: float, usual: np.ndarray, fit_radius: bool = False) -> HandBall:
-    """The centre that has all `points` (N, 3) m, markers in the hand's frame, on its surface (eq. 6.1).
+    """Fit the centre of a sphere that has all points on its surface.
 
-    points: of one throw or, better, of several, in each of which the marker was elsewhere on the ball. A single place
-    leaves the centre anywhere on a sphere about it: then `usual` (3,) m, where balls usually lie, chooses. radius: m,
-    or what is expected. fit_radius: find it too, where the places are far enough apart to tell it."""
+    Args:
+        points: (N, 3) metres, markers in the hand's frame, of one throw or, better, of several with the marker
+            elsewhere on the ball.
+        radius: metres, known or expected.
+        usual_centre: (3,) metres, where balls usually lie; it decides where one place leaves the centre undetermined.
+        fit_radius: fit the radius too, where the places are far enough apart.
+    Returns:
+        The ball in the hand.
+    Source: Fredriksson section 6.1, equation (6.1).
+    """
     points = np.asarray(points, float).reshape(-1, 3)
     points = points[np.isfinite(points).all(axis=-1)]
     if not len(points):
         return HandBall(np.asarray(usual, float), radius, _USUAL_SIGMA)
-    places = points[:: max(len(points) // 400, 1)]  # neighbours in time say the same
+    places = points[:: max(len(points) // 400, 1)]  # neighbours in time add no information
     spread = float(np.median(np.linalg.norm(places - np.median(places, axis=0), axis=-1)))
     found = None
     if fit_radius and len(places) >= 4 and spread > _LEAST_SPREAD * radius:
         found = _fitted(places, radius, usual, True)
         off = np.abs(np.linalg.norm(places - found.centre, axis=-1) - found.radius)
         if not (_SIZES[0] * radius < found.radius < _SIZES[1] * radius and np.median(off) < _SIGMA):
-            found = None  # points that are no ball of this kind
+            found = None  # the points do not fit a ball of this kind
     return found or _fitted(places, radius, usual, False)
 
 
 def _fitted(places: np.ndarray, radius: float, usual: np.ndarray, fitted: bool) -> HandBall:
-    """Gauss-Newton from the usual side."""
+    """Fit the sphere by Gauss-Newton, started on the usual side of the markers."""
     mean = places.mean(axis=0)
-    toward = np.asarray(usual, float) - mean  # on this side of the markers' mean the usual centre is
+    toward = np.asarray(usual, float) - mean  # from the markers' mean to the usual centre
+    # unknowns: centre (3) and radius
     value = np.append(mean + toward * (radius / max(np.linalg.norm(toward), 1e-9)), radius)
     pull = np.append(np.full(3, 1.0 / _USUAL_SIGMA**2), 0.0)
     for _ in range(_ROUNDS):
         arms = value[:3] - places
         length = np.maximum(np.linalg.norm(arms, axis=-1), 1e-9)
         miss = length - value[3]
-        weight = 1.0 / (_SIGMA**2 * (1.0 + (miss / (3.0 * _SIGMA)) ** 2))  # what lies far off counts less
+        weight = 1.0 / (_SIGMA**2 * (1.0 + (miss / (3.0 * _SIGMA)) ** 2))  # outliers have less weight
         slope = np.column_stack([arms / length[:, None], np.full(len(places), -1.0 if fitted else 0.0)])
         normal = np.einsum("n,ni,nj->ij", weight, slope, slope) + np.diag(pull) + np.diag([1.0, 1.0, 1.0, 1e-3])
         toward = np.einsum("n,ni,n->i", weight, slope, miss) + pull * (value - np.append(usual, 0.0))
@@ -176,10 +197,20 @@ def _fitted(places: np.ndarray, radius: float, usual: np.ndarray, fitted: bool) 
 
 
 def place_ball(hand: Hand, centre: np.ndarray, launch: Launch, ball: Ball, ground: float = 0.0) -> np.ndarray:
-    """(T, 3) m: the ball's centre in every frame of the hand.
+    """Place the ball in every frame of the hand.
 
-    centre: (3,) m, where the ball lies in the hand's frame. launch: how it leaves, s from frame 0. Shortly before, the
-    ball goes over to the place of the launch on a spline in the hand's frame, without a jump in place or speed."""
+    Shortly before the release, the ball moves to the place of the launch on a spline in the hand's frame, without a
+    jump in place or speed.
+
+    Args:
+        hand: T frames.
+        centre: (3,) metres, where the ball lies in the hand's frame.
+        launch: how it leaves, s from frame 0.
+        ball: its physics.
+        ground: metres, height of the ground.
+    Returns:
+        (T, 3) metres, the ball's centre.
+    """
     times = hand.times
     held = hand.carried(centre)
     leaves = _held_at(held, hand.fps, launch.time)
@@ -196,35 +227,53 @@ def place_ball(hand: Hand, centre: np.ndarray, launch: Launch, ball: Ball, groun
 
 
 def _held_at(held: np.ndarray, fps: float, time: float) -> np.ndarray:
-    """(3,): where it is at a time between two frames."""
+    """Interpolate a place (3,) at a time between two frames."""
     at = np.clip(time * fps, 0.0, len(held) - 1.0)
     low = min(int(at), len(held) - 2)
     return held[low] + (at - low) * (held[low + 1] - held[low])
 
 
 def speeds(places: np.ndarray, fps: float) -> np.ndarray:
-    """(T,) m/s of a point (T, 3) m, by differences over two frames."""
+    """Compute the speed of a point by differences over two frames.
+
+    Args:
+        places: (T, 3) metres.
+        fps: frames per second.
+    Returns:
+        (T,) m/s.
+    """
     if len(places) < 2:
         return np.zeros(len(places))
     return np.linalg.norm(np.gradient(places, 1.0 / fps, axis=0), axis=-1)
 
 
 def steady_speeds(places: np.ndarray, fps: float) -> np.ndarray:
-    """`speeds`, of which single frames that are off are taken out."""
+    """Compute speeds like `compute_speeds`, with single outlier frames removed by a median filter.
+
+    Returns:
+        (T,) m/s.
+    """
     from scipy.signal import medfilt
 
     return medfilt(speeds(places, fps), 5)
 
 
 def fastest(places: np.ndarray, fps: float) -> int:
-    """The frame in which a point (T, 3) m is fastest, single outliers left aside."""
+    """Find the frame in which a point (T, 3) metres is fastest, ignoring single outliers."""
     return int(np.argmax(steady_speeds(places, fps)))
 
 
 def by_distance(hand: np.ndarray, marker: np.ndarray, fps: float) -> int | None:
-    """The frame from which on the ball's marker (T, 3) m is 10 % further from the hand (T, 3) m than while held.
+    """Find the frame from which on the ball's marker is 10 % further from the hand than while held.
 
-    None where it never is, or is not seen often enough to tell."""
+    Args:
+        hand: (T, 3) metres.
+        marker: (T, 3) metres, NaN where not visible.
+        fps: frames per second.
+    Returns:
+        The frame; None if there is none, or the marker is visible too rarely.
+    Source: Fredriksson section 6.2.
+    """
     away = np.linalg.norm(marker - hand, axis=-1)
     seen = np.flatnonzero(np.isfinite(away))
     if len(seen) < 2 * _STAYS:
@@ -233,7 +282,7 @@ def by_distance(hand: np.ndarray, marker: np.ndarray, fps: float) -> int | None:
     first, last = (max(peak - int(round(seconds * fps)), 0) for seconds in _BEFORE)
     held = away[first : max(last, first + 1)]
     held = held[np.isfinite(held)]
-    if not len(held):  # hidden by the fingers: as near as it ever comes
+    if not len(held):  # hidden by the fingers: the smallest distances are used instead
         held = np.sort(away[seen])[: max(len(seen) // 20, 3)]
     further = away[seen] > GROWS * np.median(held)
     left = [a for a, b in runs(further) if b - a >= _STAYS and seen[a] >= first]

@@ -1,21 +1,20 @@
-"""When and how fast a ball leaves the hand, told by the hand alone: for recordings in which the ball bears no marker.
+"""Estimate when and how fast a ball leaves the hand from the hand alone, for recordings without a marker on the ball.
 
-Fingers push a ball and cannot pull it. It stays with them as long as their tips go faster and faster in the direction
-of the throw, and leaves when they no longer do: at the peak of the fingertips' forward speed, with that speed. On the
-way there the ball rolls out along the fingers, as a bead on a turning rod does (r'' = w^2 r, so that it needs
-acosh(tip / hold) / w, some 8 ms in a pitch and 40 ms in an easy throw; thumbs were measured to leave a fastball 6 ms
-before the fingers: Stevenson, "Finger release sequence for fastball and curveball pitches", Can. J. Appl. Sport Sci. 10
-(1985)). A rolling ball takes over only 2/7 of what its support does across the push (a solid sphere); the rest is its
-spin. This makes the ball's direction that of the whole last stretch, and not of the tips, which sweep across.
+Fingers push a ball and cannot pull it. It stays with them as long as their tips accelerate in the direction of the
+throw, and leaves when they no longer do: at the peak of the fingertips' forward speed, with that speed. Before that,
+the ball rolls out along the fingers, like a bead on a rotating rod (r'' = w^2 r, so it needs acosh(tip / hold) / w,
+some 8 ms in a pitch and 40 ms in an easy throw; thumbs were measured to leave a fastball 6 ms before the fingers:
+Stevenson, "Finger release sequence for fastball and curveball pitches", Can. J. Appl. Sport Sci. 10 (1985)). A rolling
+ball takes on only 2/7 of the movement of its support across the push (a solid sphere); the rest becomes spin. The
+ball's direction is therefore that of the whole last stretch, and not that of the tips, which sweep across.
 
-How far the tips are from the wrist is not measured, but follows from the hand: finger bones 1.22 times the third
-metacarpal, whose head the hand's marker sits on (Buchholz, Armstrong & Goldstein, "Anthropometric data for describing
+The distance from wrist to fingertips is not measured, but follows from the hand: finger bones are 1.22 times the third
+metacarpal, on whose head the hand's marker lies (Buchholz, Armstrong & Goldstein, "Anthropometric data for describing
 the kinematics of the human hand", Ergonomics 35 (1992)), bent as around a ball.
 
-What is not seen is what the fingers do on their own. SPEED_SIGMA is therefore a judgement, not a measurement: hands
-differ by a tenth in length, which makes 4 % of the speed; an aim wrong by ten degrees 2 to 4 %; the fingers' own
-flexion some more. On the one recording at hand with a radar's speed (80.8 mph), nothing having been fitted to it, the
-speed comes out within 3 %.
+The fingers' own movement is not recorded. SPEED_SIGMA is therefore a judgement, not a measurement: hands differ by a
+tenth in length, which is 4 % of the speed; an aim wrong by ten degrees is 2 to 4 %; the fingers' own flexion adds some.
+On the one available recording with a radar speed (80.8 mph), with nothing fitted to it, the speed comes out within 3 %.
 """
 
 from __future__ import annotations
@@ -29,26 +28,35 @@ from ...motion.hand import Hand
 from .throwing_hand import fastest
 
 SPEED_SIGMA = 0.06  # of the speed, one standard deviation
-TIME_SIGMA = 0.004  # seconds, one standard deviation, in a fast throw; slower ones have more, as they roll longer
-PAD = 0.91  # of the way from wrist to fingertip: where the fingers' pads push, each joint bent by some 25 degrees
-HOLD = 0.70  # of the way from wrist to fingertip: where the ball's centre is while it is gripped
+TIME_SIGMA = 0.004  # seconds, one standard deviation, of a fast throw; slower ones roll longer and have more
+PAD = 0.91  # share of the length from wrist to fingertip where the finger pads push, joints bent by some 25 degrees
+HOLD = 0.70  # share of the length from wrist to fingertip where the centre of a gripped ball is
 ROLLS_WITH = 2.0 / 7.0  # share of a surface's speed that a solid ball rolling on it takes on
-_SMOOTH = 0.014  # s, the window of the parabolas that velocities are taken from
-_NEAR = 0.1  # s about the frame in which the wrist is fastest when single frames are left aside
-_FINE = 8  # steps a frame
-_LATEST = 2.5  # times the rolling that the tips may be fastest after the wrist is
-_EARLIER, _AFTER = 4.0, 0.005  # times the rolling, and s, about the ball's fastest, between which the wrist's is
-_NEARLY = 0.95  # of the wrist's fastest there, what counts as its peak
-_ACCELERATES = 0.8  # of the tips' fastest speed, from where on their way tells the direction
-_ARC = 0.35  # rad by which a hand climbs or falls that goes over the top, without the ball doing so
-_LEAST_STEP = 0.25  # m between the feet along the throw, from where on they tell its direction
+_SMOOTH = 0.014  # s, window of the parabolas from which velocities are computed
+_NEAR = 0.1  # s around the fastest frame of the outlier-free speed, in which the fastest time is searched
+_FINE = 8  # steps per frame
+_LATEST = 2.5  # multiples of the rolling time within which the tips are fastest after the wrist
+# The wrist is fastest between so many rolling times before, and so many s after, the fastest time of the ball.
+_EARLIER, _AFTER = 4.0, 0.005
+_NEARLY = 0.95  # share of the wrist's maximum speed there, from which on a local maximum is its peak
+_ACCELERATES = 0.8  # share of the tips' maximum speed, from which on their path gives the direction
+_ARC = 0.35  # rad by which an overarm hand may rise or fall without the ball doing so
+_LEAST_STEP = 0.25  # metres between the feet, from which on the stride contributes to the direction
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class HandRelease:
-    """How the ball left by the hand alone. time: s from frame 0. position: (3,) m of its centre. velocity: (3,) m/s.
-    time_sigma, speed_sigma, way_sigma: s, m/s and rad, one standard deviation. rolled: s that it took along the
-    fingers."""
+    """A release estimated from the hand alone.
+
+    Attributes:
+        time: s from frame 0.
+        position: (3,) metres, the ball's centre.
+        velocity: (3,) m/s.
+        time_sigma: s, one standard deviation.
+        speed_sigma: m/s, one standard deviation.
+        direction_sigma: rad, one standard deviation.
+        roll_time: s that the ball took along the fingers.
+    """
 
     time: float
     position: np.ndarray
@@ -60,9 +68,15 @@ class HandRelease:
 
 
 def release_by_hand(hand: Hand, radius: float, stride: np.ndarray | None = None) -> HandRelease:
-    """The release of a ball of `radius` m that nobody sees.
+    """Estimate the release of a ball that has no marker.
 
-    stride: (T, 2) m, level, from one foot to the other, as the body stands in its step; None where nobody knows."""
+    Args:
+        hand: the throwing hand.
+        radius: metres, of the ball.
+        stride: (T, 2) metres, level, from one foot to the other; None where unknown.
+    Returns:
+        The release.
+    """
     course = _Course(hand)
     times, tips, grip = course.times, course.velocity(PAD), course.velocity(HOLD)
     turning = _length(course.turn)
@@ -86,13 +100,15 @@ def release_by_hand(hand: Hand, radius: float, stride: np.ndarray | None = None)
 
 
 def _roll(turning: float) -> float:
-    """s that a ball needs along the fingers of a hand that turns by `turning` rad/s."""
+    """Compute the s that a ball needs along the fingers of a hand that rotates by `angular_speed` rad/s."""
     return float(np.arccosh(PAD / HOLD)) / max(turning, 5.0)
 
 
 def _wrist(course: _Course, gripped: int, roll: float) -> int:
-    """Which of the times is the one at which the wrist is fastest before the ball in it is: the first peak, for the arm
-    swings on after a throw, and the wrist may be as fast again."""
+    """Find when the wrist is fastest before the ball in the hand is, as an index of the path's times.
+
+    The first peak is taken: the arm swings on after a throw, and the wrist may be as fast again.
+    """
     first, end = np.searchsorted(course.times, course.times[gripped] + [-_EARLIER * roll, _AFTER])
     first = int(min(first, gripped))
     speed = _length(course.velocity(0.0)[first : max(int(end), first + 1)])
@@ -122,25 +138,27 @@ class _Course:
         self.turn = self._swing / np.maximum(_length(self._arm), 1e-9)[:, None]
 
     def fastest(self, share: float, frame: int) -> int:
-        """Which of its times is the one at which that point is fastest, near a frame."""
+        """Find the index of the time at which the point at `share` is fastest, near a frame."""
         near = _about(self.times, frame * _FINE, _NEAR)
         return near.start + int(np.argmax(_length(self.velocity(share)[near])))
 
     def frame(self, k: int) -> int:
-        """The frame nearest to one of its times."""
+        """Return the frame nearest to one of the times."""
         return int(round(k / _FINE))
 
     def place(self, share: float) -> np.ndarray:
-        """(N, 3) m of the point at `share` of the way from wrist to fingertip."""
+        """Return the point at `share` of the length from wrist to fingertip, (N, 3) metres."""
         return self._at + share * self._arm
 
     def velocity(self, share: float) -> np.ndarray:
-        """(N, 3) m/s of that point, the hand being rigid."""
+        """Return the velocity of that point for a rigid hand, (N, 3) m/s."""
         return self._moves + share * self._swing
 
 
 def _aim(course: _Course, tips: np.ndarray, wrist: int, last: int, stride: np.ndarray | None) -> np.ndarray:
-    """Unit (3,): where the throw goes: by the fingers' way while they are fast, and level also by the stride."""
+    """Estimate the direction of the throw, unit (3,): from the fingers' path while they are fast, level also from
+    the stride.
+    """
     speed = _length(tips)
     peak = wrist + int(np.argmax(speed[wrist : last + 1]))
     first = peak
@@ -163,15 +181,14 @@ def _aim(course: _Course, tips: np.ndarray, wrist: int, last: int, stride: np.nd
 
 
 def _push(course: _Course, k: int, aim: np.ndarray) -> np.ndarray:
-    """Unit (3,): out of the fingers, across them and in the direction in which they swing; as `aim` where they do not
-    swing."""
+    """Compute the direction of the push, unit (3,): the fingers' swing, or `direction` if they do not swing."""
     push = course.turn[k]
     size = np.linalg.norm(push)
     return aim if size < 1.0 or push @ aim < 0.5 * size else push / size
 
 
 def _swept(velocities: np.ndarray) -> float:
-    """rad: half the angle between the first and the last of velocities (N, 3)."""
+    """Compute half the angle in rad between the first and the last of velocities (N, 3)."""
     first, last = velocities[0], velocities[-1]
     size = max(float(np.linalg.norm(first) * np.linalg.norm(last)), 1e-9)
     return 0.5 * float(np.arccos(np.clip(first @ last / size, -1.0, 1.0)))
@@ -186,7 +203,7 @@ def _length(vectors: np.ndarray) -> np.ndarray:
 
 
 def _filled(points: np.ndarray) -> np.ndarray:
-    """Points (T, 3) with gaps bridged straight."""
+    """Return points (T, 3) with gaps interpolated linearly."""
     known = np.isfinite(points).all(axis=-1)
     if known.all():
         return points

@@ -1,1 +1,1 @@
-"""Many bodies on one pitch: how deep they are in each other, and how they are brought out of it."""
+"""Collision avoidance between the players on one pitch: how deep bodies overlap, and how they are separated."""

@@ -1,9 +1,9 @@
-"""A body as capsules along its skeleton, and how deep two bodies are in each other.
+"""A body as capsules along its skeleton, and how deep two bodies overlap.
 
-A capsule is all that lies within its radius of a straight line. The overlap of two bodies is the largest, over all
-pairs of a capsule of the one and a capsule of the other, of the sum of both radii less the distance of both lines;
-negative where they are apart. The radii are those of the low-poly body (`appearance.body`), the wide trunk as three
-lines (across the hips, up the spine, across the shoulders).
+A capsule is everything within its radius of a straight line. The overlap of two bodies is the largest value, over all
+pairs of a capsule of each, of the sum of both radii minus the distance of the two lines; negative if they are apart.
+The radii are those of the low-poly body (`appearance.body`); the wide trunk has three lines (across the hips, up the
+spine, across the shoulders).
 """
 
 from __future__ import annotations
@@ -18,28 +18,36 @@ from ...motion.motion import Motion, forward_kinematics
 from ...motion.skeleton import Skeleton
 
 HEAD = 0.10, 0.095
-"""Metres, at a stature of 1.80 m, from the head's joint to the end of its line, and its radius."""
+"""m at a stature of 1.80 m: from the head's joint to the end of its line, and its radius."""
 
 HAND = 0.09
-"""Metres by which the forearm's line goes on into the hand."""
+"""m by which the forearm's line extends into the hand."""
 
 RADII = {
     "hips": 0.10, "spine": 0.12, "shoulders": 0.075, "upper_arm": 0.055, "lower_arm": 0.042,
     "upper_leg": 0.085, "lower_leg": 0.052, "foot": 0.042,
 }
-"""Metres at a stature of 1.80 m."""
+"""m at a stature of 1.80 m."""
 
 FAR = 2.5
-"""Metres between the middles of two bodies' hips from which on they cannot touch."""
+"""m between the middles of two bodies' hips: farther apart they cannot touch."""
 
-_TALL = 1.80  # m, the body for which radii are given
+_TALL = 1.80  # m, the stature the radii are given for
 
 
 @dataclass(frozen=True)
 class Capsule:
-    """One part: its line runs from joint `start` to joint `end` and `beyond` metres further; radius in metres. limb:
-    "arm", "leg" or "" for trunk and head; side: 0 left, 1 right; along: how far its start and its end are down a leg,
-    0 at the hip and 1 at the ankle."""
+    """One part of a body.
+
+    Attributes:
+        start: joint at the start of its line.
+        end: joint at the end of its line.
+        radius: m.
+        beyond: m by which the line extends past the end joint.
+        limb: "arm", "leg", or "" for trunk and head.
+        side: 0 left, 1 right.
+        along: how far start and end are down a leg, 0 at the hip and 1 at the ankle.
+    """
 
     start: int
     end: int
@@ -51,12 +59,20 @@ class Capsule:
 
 
 def capsules(skeleton: Skeleton) -> tuple[Capsule, ...]:
-    """The parts of a body; InputError where the skeleton has no legs."""
+    """Build the capsules of a body.
+
+    Args:
+        skeleton: the body's skeleton.
+    Returns:
+        The capsules; the first is across the hips.
+    Raises:
+        InputError: if the skeleton has no legs.
+    """
     return _capsules(_Same(skeleton))
 
 
 class _Same:
-    """A skeleton that is known again by its fingerprint."""
+    """A skeleton that compares by its fingerprint, so that results can be cached."""
 
     def __init__(self, skeleton: Skeleton):
         self.skeleton, self.key = skeleton, skeleton.fingerprint
@@ -92,7 +108,13 @@ def _capsules(same: _Same) -> tuple[Capsule, ...]:
 
 
 def lines(motion: Motion) -> np.ndarray:
-    """(T, C, 2, 3) m: both ends of every capsule's line in the world."""
+    """Compute both ends of every capsule's line.
+
+    Args:
+        motion: T frames.
+    Returns:
+        (T, C, 2, 3) m, world frame.
+    """
     parts, places = capsules(motion.skeleton), forward_kinematics(motion)[0]
     start, end = (places[:, [getattr(part, name) for part in parts]] for name in ("start", "end"))
     way = end - start
@@ -102,9 +124,18 @@ def lines(motion: Motion) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class Touching:
-    """Pairs of capsules (K,) that are in each other or nearly so: frame (K,); one, other (K,) numbers of the capsules;
-    depth (K,) m; radii (K,) m, the sum of both; away (K, 3) unit vector from the other to the one; at_one, at_other
-    (K,) share of the way along either line where they are nearest."""
+    """K pairs of capsules that overlap or nearly do.
+
+    Attributes:
+        frame: (K,) frame.
+        one: (K,) capsule of the first body.
+        other: (K,) capsule of the second body.
+        depth: (K,) m of overlap.
+        radii: (K,) m, the sum of both radii.
+        direction: (K, 3) unit vector from the other to the one.
+        share_one: (K,) position of the nearest point along the line of the one, 0 to 1.
+        share_other: (K,) the same along the line of the other.
+    """
 
     frame: np.ndarray
     one: np.ndarray
@@ -116,16 +147,24 @@ class Touching:
     at_other: np.ndarray
 
     def rows(self, kept: np.ndarray) -> Touching:
-        """Some of them, by their numbers."""
+        """Select some of the pairs by their indices."""
         return Touching(*(getattr(self, field.name)[kept] for field in fields(self)))
 
 
 def touching(one: np.ndarray, other: np.ndarray, radii: tuple[np.ndarray, ...], least: float = 0.0) -> Touching:
-    """Where two bodies' capsules are at least `least` metres deep in each other.
+    """Find where the capsules of two bodies overlap by at least `min_depth`.
 
-    one (T, C, 2, 3) and other (T, D, 2, 3): ends of their lines, m; radii: (C,) and (D,) m."""
+    Args:
+        one: (T, C, 2, 3) m, ends of the first body's lines.
+        other: (T, D, 2, 3) m, ends of the second body's lines.
+        radii: (C,) and (D,) m.
+        min_depth: m; negative values also find capsules that are close.
+    Returns:
+        The pairs.
+    """
     off = one[:, 0].sum(axis=1) - other[:, 0].sum(axis=1)
     near = np.flatnonzero(np.einsum("tk,tk->t", off, off) < (2.0 * FAR) ** 2)
+    # Two cheap filters before the exact distance: hips far apart, then spheres around the lines.
     frame, a, b = np.nonzero(_balls_meet(one[near], other[near], radii[0][:, None] + radii[1] - least))
     frame = near[frame]
     off, at_a, at_b = nearest(one[frame, a], other[frame, b])
@@ -139,7 +178,7 @@ def touching(one: np.ndarray, other: np.ndarray, radii: tuple[np.ndarray, ...], 
 
 
 def _balls_meet(one: np.ndarray, other: np.ndarray, reach: np.ndarray) -> np.ndarray:
-    """(T, C, D) bool: whether the balls around two lines meet that together reach (C, D) m further."""
+    """Say (T, C, D) bool whether the spheres around two lines, enlarged by `reach` (C, D) m together, meet."""
     (a, half_a), (b, half_b) = (
         (0.5 * (ends[:, :, 0] + ends[:, :, 1]), 0.5 * np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2))
         for ends in (one, other)
@@ -149,8 +188,15 @@ def _balls_meet(one: np.ndarray, other: np.ndarray, reach: np.ndarray) -> np.nda
 
 
 def nearest(one: np.ndarray, other: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Where straight lines one (K, 2, 3) and other (K, 2, 3) are nearest: the vector (K, 3) m from the other's place to
-    the one's, and the shares (K,) of the way along either (Ericson 2005, Real-Time Collision Detection §5.1.9)."""
+    """Find where straight lines are nearest to each other.
+
+    Args:
+        one: (K, 2, 3) m, ends of the first lines.
+        other: (K, 2, 3) m, ends of the second lines.
+    Returns:
+        Vectors (K, 3) m from the other's nearest point to the one's, and the shares (K,) along both lines.
+    Source: Ericson 2005, Real-Time Collision Detection, section 5.1.9.
+    """
     p, q = one[:, 0], other[:, 0]
     u, v, w = one[:, 1] - p, other[:, 1] - q, p - q
     uu, vv, uv = (np.einsum("kc,kc->k", a, b) for a, b in ((u, u), (v, v), (u, v)))

@@ -1,13 +1,13 @@
-"""What is changed on a body so that it keeps out of others: a few smooth curves, kept at ten knots a second.
+"""The correction that keeps a body out of others: a few smooth curves, stored at ten knots per second.
 
-The curves are: the root's shift over the ground, each foot's, and by which rotation each arm is turned about its
-shoulder. They are kept as whole tenths of millimetres and of milliradians, so that what is stored and what is in memory
-give the same bits, and are 0 between the pieces in which there is something to change.
+The curves are the root's horizontal shift, each foot's, and the rotation of each arm about its shoulder. They are
+stored as whole tenths of millimetres and of milliradians, so that stored and in-memory values give the same bits, and
+are 0 between the pieces in which something changes.
 
-A leg whose foot is put elsewhere opens or closes its knee until the ankle is as far from the hip as it has to be, about
-the axis about which it is bent; a leg that is nearly straight and shows none, about the axis square to leg and foot,
-since knees point where toes do. Then the whole leg swings about the hip the shortest way. What comes out of a frame
-depends on no other frame; a foot that stays where it is leaves the leg as it is.
+A leg whose foot moves opens or closes its knee until the ankle has the required distance from the hip, about the axis
+about which the knee is bent. A nearly straight leg shows no such axis: it uses the axis perpendicular to leg and foot,
+since knees point where toes do. Then the whole leg swings about the hip by the shortest rotation. Each frame depends on
+no other frame; a foot that does not move leaves the leg unchanged.
 """
 
 from __future__ import annotations
@@ -28,27 +28,34 @@ from ...motion.motion import Motion, pose_kinematics
 from ...motion.skeleton import Skeleton, frozen_array
 
 ROOT, FEET, ARMS = slice(0, 2), slice(2, 6), slice(6, 12)
-"""Columns: metres (x, y) of the root; metres of the left and the right foot; rotation vectors, rad, of both arms."""
+"""Columns: shift (x, y) of the root, m; of the left and the right foot, m; rotation vectors of both arms, rad."""
 
 CURVES = 12
 UNIT = 1e-4
-"""Metres and radians that a kept 1 stands for."""
+"""m and rad of a stored 1."""
 
-KNOT_SECONDS = 0.1  # between the knots of a correction
-_NOTHING = 5e-4  # m and rad below which a curve changes nothing that anybody sees
+KNOT_SECONDS = 0.1  # s between the knots of a correction
+_NOTHING = 5e-4  # m and rad: smaller values are not visible and count as 0
 
 SOFT = 0.01
-"""Metres below full length from where on a leg eases."""
+"""m below full length, where a leg starts to ease out."""
 
-_CLEAR = 0.05  # sine of a knee's bend below which its axis counts less and less
+_CLEAR = 0.05  # sine of a knee's bend: below this its axis has less and less weight
 _LEAST = 0.05  # m, the least distance from hip to ankle
 
 
 @dataclass(frozen=True, eq=False)
 class Correction:
-    """knots (N,) int: frames on the match's clock, rising, `step` apart within a piece and more between two pieces;
-    values (N, 12) int16 in UNIT, the columns ROOT, FEET and ARMS; 0 at the ends of pieces. fps: frames per second of
-    that clock. InputError for arrays that do not fit, or knots that do not rise."""
+    """The corrections of one body, on the match's clock.
+
+    Attributes:
+        knots: (N,) int, frames, ascending, `step` apart within a piece and more between two pieces.
+        values: (N, 12) int16 in UNIT, columns ROOT, FEET and ARMS; 0 at the ends of pieces.
+        fps: frames per second of the clock.
+        step: frames between knots.
+    Raises:
+        InputError: if the shapes do not match, or knots do not ascend.
+    """
 
     knots: np.ndarray
     values: np.ndarray
@@ -67,28 +74,37 @@ class Correction:
 
     @classmethod
     def none(cls, fps: float) -> Correction:
-        """The one that changes nothing."""
+        """Build a correction that changes nothing."""
         return cls(np.zeros(0, int), np.zeros((0, CURVES), int), fps, knot_step(fps))
 
     @classmethod
     def of(cls, curves: np.ndarray, first: int, fps: float) -> Correction:
-        """The one whose curves are (T, 12) from frame `first` of the match's clock on, m and rad."""
+        """Build a correction from sampled curves.
+
+        Args:
+            curves: (T, 12) m and rad.
+            first: frame of the match's clock of the first row.
+            fps: frames per second.
+        Returns:
+            The correction.
+        """
         step = knot_step(fps)
         at = np.arange(-(-first // step) * step, first + len(curves), step)
         values = np.round(np.clip(curves[at - first] / UNIT, -32767, 32767)).astype(np.int16)
         some = np.abs(curves[at - first]).max(axis=1, initial=0.0) > _NOTHING
+        # A knot next to a visible one is stored as 0: pieces start and end there.
         kept = some | np.append(some[1:], False) | np.append(False, some[:-1])
         values[~some] = 0
         return cls(at[kept], values[kept], fps, step)
 
     def pieces(self) -> list[tuple[int, int]]:
-        """(first, end) numbers of the knots of each piece."""
+        """(first, end) knot indices of each piece."""
         breaks = np.flatnonzero(np.diff(self.knots) > self.step) + 1
         edges = [0, *breaks.tolist(), len(self.knots)]
         return [(low, high) for low, high in zip(edges, edges[1:]) if high - low > 1]
 
     def curves(self, first: int, count: int) -> np.ndarray:
-        """(T, 12) m and rad at `count` frames from frame `first` on; cubic between knots."""
+        """Give the curves (T, 12), m and rad, at `count` frames from frame `first`; cubic between knots."""
         out = np.zeros((count, CURVES))
         for low, high in self.pieces():
             start, end = max(int(self.knots[low]), first), min(int(self.knots[high - 1]) + 1, first + count)
@@ -104,16 +120,27 @@ def knot_step(fps: float) -> int:
 
 
 def applied(motion: Motion, correction: Correction, first: int = 0) -> Motion:
-    """The motion, whose frame 0 is frame `first` of the match's clock, as corrected: bones as long as they were, feet
-    flat where they were flat, and every bit as it was where nothing is corrected. Each frame is corrected by itself.
-    InputError where rates differ."""
+    """Apply a correction to a motion.
+
+    Bone lengths stay, flat feet stay flat, and frames without correction keep every bit. Each frame is corrected on its
+    own.
+
+    Args:
+        motion: the motion.
+        correction: the correction.
+        first: frame of the match's clock of the motion's frame 0.
+    Returns:
+        The corrected motion.
+    Raises:
+        InputError: if the frame rates differ.
+    """
     if abs(motion.fps - correction.fps) > 1e-9:
         raise InputError("correction", f"{correction.fps:g} frames per second", f"{motion.fps:g}, the motion's rate")
     return carried(motion, correction.curves(first, len(motion)))
 
 
 def carried(motion: Motion, curves: np.ndarray) -> Motion:
-    """The motion with the curves (T, 12) put on it."""
+    """Apply correction curves (T, 12), m and rad, to a motion of T frames."""
     moved = np.flatnonzero(curves.any(axis=1))
     if not len(moved):
         return motion
@@ -134,10 +161,17 @@ def carried(motion: Motion, curves: np.ndarray) -> Motion:
 
 
 def joined(parts: Sequence[tuple[Correction, int, int]], reach: int) -> Correction:
-    """The corrections of neighbouring windows as one.
+    """Join the corrections of neighbouring windows.
 
-    parts: (correction, first, end) with the frames of each window's core, in order; each was worked out `reach` frames
-    beyond both ends. Around an edge between two cores the one goes over into the other within 2 `reach` frames."""
+    Around an edge between two cores, one blends into the other within 2 `reach` frames.
+
+    Args:
+        parts: (correction, first, end), with the frames of each window's core, in order; each was solved for `reach`
+            frames beyond both ends.
+        reach: frames.
+    Returns:
+        One correction.
+    """
     fps, step = parts[0][0].fps, parts[0][0].step
     total: dict[int, np.ndarray] = {}
     for number, (correction, first, end) in enumerate(parts):
@@ -156,14 +190,22 @@ def joined(parts: Sequence[tuple[Correction, int, int]], reach: int) -> Correcti
 def leg_moved(
     skeleton: Skeleton, limb: Limb, places: np.ndarray, world: np.ndarray, shift: np.ndarray
 ) -> dict[int, np.ndarray]:
-    """Local rotations (W, 4) by joint with which the ankle lies `shift` (W, 3) m from where the pose has it against the
-    hip; the foot keeps its rotation in the world.
+    """Move the ankle relative to the hip; the foot keeps its rotation in the world.
 
-    places (W, J, 3) m and world (W, J, 4): of all joints in the pose that is given."""
+    Args:
+        skeleton: the body's skeleton.
+        limb: the leg.
+        places: (W, J, 3) m, all joints of the given pose, world frame.
+        world: (W, J, 4) their rotations, world frame.
+        shift: (W, 3) m of the ankle relative to the hip.
+    Returns:
+        Local rotations (W, 4) by joint.
+    """
     hip, knee, ankle = (places[:, joint] for joint in (limb.upper_leg, limb.lower_leg, limb.foot))
     thigh, shin, line = knee - hip, ankle - knee, ankle - hip
     lengths, goal = (np.linalg.norm(thigh, axis=1), np.linalg.norm(shin, axis=1)), line + shift
     own, wanted = np.linalg.norm(line, axis=1), np.linalg.norm(goal, axis=1)
+    # Ease near full length, relative to the given pose: no shift changes nothing.
     eased = [two_bones.soft_distance(length, lengths[0] + lengths[1], SOFT) for length in (own, wanted)]
     reach = np.clip(own + eased[1] - eased[0], _LEAST, lengths[0] + lengths[1])
     opened = two_bones.inner_angle(*lengths, reach) - two_bones.inner_angle(*lengths, own)
@@ -181,12 +223,12 @@ def leg_moved(
 
 
 def in_parent(skeleton: Skeleton, world: np.ndarray, joint: int, turned: np.ndarray) -> np.ndarray:
-    """(W, 4): a world rotation of a joint as one against its parent's."""
+    """Convert a joint's world rotations (W, 4) to its parent's frame."""
     return quaternion.multiply(quaternion.inverse(world[:, skeleton.parents[joint]]), turned)
 
 
 def _hinge(thigh: np.ndarray, shin: np.ndarray, line: np.ndarray, toes: np.ndarray) -> np.ndarray:
-    """(W, 3) unit: the axis about which the knee is bent, by which a positive turn bends it further."""
+    """Find the axis (W, 3), unit, about which a positive rotation bends the knee further."""
     bones = np.linalg.norm(thigh, axis=1) * np.linalg.norm(shin, axis=1)
     shows = np.cross(thigh, shin) / bones[:, None]
     across = unit_vectors(np.cross(toes, line), np.array([0.0, 1.0, 0.0]))

@@ -1,11 +1,11 @@
-"""Players kept out of each other after their motions are made: what is changed on each, as a `Correction`.
+"""Resolve collisions between players after their motions are constructed, as a `Correction` of each.
 
-    corrections = kept_apart([take.motion for take in takes], [take.contacts for take in takes], firsts, 30.0)
-    motions = [applied(take.motion, c, first) for take, c, first in zip(takes, corrections, firsts)]
+    corrections = resolve_collisions([take.motion for take in takes], [take.contacts for take in takes], firsts, 30.0)
+    motions = [apply_correction(take.motion, c, first) for take, c, first in zip(takes, corrections, firsts)]
 
-Where capsules along the skeletons are in each other (`match.crowd.capsules`), arms are turned away and roots and feet
-shifted (`match.crowd.pushing`). Feet that stand stay where they stand or are put elsewhere as a whole; so after the
-limbs have been bent for it bodies are not quite where the curves say, and the next pass starts from where they are.
+Where capsules along the skeletons overlap (`match.crowd.capsules`), arms are rotated away and roots and feet shifted
+(`match.crowd.separation`). A foot in contact stays where it is or moves as a whole for the whole contact. Limbs bend
+for this, so bodies are not exactly where the curves alone would put them; the next pass starts from where they are.
 """
 
 from __future__ import annotations
@@ -24,30 +24,39 @@ from .pushing import ALLOWED, Pressure, pushed
 from .spacing import Episode, Span, meetings
 
 REACH = 1.5
-"""Seconds before and behind an overlap within which something is changed."""
+"""s before and after an overlap within which motions change."""
 
 PASSES = 5
-"""Times that it is looked for overlaps at most."""
+"""The most passes."""
 
 DONE = 0.015
-"""Metres of overlap from which on bodies are looked at once more after the first pass."""
+"""m: after the first pass, only deeper overlaps are resolved again."""
 
 
 def kept_apart(
     motions: Sequence[Motion], contacts: Sequence[np.ndarray], firsts: Sequence[int], fps: float,
     firm: Sequence[np.ndarray] | None = None,
 ) -> tuple[Correction, ...]:  # fmt: skip
-    """What has to be changed on each of the motions so that no two of them are in each other.
+    """Compute corrections with which no two motions overlap.
 
-    motions: on the pitch, frames at `fps` per second; firsts: the frame of the match's clock at which each begins.
-    contacts: (T, 2) bool each, left and right foot that stand. firm: (T,) each, how firmly it keeps its way against
-    others (`match.crowd.spacing.keeping` around touches of the ball), 1 by default. Where a correction would reach
-    beyond a motion's ends it is cut off there: give some seconds more than what is used (`correction.joined`)."""
+    Args:
+        motions: placed on the pitch, frames at `fps`.
+        contacts: (T, 2) bool each, left and right foot in contact with the ground.
+        first_frames: the frame of the match's clock at which each motion starts.
+        fps: frames per second.
+        firmness: (T,) each, how firmly it keeps its path against others (`spacing.compute_firmness` around ball
+            touches); 1 by default.
+    Returns:
+        One correction per motion. At the ends of a motion it is cut off: pass some seconds more than are used
+        (`correction.join_corrections`).
+    """
     bodies, start = _on_one_clock(motions, contacts, firsts, firm)
     curves = [np.zeros((len(body.lines), CURVES)) for body in bodies]
     done = [Correction.none(fps)] * len(bodies)
     met: list[Span] = []
     pressures: dict[tuple[int, int], Pressure] = {}
+    # Later passes resolve what the bent limbs of the pass before leave. An episode includes everyone the bodies
+    # met in earlier passes, so that a body is not pushed into another one that is not part of the solution.
     for turn in range(PASSES):
         placed = [moved(body, own) for body, own in zip(bodies, curves)]
         deep = _touching_spans(bodies, placed, round(REACH * fps), DONE if turn else ALLOWED)
@@ -63,8 +72,14 @@ def kept_apart(
 
 
 def overlap_depths(motions: Sequence[Motion], firsts: Sequence[int]) -> list[np.ndarray]:
-    """(T,) m for each of the motions: how deep it is in any other at each of its frames, 0 where in none. firsts: the
-    frame of a common clock at which each begins."""
+    """Measure how deep each motion overlaps any other, at each of its frames.
+
+    Args:
+        motions: placed on the pitch.
+        first_frames: the frame of a common clock at which each starts.
+    Returns:
+        (T,) m for each motion, 0 where it overlaps none.
+    """
     bodies, start = _on_one_clock(motions, [np.zeros((len(motion), 2), bool) for motion in motions], firsts, None)
     deepest = [np.zeros(len(body.lines)) for body in bodies]
     for one, other, frames in _near_pairs([body.lines for body in bodies]):
@@ -76,7 +91,7 @@ def overlap_depths(motions: Sequence[Motion], firsts: Sequence[int]) -> list[np.
 
 
 def _on_one_clock(motions, contacts, firsts, firm) -> tuple[list[CrowdBody], int]:
-    """The motions as bodies over the frames that any of them has, and the first of these."""
+    """Align the motions as bodies over the frames any of them has; return them and the first frame."""
     start = min(firsts, default=0)
     count = max((first + len(motion) for first, motion in zip(firsts, motions)), default=start) - start
     bodies = []
@@ -93,7 +108,7 @@ def _on_one_clock(motions, contacts, firsts, firm) -> tuple[list[CrowdBody], int
 
 
 def _near_pairs(placed: Sequence[np.ndarray]) -> list[tuple[int, int, np.ndarray]]:
-    """Pairs of bodies, by their capsules' lines (T, C, 2, 3), and the frames at which their hips are near."""
+    """Find pairs of bodies, by their capsule lines (T, C, 2, 3) m, and the frames at which their hips are close."""
     hips = np.array([ends[:, 0].mean(axis=1) for ends in placed])
     found = []
     for one in range(len(hips) - 1):
@@ -104,8 +119,9 @@ def _near_pairs(placed: Sequence[np.ndarray]) -> list[tuple[int, int, np.ndarray
 
 
 def _touching_spans(bodies, placed, reach: int, least: float) -> list[Span]:
-    """(first frame, end, pair) of all times at which two bodies are at least so many metres in each other, with `reach`
-    frames around."""
+    """Find the spans (first frame, end, pair) in which two bodies overlap by `min_depth` m, extended by `reach`
+    frames.
+    """
     spans = []
     for one, other, frames in _near_pairs(placed):
         found = touching(placed[one][frames], placed[other][frames], (bodies[one].radii, bodies[other].radii), least)
@@ -117,11 +133,12 @@ def _touching_spans(bodies, placed, reach: int, least: float) -> list[Span]:
 
 
 def _part(episode: Episode, bodies: list[CrowdBody], curves: list[np.ndarray], pressures, fps: float) -> None:
-    """Puts the bodies of one episode out of each other, changing their `curves`."""
+    """Separate the bodies of one episode, changing their `curves` in place."""
     low, high = episode.first, episode.end
     number = {body: row for row, body in enumerate(episode.bodies)}
     mine = [bodies[body].frames(low, high) for body in episode.bodies]
     whole = [bodies[body].there for body in episode.bodies]
+    # Curves are held at an episode's ends unless the body itself starts or ends there.
     held = [(low + body.there[0] > there[0], low + body.there[1] < there[1]) for body, there in zip(mine, whole)]
     pairs = [(number[one], number[other]) for one, other in episode.pairs]
     pressed = [pressures.setdefault(pair, Pressure()) for pair in episode.pairs]
@@ -131,7 +148,7 @@ def _part(episode: Episode, bodies: list[CrowdBody], curves: list[np.ndarray], p
 
 
 def _as_bent(body: CrowdBody, motion: Motion, curves: np.ndarray, first: int, start: int) -> CrowdBody:
-    """The body, with how far its limbs are from where the curves (T, 12) alone would have them."""
+    """Update how far a body's limbs are from where the curves (T, 12) alone would put them."""
     here = slice(first - start, first - start + len(motion))
     if not curves[here].any():
         return replace(body, bent=np.zeros(body.lines.shape))

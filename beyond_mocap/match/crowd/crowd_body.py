@@ -1,10 +1,10 @@
-"""One body among many: its capsules over time, where curves bring it, and which curves its contacts ask for.
+"""One body among many: its capsules over time, how curves move them, and which curves resolve its contacts.
 
-These are the least smooth ones that bring it out of its share of each contact. With n the direction away from the
-other, a point that is down its leg by a share f moves by (1 - f) root + f foot, and a point on an arm by turn x arm.
-What is least is, for root and feet together and for each arm by itself, one banded system (`BandedLeastSquares`): the
-squares of what lacks at each contact, of the curves and of their third differences, of a foot's distance from its
-root's shift, and of its speed while it stands.
+The curves are the least and smoothest ones that move the body by its share of each contact. With n the direction away
+from the other body, a point down its leg by a share f moves by (1 - f) root + f foot, and a point on an arm by rotation
+x lever. Root and feet together, and each arm by itself, are one banded system (`BandedLeastSquares`) that minimises the
+squares of: what is missing at each contact, the curves and their third differences, a foot's shift relative to its
+root's, and a foot's speed while it is in contact.
 """
 
 from __future__ import annotations
@@ -20,28 +20,34 @@ from .capsules import Capsule
 from .correction import ARMS, FEET, ROOT
 
 STAY, SECONDS = 0.003, 0.3
-"""Weight of the root's shift, and seconds in which it comes and goes."""
+"""Weight of the root's shift, and s in which it fades in and out."""
 
 FOOT_NEAR, FOOT_STANDS, FOOT_SECONDS = 0.01, 300.0, 0.12
-"""Weights of a foot's shift against its root's and of its speed while it stands (per frame at 30 per second); seconds
-in which it comes and goes."""
+"""Weights of a foot's shift relative to its root's and of its speed in contact (per frame at 30 per second); s in which
+the shift fades in and out."""
 
 ARM_STAY, ARM_SECONDS, MOST_TURN = 5e-4, 0.15, 1.1
-"""Weight of an arm's turn, seconds in which it comes and goes, and radians that it turns at most."""
+"""Weight of an arm's rotation, s in which it fades in and out, and its largest angle, rad."""
 
 BASE = 30.0
-"""Frames per second for which weights are."""
+"""Frames per second the weights are given for."""
 
-_SHORT_ARM = 0.08  # m from the shoulder's axis below which turning an arm brings nothing away
-_UPRIGHT = 0.35  # least share of a push that goes over the ground
-_HELD = 1e6  # weight that holds a value: far above all others
+_SHORT_ARM = 0.08  # m from the rotation axis: on a shorter lever, rotating an arm does not separate bodies
+_UPRIGHT = 0.35  # least share of a push that counts as horizontal
+_HELD = 1e6  # weight that fixes a value: far above all others
 
 
 @dataclass(frozen=True, eq=False)
 class CrowdBody:
-    """One body over T common frames. parts: its C capsules; lines (T, C, 2, 3) m, NaN where it is not there; bent (T,
-    C, 2, 3) m: how far from where its curves alone bring them limbs have come by being bent for earlier curves; stands
-    (T, 2) bool, left and right foot; firm (T,): how firmly it keeps its way against others."""
+    """One body over T common frames.
+
+    Attributes:
+        parts: its C capsules.
+        lines: (T, C, 2, 3) m, ends of their lines, NaN where the body is absent.
+        bend_offset: (T, C, 2, 3) m by which bent limbs differ from where the curves alone put them.
+        foot_contacts: (T, 2) bool, left and right foot in contact with the ground.
+        firmness: (T,) how firmly it keeps its path against others.
+    """
 
     parts: tuple[Capsule, ...]
     lines: np.ndarray
@@ -51,25 +57,34 @@ class CrowdBody:
 
     @property
     def radii(self) -> np.ndarray:
-        """(C,) m."""
+        """(C,) m of the capsules."""
         return np.array([part.radius for part in self.parts])
 
     @property
     def there(self) -> tuple[int, int]:
-        """First frame and end of where it is there."""
+        """First frame and end of the time the body is present."""
         known = np.flatnonzero(np.isfinite(self.lines[:, 0, 0, 0]))
         return (int(known[0]), int(known[-1]) + 1) if len(known) else (0, 0)
 
     def frames(self, low: int, high: int) -> CrowdBody:
-        """Frames low .. high of it."""
+        """Select the frames low .. high."""
         rows = (values[low:high] for values in (self.lines, self.bent, self.stands, self.firm))
         return CrowdBody(self.parts, *rows)
 
 
 @dataclass(frozen=True, eq=False)
 class Contact:
-    """What one body has of its contacts (K,): frame, part, place (K, 3) m, away (K, 3) unit from the other, give (K,)
-    m that it should give way by, its share of the overlap; arm (K,) m that its arm should, where the part is one."""
+    """The K contacts of one body.
+
+    Attributes:
+        frame: (K,) frame.
+        part: (K,) capsule.
+        line_share: (K,) position along the capsule's line, 0 to 1.
+        position: (K, 3) m of that point.
+        direction: (K, 3) unit vector away from the other body.
+        distance: (K,) m the body should move, its share of the overlap.
+        arm_distance: (K,) m its arm should move, where the part is an arm.
+    """
 
     frame: np.ndarray
     part: np.ndarray
@@ -81,8 +96,14 @@ class Contact:
 
 
 def moved(body: CrowdBody, curves: np.ndarray) -> np.ndarray:
-    """(T, C, 2, 3) m: the capsules' lines with curves (T, 12) put on the body, bones taken for as long as they have to
-    be."""
+    """Move a body's capsules by curves; bones become as long as they have to be.
+
+    Args:
+        body: the body, T frames.
+        curves: (T, 12) m and rad.
+    Returns:
+        (T, C, 2, 3) m, ends of the capsules' lines.
+    """
     out = np.array(body.lines)
     feet, arms = curves[:, FEET].reshape(-1, 2, 2), curves[:, ARMS].reshape(-1, 2, 3)
     pivot: dict[int, np.ndarray] = {}
@@ -98,8 +119,15 @@ def moved(body: CrowdBody, curves: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Calm:
-    """What keeps a body's curves small and smooth, whatever its contacts: the squares of its root and feet and of each
-    arm, over the frames low .. low + count in which it is there."""
+    """The terms that keep a body's curves small and smooth, independent of its contacts.
+
+    Attributes:
+        body: the body.
+        low: first frame at which it is present.
+        count: number of frames it is present.
+        root_and_feet: squares of the first six curves.
+        arms: squares of each arm's three curves.
+    """
 
     body: CrowdBody
     low: int
@@ -109,7 +137,16 @@ class Calm:
 
     @classmethod
     def of(cls, body: CrowdBody, curves: np.ndarray, held: tuple[bool, bool], fps: float) -> Calm:
-        """Of a body; held: whether its curves (T, 12) stay what they are at its first and at its last frame."""
+        """Build the terms of a body.
+
+        Args:
+            body: the body, T frames.
+            curves: (T, 12) m and rad so far.
+            held_ends: whether the curves keep their values at the body's first and last frame.
+            fps: frames per second.
+        Returns:
+            The terms.
+        """
         low, high = body.there
         whole = _calm_root_and_feet(body.frames(low, high), curves[low:high], held, fps)
         arms = []
@@ -123,7 +160,18 @@ class Calm:
 
 
 def solve_curves(calm: Calm, mine: Contact, curves, placed, arms_too: bool, weight: float) -> np.ndarray:
-    """The body's curves (T, 12) with its share of these contacts given way to."""
+    """Solve the body's curves for its share of these contacts.
+
+    Args:
+        smoothness: the body's terms.
+        contacts: the body's contacts.
+        curves: (T, 12) m and rad so far.
+        capsule_lines: (T, C, 2, 3) m, where the capsules are now.
+        arms_too: contacts at arms also move root and feet.
+        weight: of each contact.
+    Returns:
+        (T, 12) m and rad.
+    """
     out, parts = np.array(curves), calm.body.parts
     there = slice(calm.low, calm.low + calm.count)
     is_arm = np.array([part.limb == "arm" for part in parts])[mine.part]
@@ -142,10 +190,12 @@ def solve_curves(calm: Calm, mine: Contact, curves, placed, arms_too: bool, weig
 
 
 def _calm_root_and_feet(body: CrowdBody, curves: np.ndarray, held, fps: float) -> BandedLeastSquares:
+    """Build the terms of root and feet: small, smooth, feet near the root's shift and slow in contact."""
     squares, scale = BandedLeastSquares(len(curves), ARMS.start), BASE / fps
     for curve in range(ARMS.start):
         _calm(squares, curve, STAY, seconds=SECONDS if curve < FEET.start else FOOT_SECONDS, firm=body.firm, fps=fps)
         _hold(squares, curve, curves[:, curve], held)
+    # Unknown number of curve c at frame t: t * 6 + c. Each row couples the unknowns in its index columns.
     frames = np.arange(len(curves)) * ARMS.start
     for side in (0, 1):
         both = (body.stands[:-1, side] & body.stands[1:, side]).astype(float)
@@ -159,13 +209,13 @@ def _calm_root_and_feet(body: CrowdBody, curves: np.ndarray, held, fps: float) -
 
 
 def _calm(squares: BandedLeastSquares, curve: int, stay: float, seconds: float, firm: np.ndarray, fps: float) -> None:
-    """Keeps a curve small, and smooth over so many seconds."""
+    """Add terms that keep a curve small, and smooth over so many seconds."""
     squares.add_value(stay * BASE / fps * firm, curve)
     squares.add_smoothness(stay * BASE / fps * (seconds * fps) ** 6 * firm, curve)
 
 
 def _hold(squares: BandedLeastSquares, curve: int, values: np.ndarray, held) -> None:
-    """Keeps a curve's first and last two frames what they are, where they are held."""
+    """Hold a curve's first and last two frames at their values, where `held_ends` is set."""
     for ends, which in ((slice(0, 2), held[0]), (slice(-2, None), held[1])):
         if which:
             index = (np.arange(squares.count) * squares.unknowns + curve)[ends, None]
@@ -173,7 +223,11 @@ def _hold(squares: BandedLeastSquares, curve: int, values: np.ndarray, held) -> 
 
 
 def _arm(calm: Calm, side: int, mine: Contact, rows, shoulder, turns, weight: float) -> np.ndarray:
-    """The turns (W, 3) of one arm with its contacts `rows`; shoulder (T, 3) m, turns (T, 3) so far."""
+    """Solve the rotation vectors (W, 3) of one arm for its contacts `rows`.
+
+    shoulder (T, 3) m; rotations (T, 3) rad, the rotations so far.
+    """
+    # A small rotation w moves the point by w x lever; along `direction` that is (lever x direction) . w.
     row = cross(mine.place[rows] - shoulder[mine.frame[rows]], mine.away[rows])
     long = np.linalg.norm(row, axis=1) > _SHORT_ARM
     rows, row, squares = rows[long], row[long], calm.arms[side].copy()
@@ -184,16 +238,17 @@ def _arm(calm: Calm, side: int, mine: Contact, rows, shoulder, turns, weight: fl
 
 
 def _limited(turns: np.ndarray) -> np.ndarray:
-    """Rotation vectors (T, 3) that near MOST_TURN softly."""
+    """Limit rotation vectors (T, 3) softly to MAX_ARM_ANGLE."""
     size = np.maximum(np.linalg.norm(turns, axis=1, keepdims=True), 1e-9)
     return turns * (MOST_TURN * np.tanh(size / MOST_TURN) / size)
 
 
 def _root_and_feet(calm: Calm, mine: Contact, rows, curves, weight: float) -> np.ndarray:
-    """The first six curves (W, 6) with what lacks at the contacts `rows` given by root and feet."""
+    """Solve the first six curves (W, 6) for the contacts `rows`."""
     parts, frame, part = calm.body.parts, mine.frame[rows], mine.part[rows]
     side = np.array([p.side for p in parts])[part]
     ends = np.array([p.along if p.limb == "leg" else (0.0, 0.0) for p in parts])[part]
+    # How far down the leg the contact is: the foot's shift counts by this share, the root's by the rest.
     share = (ends[:, 0] + mine.at[rows] * (ends[:, 1] - ends[:, 0]))[:, None]
     push = mine.away[rows, :2]
     size = np.maximum(np.linalg.norm(push, axis=1, keepdims=True), 1e-9)

@@ -1,5 +1,6 @@
-"""A window of time with all players in it: bodies that would be in each other kept apart, and the ball where they meet
-it; what the window says is kept in a file until it is needed again (never pickled)."""
+"""A window of time with all players in it: collisions are resolved, and players meet the ball where it is. The result
+of a window is saved in a file (never pickled).
+"""
 
 from __future__ import annotations
 
@@ -27,24 +28,31 @@ from .crowd import kept_apart, overlap_depths
 from .spacing import keeping
 
 LONGEST = 60.0
-"""Seconds of a window at most: everybody's motion in it is in memory at once."""
+"""s, the longest window: all players' motions in it are in memory at once."""
 
 BEYOND = 4.0
-"""Seconds on either side of a window in which everybody is looked at too."""
+"""s on either side of a window in which collisions are resolved too."""
 
 REACH = 2.0
-"""Seconds around an edge between two windows in which the corrections of one go over into the other's."""
+"""s around an edge between two windows in which the corrections of one blend into the other's."""
 
-_SETTLED = 8.0  # s of an edit list, beyond those, by which its motion does not depend on where it begins
+_SETTLED = 8.0  # s more of an edit list, after which its motion does not depend on where it starts
 
 _ARRAYS = ("frames", "depth", "led_frames", "led")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class CrowdPart:
-    """What a window says of one player. correction: of his motion; frames (K,) of the match's clock at which he is in
-    somebody, and depth (K,) m how deep when corrected; before: m, the deepest without it; led_frames (L,) and led (L,
-    3) m: where he leads the ball (`match_ball.led_by`)."""
+    """The result of a window for one player.
+
+    Attributes:
+        correction: of their motion.
+        frames: (K,) frames of the match's clock at which they overlap another player after correction.
+        depth: (K,) m of that overlap.
+        before: m, the deepest overlap without correction.
+        led_frames: (L,) frames at which they lead the ball.
+        led: (L, 3) m by which the ball is moved there (`match_ball.find_led_ball`).
+    """
 
     correction: Correction
     frames: np.ndarray
@@ -55,8 +63,15 @@ class CrowdPart:
 
 
 def cut_edit(edit: PlayerEdit, start: float, end: float) -> PlayerEdit:
-    """A player's edit list around a window, which lays out as the whole one does from `start` to `end` s; without
-    stretches where he is away."""
+    """Cut a player's edit list around a window, so that it constructs the same motion from `start` to `end`.
+
+    Args:
+        edit: the player's edit list.
+        start: s of the window.
+        end: s of the window.
+    Returns:
+        The cut edit list, without stretches where the player is absent.
+    """
     cuts = (_cut_stretch(stretch, start - _SETTLED, end + _SETTLED) for stretch in edit.stretches)
     return replace(edit, stretches=tuple(cut for cut in cuts if cut is not None))
 
@@ -72,8 +87,16 @@ def _cut_stretch(stretch: Stretch, start: float, end: float) -> Stretch | None:
 
 
 def crowd_window(library: Library, edits: Sequence[PlayerEdit], start: float, end: float) -> tuple[CrowdPart, ...]:
-    """What the window from `start` to `end` s says of each player; edits: cut to it and BEYOND on either side
-    (`cut_edit`). The same input gives the same bits."""
+    """Resolve the collisions of a window. The same input gives the same bits.
+
+    Args:
+        library: the clips.
+        edits: one per player, cut to the window and MARGIN_SECONDS on either side (`cut_edit`).
+        start: s of the window.
+        end: s of the window.
+    Returns:
+        One result per player.
+    """
     from threadpoolctl import threadpool_limits
 
     with threadpool_limits(limits=1):
@@ -94,7 +117,14 @@ def crowd_window(library: Library, edits: Sequence[PlayerEdit], start: float, en
 
 
 def join_windows(parts: Sequence[tuple[CrowdPart, tuple[float, float]]], fps: float) -> CrowdPart:
-    """One player's windows, each with its start and end in seconds, as one."""
+    """Join one player's windows.
+
+    Args:
+        parts: results, each with its window's start and end in s.
+        fps: frames per second.
+    Returns:
+        One result.
+    """
     if not parts:
         return _part([], (0, 0), fps)
     cores = [(one.correction, round(start * fps), round(end * fps)) for one, (start, end) in parts]
@@ -103,7 +133,14 @@ def join_windows(parts: Sequence[tuple[CrowdPart, tuple[float, float]]], fps: fl
 
 
 def keep_parts(path: Path, parts: Sequence[CrowdPart]) -> None:
-    """Writes a window's parts, in the order of the players; InputError where that cannot be done."""
+    """Save a window's results.
+
+    Args:
+        path: the file.
+        parts: in the order of the players.
+    Raises:
+        InputError: if the file cannot be written.
+    """
     arrays = {}
     for number, one in enumerate(parts):
         arrays |= {f"{number}.{name}": getattr(one, name) for name in _ARRAYS}
@@ -115,7 +152,7 @@ def keep_parts(path: Path, parts: Sequence[CrowdPart]) -> None:
 
 
 def kept_parts(path: Path) -> tuple[CrowdPart, ...] | None:
-    """The parts that `keep_parts` wrote; None where there are none, or none that can be read whole."""
+    """Load the results that `save_parts` wrote; None if there is no complete file."""
     try:
         with np.load(path, allow_pickle=False) as kept:
             header = json.loads(kept["header"].tobytes())
@@ -125,18 +162,18 @@ def kept_parts(path: Path) -> tuple[CrowdPart, ...] | None:
                     before=before, **{name: kept[f"{number}.{name}"] for name in _ARRAYS},
                 ) for number, (fps, step, before) in enumerate(header)
             )  # fmt: skip
-    except Exception:  # a damaged file can fail in any of zipfile's, zlib's, numpy's and our own ways
+    except Exception:  # a damaged file can raise any error of zipfile, zlib, numpy or this package
         return None
 
 
 def _firm(take: Take) -> np.ndarray:
-    """(T,) how firmly a player keeps his way: more where he touches the ball."""
+    """Compute (T,) how firmly a player keeps their path: more where they touch the ball."""
     touching = [key.frame for key in take.keys if surfaces(take.motion.skeleton, key.touching)]
     return keeping(len(take.motion), np.array(touching), take.motion.fps)
 
 
 def _on_the_ball(take: Take, motion: Motion, first: int, led: Sequence[tuple[np.ndarray, np.ndarray]]) -> Motion:
-    """A player's corrected motion with its touches at the ball, which everybody has `led`."""
+    """Restore the ball contacts of a player's corrected motion, with the ball that all players have `led`."""
     if take.ball is None:
         return motion
     ball = met(course(take.plan, take.ball.times), first, led)
@@ -144,7 +181,10 @@ def _on_the_ball(take: Take, motion: Motion, first: int, led: Sequence[tuple[np.
 
 
 def _part(rows, inside: tuple[int, int], fps: float) -> CrowdPart:
-    """One player's part, out of his takes with what was found of each."""
+    """Build one player's result from their takes with what was measured of each.
+
+    rows: (correction, first frame, depths before (T,) m, depths after (T,) m, (led frames, led offsets)) per take.
+    """
     frames, depth, before = [np.zeros(0, int)], [np.zeros(0)], 0.0
     led_frames, led = [np.zeros(0, int)], [np.zeros((0, 3))]
     for _, first, deep, deep_after, (at, off) in rows:
@@ -163,7 +203,7 @@ def _part(rows, inside: tuple[int, int], fps: float) -> CrowdPart:
 
 
 def _one_after_the_other(corrections: Sequence[Correction], fps: float) -> Correction:
-    """Corrections of one player at different times as one."""
+    """Concatenate corrections of one player at different times."""
     if not corrections:
         return Correction.none(fps)
     knots = np.concatenate([one.knots for one in corrections])

@@ -1,19 +1,19 @@
-"""Bodies that are in each other pushed apart: arms turned away, roots and feet shifted, all as smooth curves.
+"""Separate overlapping bodies: arms rotated away, roots and feet shifted, all as smooth curves.
 
-Each body has twelve curves (`correction`): its root's shift over the ground, its feet's, and the turns of its arms
-about their shoulders. Round after round the contacts are looked for where the bodies are by now, and every body gives
-its share of each (`crowd_body.solve_curves`), a part of the way at a time, since what is changed here opens or closes
-contacts there. Which way and how hard a contact presses is remembered from round to round: each round's curves are
-worked out from rest, and would let go of whatever is not pressed at any more.
+Each body has twelve curves (`correction`): its root's horizontal shift, its feet's, and the rotations of its arms about
+their shoulders. Every round finds the contacts at the bodies' current places and moves each body by its share of each
+contact (`crowd_body.solve_curves`), only part of the way at a time, since a change here opens or closes contacts there.
+The direction and pressure of each contact are remembered from round to round: each round solves its curves from rest,
+and would release whatever no longer presses.
 
-*How hard:* bodies come apart to where contacts are no longer found, and would fall back into each other in the next
-round. So a contact goes on pressing until nothing falls back on it: with a lack d of distance (negative where there is
-room), a round turns its pressure p into max(0, p + PRESSURE_STEP d), and asks for d + p (the method of multipliers for
-inequalities: Bertsekas 1982, Constrained Optimization and Lagrange Multiplier Methods, ch. 3).
+*Pressure:* bodies separate until their contacts are no longer found, and would fall back into each other in the next
+round. So a contact keeps pressing until nothing falls back on it: with a missing distance d (negative where there is
+room), a round changes its pressure p to max(0, p + PRESSURE_STEP d), and asks for d + p (the method of multipliers for
+inequalities: Bertsekas 1982, Constrained Optimization and Lagrange Multiplier Methods, chapter 3).
 
-*Which way:* the shortest way apart turns round at the moment at which two lines cross: pushed by it, both would be
-pushed the one way before and the other way after, and stay where they are. So they part on the side on which they miss
-each other on the whole, over some tenths of a second.
+*Direction:* the shortest separation reverses at the moment two lines cross: both bodies would be pushed one way before
+it and the other way after it, and stay where they are. So they separate towards the side on which they pass each other
+on average over some tenths of a second.
 """
 
 from __future__ import annotations
@@ -28,39 +28,48 @@ from .capsules import Touching, touching
 from .crowd_body import BASE, Calm, Contact, CrowdBody, moved, solve_curves
 
 ALLOWED = 0.005
-"""Metres of overlap that are left as they are."""
+"""m of overlap that is accepted."""
 
 ROOM = 0.06
-"""Metres between two capsules, more than ALLOWED lets them, up to which their contact is followed."""
+"""m beyond the accepted overlap: closer capsules count as a contact."""
 
 INERTIA = 4.0
-"""How much a metre of pressure counts for the side it pressed to, against a metre between two lines."""
+"""Weight of a metre of pressure for its side, relative to a metre between two lines."""
 
+# Rounds in all, rounds in which contacts at arms move the arms alone, and the share of each step.
 _ROUNDS, _ARMS_ALONE = 24, 4
 _STEP = 0.35
-_LOOKED_OVER = 8  # rounds after which it is looked up again who is near
-_CLOSE, _AROUND = 0.1, 4  # metres within which, and frames around which bodies are near
+_LOOKED_OVER = 8  # rounds after which the close frames are found again
+_CLOSE, _AROUND = 0.1, 4  # m within which, and frames around which bodies are close
 
 SIDE_SECONDS = 0.2
-"""Seconds before and behind a moment within which a contact counts for the side at that moment, less the farther."""
+"""s before and after a moment within which a contact counts for the side at that moment, with falling weight."""
 
 OUTWARD = 2.0
-"""How much the way between two trunks counts against the side on which two capsules pass."""
+"""Weight of the direction between two trunks, relative to the side on which two capsules pass."""
 
 PRESSURE_STEP, MOST_PRESSURE = 0.2, 0.5
-"""Share of what lacks that a contact presses with from then on, and metres that it presses with at most: bodies that
-cannot get apart are not thrown about."""
+"""Share of the missing distance that becomes pressure each round, and the largest pressure, m: bodies that cannot be
+separated are not thrown about."""
 
 
 def pushed(
     bodies: Sequence[CrowdBody], pairs: Sequence[tuple[int, int]], curves: Sequence[np.ndarray],
     pressures: Sequence[Pressure], held, fps: float, first: int = 0,
 ) -> list[np.ndarray]:  # fmt: skip
-    """The curves (T, 12) of each body with which these pairs are out of each other, as far as they can be.
+    """Solve the curves with which these pairs no longer overlap, where that is possible.
 
-    curves: those that they have already. pressures: of each pair, what its contacts have pressed with so far; changed.
-    held: for each body whether its curves stay what they are at its first and at its last frame. The bodies lie on the
-    same T frames, from frame `first` of the clock of the pressures on."""
+    Args:
+        bodies: over the same T frames.
+        pairs: indices of the bodies to separate.
+        curves: (T, 12) per body, m and rad so far.
+        pressures: the memory of each pair's contacts; changed in place.
+        held_ends: per body, whether its curves keep their values at its first and last frame.
+        fps: frames per second.
+        first: frame of the pressures' clock of the bodies' frame 0.
+    Returns:
+        (T, 12) per body, m and rad.
+    """
     now = [np.array(values) for values in curves]
     calm = [Calm.of(body, own, ends, fps) for body, own, ends in zip(bodies, now, held)]
     for turn in range(_ROUNDS):
@@ -77,22 +86,33 @@ def pushed(
 
 
 class Pressure:
-    """The pressures (K,) m of contacts that are known by whole numbers, and the sides (K, 3) to which the one is pushed
-    out of the other; 0 for all others."""
+    """The pressures of contacts known by whole numbers, and the sides they press to; 0 for all others.
+
+    Attributes:
+        keys: (K,) int, ascending.
+        values: (K,) m.
+        sides: (K, 3) unit vectors.
+    """
 
     def __init__(self):
         self.keys, self.values, self.sides = np.zeros(0, int), np.zeros(0), np.zeros((0, 3))
 
     def pushes(self, keys: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """What contacts `keys` (K,) have pressed with so far: (K,) m and to which side (K, 3) unit."""
+        """Find the pressures (K,) m and sides (K, 3) of the contacts `keys` (K,)."""
         if not len(self.keys):
             return np.zeros(len(keys)), np.zeros((len(keys), 3))
         at = np.minimum(np.searchsorted(self.keys, keys), len(self.keys) - 1)
         return np.where(self.keys[at] == keys, self.values[at], 0.0), self.sides[at]
 
     def keep(self, keys: np.ndarray, values: np.ndarray, sides: np.ndarray, span: tuple[int, int]) -> None:
-        """Contacts `keys` (K,), no number twice, press with `values` (K,) m to the sides (K, 3) from now on; all others
-        with numbers from span[0] to below span[1] press no more."""
+        """Update the pressures of a span; other contacts in the span no longer press.
+
+        Args:
+            keys: (K,) unique numbers of contacts.
+            values: (K,) m.
+            sides: (K, 3) unit vectors.
+            span: numbers from span[0] to below span[1].
+        """
         order = np.argsort(keys, kind="stable")
         kept = order[values[order] > 0.0]
         low, high = np.searchsorted(self.keys, span)
@@ -102,18 +122,27 @@ class Pressure:
 
 
 def pressed(before: np.ndarray, lack: np.ndarray) -> np.ndarray:
-    """(K,) m that contacts press with which pressed with `before` (K,) m and lack `lack` (K,) m of distance."""
+    """Compute the new pressures (K,) m from the old (K,) m and the missing distances (K,) m."""
     return np.clip(before + PRESSURE_STEP * lack, 0.0, MOST_PRESSURE)
 
 
 def sides(found: Touching, before: np.ndarray, fps: float) -> np.ndarray:
-    """(K, 3) unit vectors from the other to the one: the way from line to line plus `before` (K, 3) m, weighed over
-    SIDE_SECONDS around each contact among contacts of the same two capsules."""
+    """Compute the sides on which capsules pass each other.
+
+    Args:
+        found: K contacts.
+        before: (K, 3) m, past pressure as a vector.
+        fps: frames per second.
+    Returns:
+        (K, 3) unit vectors from the other to the one: the offset between the lines plus `before`, weighted over
+        SIDE_SECONDS among contacts of the same two capsules.
+    """
     reach = max(1, round(SIDE_SECONDS * fps))
     order = np.lexsort((found.frame, found.other, found.one))
     frame, one, other = found.frame[order], found.one[order], found.other[order]
     off = (_off(found) + before)[order]
     total = np.array(off)
+    # Sorted by capsule pair and frame, rows `step` apart are at most so many frames apart; add both ways.
     for step in range(1, min(reach, len(off))):
         apart = frame[step:] - frame[:-step]
         same = (one[step:] == one[:-step]) & (other[step:] == other[:-step])
@@ -126,19 +155,28 @@ def sides(found: Touching, before: np.ndarray, fps: float) -> np.ndarray:
 
 
 def way_out(found: Touching, side: np.ndarray, trunks: np.ndarray, allowed: float) -> tuple[np.ndarray, np.ndarray]:
-    """Which way (K, 3), unit, the one leaves the other by, and how far (K,) m until they are `allowed` m in each other,
-    negative where there is room. side (K, 3): on which they pass, turned towards the way over the ground from the
-    other's trunk to the one's, trunks (T, 3) m, so that limbs that have caught each other come free."""
+    """Compute in which direction and how far the one has to move.
+
+    Args:
+        found: K contacts.
+        side: (K, 3) unit vectors, the sides on which they pass. They are turned towards the horizontal direction
+            between the trunks, so that interlocked limbs come free.
+        trunks: (T, 3) m from the other's trunk to the one's.
+        allowed: m of overlap that may remain.
+    Returns:
+        Directions (K, 3), unit, and distances (K,) m, negative where there is room.
+    """
     out = trunks[found.frame] * np.array([1.0, 1.0, 0.0])
     way = unit_vectors(side + OUTWARD * unit_vectors(out))
     off = _off(found)
     along = np.einsum("kc,kc->k", way, off)
+    # Solve |offset + distance * direction| = radii - allowed for the distance.
     square = along**2 + (found.radii - allowed) ** 2 - np.einsum("kc,kc->k", off, off)
     return way, np.sqrt(np.maximum(square, 0.0)) - along
 
 
 def _near_frames(bodies, placed, pair: tuple[int, int]) -> np.ndarray:
-    """The frames at which two bodies are within _CLOSE of each other, and _AROUND before and behind."""
+    """Find the frames at which two bodies are within _NEAR_DISTANCE, and _NEAR_FRAMES around them."""
     one, other = pair
     found = touching(placed[one], placed[other], (bodies[one].radii, bodies[other].radii), -_CLOSE).frame
     near = np.zeros(len(placed[pair[0]]) + 2 * _AROUND, bool)
@@ -148,7 +186,7 @@ def _near_frames(bodies, placed, pair: tuple[int, int]) -> np.ndarray:
 
 
 def _contacts(bodies, placed, pairs, near, pressures, first: int, fps: float) -> list[Contact]:
-    """The contacts of every body with all others, of each pair at the frames `near`."""
+    """Find the contacts of every body with all others, at the frames `near` of each pair."""
     rows: list[list[tuple]] = [[] for _ in bodies]
     for (one, other), frames, pressure in zip(pairs, near, pressures):
         two = placed[one], placed[other]
@@ -164,12 +202,13 @@ def _contacts(bodies, placed, pairs, near, pressures, first: int, fps: float) ->
 
 
 def _pressing(found: Touching, two, pressure: Pressure, first: int, fps: float) -> tuple:
-    """The contacts of two bodies that press, which way (K, 3), unit, the one is pushed and how far (K,) m."""
+    """Select the contacts of two bodies that press; return them, directions (K, 3) and distances (K,) m."""
     parts = two[0].shape[1] * two[1].shape[1]
+    # One number per (frame, capsule, capsule), ascending with the frame.
     keys = (found.frame + first) * parts + found.one * two[1].shape[1] + found.other
     before, towards = pressure.pushes(keys)
     side = sides(found, INERTIA * before[:, None] * towards, fps)
-    trunks = two[0][:, 0].mean(axis=1) - two[1][:, 0].mean(axis=1)  # by the middle of the hips
+    trunks = two[0][:, 0].mean(axis=1) - two[1][:, 0].mean(axis=1)  # between the middles of the hips
     way, lack = way_out(found, side, trunks, ALLOWED)
     now = pressed(before, lack)
     pressure.keep(keys, now, side, (first * parts, (first + len(two[0])) * parts))
@@ -178,13 +217,17 @@ def _pressing(found: Touching, two, pressure: Pressure, first: int, fps: float) 
 
 
 def _share(found: Touching, way, give, bodies, placed, pair: tuple[int, int], is_one: bool) -> tuple:
-    """What one of a pair, of whom is_one tells whether it is the contacts' one, has of them, as columns of `Contact`;
-    way (K, 3) and give (K,) m: where to and how far both have to part."""
+    """Build the columns of `BodyContacts` for one body of a pair.
+
+    is_one: whether the body is the contacts' `one`; direction (K, 3) and distance (K,) m: where to and how far both
+    have to separate.
+    """
     body, against = pair
     part, beside = (found.one, found.other) if is_one else (found.other, found.one)
     at = found.at_one if is_one else found.at_other
     ends = placed[body][found.frame, part]
     place = ends[:, 0] + at[:, None] * (ends[:, 1] - ends[:, 0])
+    # The firmer body moves less. An arm alone takes the whole distance, two arms half each.
     firm = [bodies[number].firm[found.frame] for number in pair]
     arms = [np.array([p.limb == "arm" for p in bodies[n].parts])[c] for n, c in ((body, part), (against, beside))]
     arm = give * np.where(arms[0], np.where(arms[1], 0.5, 1.0), 0.0)
@@ -192,5 +235,5 @@ def _share(found: Touching, way, give, bodies, placed, pair: tuple[int, int], is
 
 
 def _off(found: Touching) -> np.ndarray:
-    """(K, 3) m from the other's line to the one's."""
+    """Compute the vectors (K, 3) m from the other's line to the one's."""
     return found.away * (found.radii - found.depth)[:, None]

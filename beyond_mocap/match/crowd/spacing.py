@@ -1,10 +1,11 @@
-"""Which bodies come near each other and when, and tracks that come nearer than two trunks allow pushed apart, before
-anything is made from them.
+"""Find which bodies come close to each other and when, and separate tracks that come closer than two trunks allow,
+before
+motions are constructed from them.
 
-The shifts are the least smooth ones: sum STAY (|s|^2 + SECONDS^6 |s'''|^2) over everybody, plus the square of what is
-lacking of the distance while two are too near. Which way they are pushed turns with how they lie to each other; where
-one goes straight through the other that would be one way and at once the other, so the first rounds smooth its
-direction over time, and they pass each other on the side on which they miss each other.
+The shifts are the least and smoothest ones: they minimise sum SHIFT_WEIGHT (|s|^2 + SHIFT_SECONDS^6 |s'''|^2) over all
+bodies, plus the square of the missing distance while two are too close. The direction in which they are pushed turns
+with their relative position. Where one runs straight through the other it would reverse abruptly, so the first rounds
+smooth it over time, and they pass each other on the side on which they are offset.
 """
 
 from __future__ import annotations
@@ -19,20 +20,20 @@ from ...base.vectors import arctan2
 from ...motion.track import zero_phase_hann
 
 DISTANCE = 0.55
-"""Metres between the middles of two bodies that stand or run beside each other."""
+"""m between the middles of two bodies that stand or run side by side."""
 
 STAY, SECONDS = 0.003, 0.5
-"""Weight of a shift against what lacks of the distance, and seconds within which it comes and goes."""
+"""Weight of a shift relative to the missing distance, and s in which it fades in and out."""
 
 REACH = 2.5
-"""Seconds before and behind a meeting within which shifts begin and end."""
+"""s before and after a meeting within which shifts start and end."""
 
 STEADY = 30.0
-"""How much firmer who touches the ball keeps his way."""
+"""How much more firmly a player keeps their path while they touch the ball."""
 
-_TURNED = (1.0, 1.0, 0.8, 0.8, 0.6, 0.6, 0.4, 0.4, 0.2, 0.2, 0.1, 0.1)  # s over which directions are smoothed at first
-_ROUNDS, _STEP = 24, 0.5  # directions turn as bodies part, so shifts go half of the way each round
-_HELD = 1e6  # weight that holds a value: far above all others
+_TURNED = (1.0, 1.0, 0.8, 0.8, 0.6, 0.6, 0.4, 0.4, 0.2, 0.2, 0.1, 0.1)  # s of smoothing of directions, per round
+_ROUNDS, _STEP = 24, 0.5  # directions change as bodies separate, so shifts go half of the way each round
+_HELD = 1e6  # weight that fixes a value: far above all others
 
 Span = tuple[int, int, tuple[int, int]]
 """First frame, end, and the numbers of two bodies."""
@@ -41,11 +42,18 @@ Span = tuple[int, int, tuple[int, int]]
 def spaced(
     times: np.ndarray, positions: np.ndarray, keep: np.ndarray | None = None, distance: float = DISTANCE
 ) -> np.ndarray:
-    """(P, N, 2) m by which P bodies give way to each other.
+    """Compute the horizontal shifts with which bodies keep their distance.
 
-    times (N,) s, rising evenly; positions (P, N, 2) m, NaN where somebody is not there; keep (P, N): how firmly each
-    keeps his way against the others', 1 by default (`keeping`). Shifts are 0 but around meetings, and at the first and
-    last frame."""
+    Shifts are 0 except around meetings, and at the first and last frame.
+
+    Args:
+        times: (N,) s, evenly spaced, ascending.
+        positions: (P, N, 2) m, NaN where a player is absent.
+        firmness: (P, N) how firmly each keeps their path against the others, 1 by default (`compute_firmness`).
+        distance: m, the least distance.
+    Returns:
+        (P, N, 2) m.
+    """
     shifts = np.zeros(positions.shape)
     if len(times) < 4:
         return shifts
@@ -58,8 +66,16 @@ def spaced(
 
 
 def keeping(count: int, moments: np.ndarray, fps: float, seconds: float = 0.6) -> np.ndarray:
-    """(T,) how firmly somebody keeps his way who touches the ball at frames `moments` (K,): STEADY there, 1 from
-    `seconds` before and behind on."""
+    """Compute how firmly a player keeps their path around touches of the ball.
+
+    Args:
+        count: T frames.
+        moments: (K,) frames of the touches.
+        fps: frames per second.
+        seconds: s before and after a touch over which the firmness falls to 1.
+    Returns:
+        (T,) TOUCH_FIRMNESS at touches, 1 far from them.
+    """
     if not len(moments):
         return np.ones(count)
     away = np.abs(np.arange(count)[:, None] - np.asarray(moments)).min(axis=1) / (seconds * fps)
@@ -68,8 +84,14 @@ def keeping(count: int, moments: np.ndarray, fps: float, seconds: float = 0.6) -
 
 @dataclass(frozen=True)
 class Episode:
-    """Bodies that come near each other, one through the other. bodies: their numbers, ascending; first, end: frames;
-    pairs: (one, other) of those that do."""
+    """Bodies that come close to each other, directly or through a third.
+
+    Attributes:
+        bodies: their indices, ascending.
+        first: first frame.
+        end: end frame.
+        pairs: (one, other) of those that come close.
+    """
 
     bodies: tuple[int, ...]
     first: int
@@ -78,8 +100,15 @@ class Episode:
 
 
 def episodes(positions: np.ndarray, distance: float, reach: int) -> list[Episode]:
-    """All times at which two of the positions (P, N, 2) m, NaN where somebody is not there, are nearer than `distance`
-    metres, `reach` frames before and behind included; what overlaps in time and shares a body is one episode."""
+    """Find all times at which two bodies come too close.
+
+    Args:
+        positions: (P, N, 2) m, NaN where a player is absent.
+        distance: m, the least distance.
+        reach: frames added before and after.
+    Returns:
+        The episodes: spans that overlap in time and share a body are one.
+    """
     found = []
     for one in range(len(positions) - 1):
         off = positions[one + 1 :] - positions[one]
@@ -91,11 +120,11 @@ def episodes(positions: np.ndarray, distance: float, reach: int) -> list[Episode
 
 
 def joined_spans(spans: list[Span]) -> list[Episode]:
-    """Spans (first frame, end, pair of bodies) as episodes: those that overlap in time and share a body are one."""
+    """Join spans (first frame, end, pair) that overlap in time and share a body into episodes."""
     groups: list[tuple[int, int, set, set]] = []
     for first, end, pair in sorted(spans):
         bodies, pairs = set(pair), {pair}
-        while met := [g for g in groups if g[0] < end and first < g[1] and g[2] & bodies]:  # what is joined meets more
+        while met := [g for g in groups if g[0] < end and first < g[1] and g[2] & bodies]:  # may meet more
             groups = [g for g in groups if not any(g is other for other in met)]
             for low, high, others, theirs in met:
                 first, end, bodies, pairs = min(first, low), max(end, high), bodies | others, pairs | theirs
@@ -105,8 +134,16 @@ def joined_spans(spans: list[Span]) -> list[Episode]:
 
 
 def meetings(spans: list[Span], met: list[Span]) -> list[Episode]:
-    """These spans as episodes, together with all who meet their bodies at the same time by the spans `met`, and in turn
-    those: nobody is pushed into somebody who is not looked at."""
+    """Find the episodes of these spans, with all bodies they meet at the same time.
+
+    A body is then not pushed into one that is not part of the solution.
+
+    Args:
+        spans: spans to resolve.
+        past_spans: all spans known so far, which may bring in more bodies, and in turn those they meet.
+    Returns:
+        The episodes.
+    """
     spans = list(spans)
     while True:
         found = joined_spans(spans)
@@ -122,7 +159,7 @@ def meetings(spans: list[Span], met: list[Span]) -> list[Episode]:
 
 
 def _pushed(episode: Episode, places: np.ndarray, firm: np.ndarray, distance: float, fps: float) -> np.ndarray:
-    """(K, T, 2) m: the shifts of one episode's bodies, whose places (K, T, 2) m and firmness (K, T) are given."""
+    """Solve the shifts (K, T, 2) m of one episode's bodies at `places` (K, T, 2) m with their firmness (K, T)."""
     bodies, count = len(places), places.shape[1]
     calm = _calm(firm, fps)
     number = {body: row for row, body in enumerate(episode.bodies)}
@@ -142,7 +179,7 @@ def _pushed(episode: Episode, places: np.ndarray, firm: np.ndarray, distance: fl
 
 
 def _calm(firm: np.ndarray, fps: float) -> BandedLeastSquares:
-    """The sum of squares that keeps shifts small and smooth, and holds both ends; firm (K, T)."""
+    """Build the squares that keep shifts small and smooth, and hold both ends; firmness (K, T)."""
     squares = BandedLeastSquares(firm.shape[1], 2 * len(firm))
     held = np.zeros(firm.shape[1])
     held[:2], held[-2:] = _HELD, _HELD
@@ -156,8 +193,10 @@ def _calm(firm: np.ndarray, fps: float) -> BandedLeastSquares:
 def _lacking(
     places: np.ndarray, shifts: np.ndarray, pair: tuple[int, int], distance: float, seconds: float, fps: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The rows of one pair for `BandedLeastSquares.add_rows`: where it is too near, which way and how far it has to
-    part; the directions smoothed over `seconds`."""
+    """Build the rows of one pair for `BandedLeastSquares.add_rows`: where it is too close, in which direction and how
+    far it
+    has to separate; directions are smoothed over `seconds`.
+    """
     one, other = pair
     bodies = len(places)
     off = places[one] + shifts[one] - places[other] - shifts[other]
@@ -170,10 +209,12 @@ def _lacking(
             angle = zero_phase_hann(angle[:, None], fps, seconds)[:, 0]
         way = np.stack([np.cos(angle), np.sin(angle)], axis=1)
         along = np.einsum("tk,tk->t", way, part)
+        # Solve |part + need * direction| = distance for the need.
         needs[low:high] = np.sqrt(along**2 + distance**2 - np.einsum("tk,tk->t", part, part)) - along
         directions[low:high] = way
     frame = np.flatnonzero(near)
     way, need = directions[frame], np.minimum(needs[frame], distance)
+    # Unknown number of body b, axis a at frame t: (t * bodies + b) * 2 + a.
     index = (frame * 2 * bodies)[:, None] + np.array([2 * one, 2 * one + 1, 2 * other, 2 * other + 1])
     apart = (shifts[one] - shifts[other])[frame]
     return index, np.concatenate([way, -way], axis=1), need + np.einsum("tk,tk->t", way, apart)

@@ -1,4 +1,6 @@
-"""Neighbours who do not show the same clip in step: which lag each player likes, and who is in step all the same."""
+"""Variety among neighbours: choose each player's preferred clip lag, and find players who show the same clip in
+step.
+"""
 
 from __future__ import annotations
 
@@ -7,27 +9,33 @@ import numpy as np
 from ...synthesis.search.preferences import PERIOD
 
 NEAR = 10.0
-"""Metres between two players within which the same clip in step is seen."""
+"""m between two players within which the same clip in step is noticed."""
 
 PHASE = 0.15
-"""Seconds between the places in a clip within which two players are in step."""
+"""s between the times in a clip within which two players are in step."""
 
 APART = 0.3
-"""Seconds between the lags of two players who come near each other."""
+"""s between the lags that can be chosen."""
 
 BESIDE = 0.3
-"""How much somebody near who has the next lag counts against one who has the same."""
+"""Weight of a neighbour with the next lag, relative to one with the same lag."""
 
 SWEEPS = 6
-"""Times that everybody chooses, knowing what all others have chosen."""
+"""Rounds in which every player chooses, knowing the choice of all others."""
 
 
 def lags(positions: np.ndarray) -> np.ndarray:
-    """(P,) s: the lag that each player is to like (`Plan.lag`), so that those who are much near each other have others.
+    """Choose each player's preferred lag (`Plan.lag`), so that players who are often near each other differ.
 
-    positions (P, N, 2) m at evenly spaced times, NaN where somebody is not there; a sample or a few a second will do.
-    There are PERIOD / APART lags. Whoever is near others most chooses first, and each takes the lag which, with those
-    beside it, those have near whom he is least; then they choose again."""
+    There are PERIOD / LAG_STEP lags. The player who is near others most chooses first. Each takes the lag whose users,
+    and those of the lags next to it, they are near least; then all choose again.
+
+    Args:
+        positions: (P, N, 2) m at evenly spaced times, NaN where a player is absent; one or a few samples per second are
+            enough.
+    Returns:
+        (P,) s.
+    """
     count = round(PERIOD / APART)
     near = np.zeros((len(positions), len(positions)))
     for one, place in enumerate(positions):
@@ -43,10 +51,15 @@ def lags(positions: np.ndarray) -> np.ndarray:
 
 
 def in_step(shown: np.ndarray, seconds: np.ndarray, positions: np.ndarray) -> np.ndarray:
-    """(P, T) bool: who shows at which time the same clip as somebody within NEAR metres, within PHASE seconds of it.
+    """Find who shows the same clip as a player within NEAR_DISTANCE, within PHASE_SECONDS of it.
 
-    shown (P, T) int: which clip, a mirrored one being another, -1 where somebody is not there; seconds (P, T) of its
-    own clock; positions (P, T, 2) m, of P players at T common times."""
+    Args:
+        clips: (P, T) int, the clip of each player (a mirrored one is another clip), -1 where absent.
+        seconds: (P, T) s on the clip's clock.
+        positions: (P, T, 2) m.
+    Returns:
+        (P, T) bool.
+    """
     found = np.zeros(shown.shape, bool)
     for one in range(len(shown) - 1):
         others = slice(one + 1, None)
@@ -58,6 +71,6 @@ def in_step(shown: np.ndarray, seconds: np.ndarray, positions: np.ndarray) -> np
 
 
 def share_in_step(shown: np.ndarray, seconds: np.ndarray, positions: np.ndarray) -> float:
-    """Share of the time of all players in which they are in step with a neighbour (`in_step`); 0 where nobody is."""
+    """Measure the share of the time of all players in which they are in step with a neighbour; 0 if none is present."""
     there = shown >= 0
     return float(in_step(shown, seconds, positions)[there].mean()) if there.any() else 0.0

@@ -1,6 +1,8 @@
-"""An edit list that names its clips by path and counts their own frames, so that it fits the library whenever that is
-built again, and is as small as it can be: runs of frames that follow each other evenly. `named` makes it of a
-library's own edit list, `bound` the other way round."""
+"""An edit list that names its clips by path and counts their own frames.
+
+It stays valid when the library is built again, and it is compact: it stores runs of evenly spaced frames.
+`to_named_edit` converts a library's own edit list, `to_library_edit` the other way round.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +19,7 @@ from ...motion.skeleton import frozen_array
 from ...synthesis.search.edit_list import EditList, PlacedKey
 
 CONTINUES = 0.05
-"""Library frames by which the next frame may miss its place and still goes on without a cut."""
+"""Library frames: a run that starts this close to where the previous one ends continues it without a cut."""
 
 _FIELDS = (("clip", int), ("first", float), ("rate", float), ("length", int), ("cut", bool))
 
@@ -25,13 +27,21 @@ ClipName = tuple[str, bool]
 """A clip's path below the library, and whether it is mirrored."""
 
 _EVEN = 1e-6
-"""Library frames by which steps within a run may differ."""
+"""Library frames by which the steps within a run may differ."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class NamedKey:
-    """A key moment of the timeline, asked for at `time` s, is served by a key moment of a clip: clip of the table;
-    frame, start and end in the clip's own rate; words that it carries there."""
+    """A key moment of a clip that serves a key moment of the timeline.
+
+    Attributes:
+        time: s, the requested key moment.
+        clip: index into the table of clips.
+        frame: of the key moment, at the clip's own rate.
+        start: first frame, at the clip's own rate.
+        end: last frame, at the clip's own rate.
+        words: labels the clip has there.
+    """
 
     time: float
     clip: int
@@ -45,10 +55,16 @@ class NamedKey:
 class NamedEdit:
     """R runs of T frames in all, at the library's rate.
 
-    clips: table of clips. clip (R,) index into it; first (R,) frame of the clip, at the library's rate from its
-    beginning, that a run begins with (beyond the clip's ends a little, where these are held); rate (R,) frames that it
-    goes on by; length (R,) frames; cut (R,) bool: whether it begins another piece or goes on with the run before. keys:
-    in the order of time."""
+    Attributes:
+        clips: table of clips.
+        clip: (R,) index into the table.
+        first: (R,) first frame of each run, at the library's rate from the start of the clip; slightly beyond the
+            clip's ends where these are held.
+        rate: (R,) clip frames per output frame.
+        length: (R,) output frames.
+        cut: (R,) bool, the run starts another piece; else it continues the run before.
+        keys: in order of time.
+    """
 
     clips: tuple[ClipName, ...]
     clip: np.ndarray
@@ -67,22 +83,22 @@ class NamedEdit:
 
     @property
     def starts(self) -> np.ndarray:
-        """(R,) frame at which each run begins."""
+        """(R,) frame at which each run starts."""
         return np.cumsum(self.length) - self.length
 
     @property
     def seams(self) -> np.ndarray:
-        """(S,) frames that begin another piece, but for the first."""
+        """(S,) frames of the transitions: those that start another piece, except the first."""
         return self.starts[1:][self.cut[1:]]
 
     def frames(self) -> tuple[np.ndarray, np.ndarray]:
-        """Clip of the table (T,) and frame of it (T,) that every frame shows."""
+        """Give the clip of the table (T,) and the clip's frame (T,) of every frame."""
         run = np.repeat(np.arange(len(self.clip)), self.length)
         return self.clip[run], self.first[run] + self.rate[run] * (np.arange(len(run)) - self.starts[run])
 
 
 def part(edit: NamedEdit, low: int, high: int) -> NamedEdit:
-    """Frames low .. high of an edit list, with all of its keys."""
+    """Cut the frames low .. high out of an edit list; it keeps all keys."""
     starts = edit.starts
     begin, end = np.maximum(starts, low), np.minimum(starts + edit.length, high)
     kept = end > begin
@@ -93,8 +109,16 @@ def part(edit: NamedEdit, low: int, high: int) -> NamedEdit:
 
 
 def chained(parts: Sequence[NamedEdit], keys: Sequence[NamedKey]) -> NamedEdit:
-    """One edit list after the other, cut in between unless the next goes on with the clip where the one before leaves
-    it; `keys` by the names of the clips in the joint table: see `retabled`."""
+    """Join edit lists one after the other.
+
+    There is a cut in between unless the next one continues the clip where the one before leaves it.
+
+    Args:
+        parts: in order.
+        keys: with clips numbered as in the joint table (`renumber_clips`).
+    Returns:
+        One edit list.
+    """
     clips = table(parts)
     parts = [retabled(each, clips) for each in parts]
     clip, first, rate, length, cut = (np.concatenate([getattr(each, name) for each in parts]) for name, _ in _FIELDS)
@@ -106,12 +130,12 @@ def chained(parts: Sequence[NamedEdit], keys: Sequence[NamedKey]) -> NamedEdit:
 
 
 def table(parts: Sequence[NamedEdit]) -> tuple[ClipName, ...]:
-    """All clips of some edit lists, each once."""
+    """List all clips of some edit lists, each once, sorted."""
     return tuple(sorted({name for each in parts for name in each.clips}))
 
 
 def retabled(edit: NamedEdit, clips: tuple[ClipName, ...]) -> NamedEdit:
-    """The edit list with another table, which has all of its clips."""
+    """Renumber the clips of an edit list for another table that has all of them."""
     place = {name: number for number, name in enumerate(clips)}
     number = np.array([place[name] for name in edit.clips], int)
     keys = tuple(replace(key, clip=int(number[key.clip])) for key in edit.keys)
@@ -119,8 +143,15 @@ def retabled(edit: NamedEdit, clips: tuple[ClipName, ...]) -> NamedEdit:
 
 
 def named(library: Library, edit: EditList, moments: Sequence[KeyMoment]) -> NamedEdit:
-    """An edit list of `library` by its clips' names; moments: the timeline's key moments by their number in the
-    order."""
+    """Convert a library's edit list to one with named clips.
+
+    Args:
+        library: the library.
+        edit: its edit list.
+        moments: the timeline's key moments, by their index in the plan.
+    Returns:
+        The named edit list.
+    """
     local = edit.frame - library.frames.first[edit.clip]
     starts = np.array(_run_starts(edit, local))
     length = np.diff(np.append(starts, len(edit)))
@@ -137,7 +168,7 @@ def named(library: Library, edit: EditList, moments: Sequence[KeyMoment]) -> Nam
 
 
 def _run_starts(edit: EditList, local: np.ndarray) -> list[int]:
-    """Frames at which another piece begins, or the same one goes on at another rate."""
+    """Find the frames at which another piece starts, or the same one continues at another rate."""
     starts = []
     for low, high in edit.pieces:
         step = np.diff(local[low:high])
@@ -152,13 +183,22 @@ def _named_key(placed: PlacedKey, row: dict[int, int], time: float) -> NamedKey:
 
 
 def bound(library: Library, edit: NamedEdit, moments: Sequence[KeyMoment] = ()) -> EditList:
-    """The edit list of `library` that a named one means; key moments that `moments` have are placed, by their number in
-    it. InputError where the library lacks a clip, or it is shorter than what is shown."""
+    """Convert a named edit list to one of `library`.
+
+    Args:
+        library: the library.
+        edit: the named edit list.
+        moments: key moments; those the edit list serves are placed, by their index.
+    Returns:
+        The library's edit list.
+    Raises:
+        InputError: if the library lacks a clip, or a clip is shorter than what is used of it.
+    """
     place = {(clip.path, clip.mirrored): number for number, clip in enumerate(library.clips)}
     for path, mirrored in edit.clips:
         if (path, mirrored) not in place:
             found = f"no clip {path}{' (mirrored)' if mirrored else ''}"
-            raise InputError(library.folder, found, "the library that the match was made from", "make the match again")
+            raise InputError(library.folder, found, "the library of this match", "run the match again")
     number = np.array([place[name] for name in edit.clips], int)
     clip, local = edit.frames()
     pool = library.frames.first[number[clip]] + local

@@ -1,12 +1,10 @@
-"""Pieces of work spread over processes of this machine, or over a Dask cluster; whatever does them, the results are the
-same.
+"""Run pieces of work in processes of this machine, or on a Dask cluster; the results are the same wherever they run.
 
-    for key, result in run(tasks, work, workers=2):
+    for key, result in run_tasks(tasks, work, WorkerConfig(workers=2)):
         ...
 
-Local workers are plain Python processes (joblib's loky); with a scheduler, the workers of its cluster. A worker that
-dies costs the pieces it had in hand, which are done again by others; a piece that ends its worker every time fails
-alone.
+Local workers are plain Python processes (joblib's loky); with a scheduler, the workers of its cluster. If a worker
+dies, the pieces it had are run again by others; a piece that ends its worker every time fails alone.
 """
 
 from __future__ import annotations
@@ -27,34 +25,43 @@ from typing import NoReturn
 from ...base.errors import BeyondMocapError, Cancelled, InputError
 
 AHEAD = 2
-"""Pieces that each worker has in hand or waiting: enough that none is idle, few enough to keep them out of memory."""
+"""Pieces that each worker runs or has waiting: enough that none is idle, few enough to save memory."""
 
 POLL = 0.2
-"""Seconds between two looks at whether the user wants out."""
+"""s between two checks for a cancellation."""
 
 PATIENCE = 60.0
-"""Seconds without any worker after which a cluster is given up."""
+"""s without any worker after which a cluster is given up."""
 
-_ANSWERS = "10s"  # how long a scheduler may take to answer
+_ANSWERS = "10s"  # the longest a scheduler may take to answer
 _IDLE = 60  # s after which a local worker without work ends
-_BREAKS = 2  # breaks of the workers after which pieces go one by one
+_BREAKS = 2  # breaks of the workers after which pieces run one by one
 
 Work = Callable[..., object]
 Task = tuple[object, tuple]
-"""A key, and the arguments that the work is called with."""
+"""A key, and the arguments of the work."""
 
 
 @dataclass(frozen=True)
 class Failed:
-    """A piece of work that could not be done, and why, in one line."""
+    """A piece of work that failed.
+
+    Attributes:
+        reason: why, in one line.
+    """
 
     reason: str
 
 
 @dataclass(frozen=True, eq=False)
 class Done:
-    """A piece of work that was tried: its result, the MB that its process has needed at most so far, and the seconds of
-    processor time that the piece took."""
+    """A piece of work that was run.
+
+    Attributes:
+        result: what the work returned, or a `TaskFailure`.
+        memory: MB, the peak of its process so far.
+        seconds: s of processor time of this piece.
+    """
 
     result: object
     memory: float = 0.0
@@ -63,19 +70,27 @@ class Done:
 
 @dataclass(frozen=True)
 class Workplace:
-    """Where work is done. workers: processes on this machine, 1: this process itself; scheduler: address of a Dask
-    scheduler, or "" for this machine. InputError for fewer workers than one."""
+    """Where work runs.
+
+    Attributes:
+        workers: processes on this machine; 1: this process itself.
+        scheduler: address of a Dask scheduler, "" for this machine.
+    Raises:
+        InputError: for fewer than one worker.
+    """
 
     workers: int = 1
     scheduler: str = ""
 
     def __post_init__(self):
         if self.workers < 1:
-            raise InputError("--workers", f"{self.workers}", "1 or more")
+            raise InputError("workers", f"{self.workers}", "1 or more")
 
 
 def check_place(place: Workplace) -> None:
-    """InputError where a cluster's scheduler does not answer, so that it is told before work begins."""
+    """Check that a cluster's scheduler answers, so that an error is reported before work starts; InputError
+    otherwise.
+    """
     if place.scheduler:
         with _cluster(place.scheduler):
             pass
@@ -85,12 +100,21 @@ def run(
     tasks: Iterable[Task], work: Work, place: Workplace, cancelled: Callable[[], bool] | None = None,
     spent: Callable[[Done], None] | None = None,
 ) -> Iterator[tuple[object, object]]:
-    """(key, result) of every task, as they end, in any order; the result is `Failed` where `work` raises.
+    """Run tasks and give their results as they end, in any order.
 
-    tasks: taken one by one, only as far as workers are free for them. work: a function of a module, which other
-    processes can import by its name. spent: is told of each piece what it took. Raises
-    Cancelled soon after `cancelled()` says so, InputError where the cluster does not answer, has no workers, or goes
-    away. Closing the iterator, or an error, ends what is still being done."""
+    Args:
+        tasks: (key, arguments), taken one by one when a worker is free.
+        work: a function of a module, which other processes can import by name.
+        config: where the work runs.
+        cancelled: called now and then; True cancels the work.
+        report_result: receives each `TaskResult`.
+    Returns:
+        An iterator over (key, result); the result is a `TaskFailure` if `work` raises. Closing it, or an error, stops
+        the remaining work.
+    Raises:
+        Cancelled: soon after `cancelled` returns True.
+        InputError: if the cluster does not answer, has no workers, or goes away.
+    """
     stop = cancelled or (lambda: False)
     if place.scheduler:
         with _cluster(place.scheduler) as client:
@@ -110,8 +134,10 @@ def _told(done: Generator[tuple[object, Done], None, None], spent) -> Iterator[t
 
 
 def attempt(work: Work, arguments: tuple) -> Done:
-    """What `work` gives for `arguments`, or why it gives nothing. Errors are told as text, since not every error comes
-    through to another process. Raises Cancelled."""
+    """Run `work` with `arguments` and measure it.
+
+    Errors become text, because not every error can be sent to another process. Raises Cancelled.
+    """
     begun = time.process_time()
     try:
         result = work(*arguments)
@@ -119,13 +145,13 @@ def attempt(work: Work, arguments: tuple) -> Done:
         raise
     except BeyondMocapError as error:
         result = Failed(str(error))
-    except Exception as error:  # a fault of one piece must not cost the others
+    except Exception as error:  # an error of one piece must not stop the others
         result = Failed(" ".join(f"{type(error).__name__}: {error}".split()))
     return Done(result, peak_memory(), time.process_time() - begun)
 
 
 def peak_memory() -> float:
-    """MB that this process has needed at most; 0 where the system does not tell (Windows)."""
+    """Measure the peak memory of this process in MB; 0 where the system does not provide it (Windows)."""
     try:
         import resource
     except ImportError:
@@ -141,10 +167,11 @@ def _here(tasks: Iterable[Task], work: Work, stop: Callable[[], bool]) -> Genera
 
 
 def _spread(tasks: Iterator[Task], work: Work, place, stop) -> Generator[tuple[object, Done], None, None]:
-    """The loop over one place's workers: keeps them busy, hands on what is done, and does again what was lost.
+    """Keep workers busy, give results as they end, and run lost pieces again.
 
-    After a break all that was in hand is done again; after several the pieces go one by one, so that the one that ends
-    its worker is found."""
+    After a break all pieces that were running are run again; after several breaks pieces run one by one, so that the
+    one that ends its worker is found.
+    """
     again: deque[Task] = deque()
     going: dict[Future, Task] = {}
     breaks = 0
@@ -154,7 +181,7 @@ def _spread(tasks: Iterator[Task], work: Work, place, stop) -> Generator[tuple[o
             while len(going) < (1 if alone else place.room()) and (task := _next(again, tasks)) is not None:
                 try:
                     going[place.submit(work, task[1])] = task
-                except BrokenExecutor:  # a worker ended while nobody looked
+                except BrokenExecutor:  # a worker ended in the meantime
                     again.appendleft(task)
                     break
             if not going and again:
@@ -174,7 +201,7 @@ def _spread(tasks: Iterator[Task], work: Work, place, stop) -> Generator[tuple[o
                     yield task[0], _result(future)
                 elif alone:
                     place.renew()
-                    yield task[0], Done(Failed("its worker process ended; is there too little memory?"))
+                    yield task[0], Done(Failed("its worker process ended, possibly for lack of memory"))
                 else:
                     lost.append(task)
             if lost:
@@ -193,12 +220,12 @@ def _next(again: deque[Task], tasks: Iterator[Task]) -> Task | None:
 
 
 def _is_broken(future: Future) -> bool:
-    """Whether the place broke, not the work: here nobody else cancels what is in hand."""
+    """Say whether the worker failed, not the work; nothing else cancels running pieces."""
     return future.cancelled() or isinstance(future.exception(), (BrokenExecutor, CancelledError))
 
 
 def _result(future: Future) -> Done:
-    """What a future gives; a failure of the place rather than of the work is a failure of this piece."""
+    """Get the result of a future; an error in sending it counts as a failure of this piece."""
     try:
         return future.result()
     except Exception as error:  # such as a result that cannot be sent
@@ -209,19 +236,21 @@ class _Processes:
     """Processes of this machine."""
 
     started: Executor | None = None
-    """The processes that this program has started last, and that may wait for work."""
+    """The processes this program started last; they may wait for more work."""
 
     def __init__(self, workers: int):
         self._workers = workers
         self._executor: Executor | None = None
 
     def room(self) -> int:
-        """Pieces that may be in hand at once."""
+        """Find how many pieces may run or wait at once."""
         return AHEAD * self._workers
 
     def submit(self, work: Work, arguments: tuple) -> Future:
-        """Hands out a piece; processes that are still there from an earlier stage go on, with all that they hold.
-        BrokenExecutor where one of them has ended."""
+        """Submit a piece; processes of an earlier stage continue with what they have loaded.
+
+        BrokenExecutor if one of them has ended.
+        """
         if self._executor is None:
             from joblib.externals.loky import get_reusable_executor
 
@@ -233,15 +262,15 @@ class _Processes:
         return self._executor.submit(attempt, work, arguments)
 
     def check(self, moved: bool) -> None:
-        """Processes here need no looking after: the executor tells when one ends."""
+        """Do nothing: the executor reports when a process ends."""
 
     def close(self, going: Iterable[Future]) -> None:
-        """Ends the processes where they still work on something; else they wait for the next stage."""
+        """End the processes if they still work; otherwise they wait for the next stage."""
         if any(not future.done() for future in going):
             self.renew()
 
     def renew(self) -> None:
-        """Ends the processes, where one has ended; the next piece starts others."""
+        """End the processes after one has ended; the next piece starts new ones."""
         executor, self._executor = self._executor, None
         if executor is not None:
             executor.shutdown(wait=True, kill_workers=True)  # type: ignore[call-arg]  # loky's own
@@ -251,8 +280,9 @@ _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLI
 
 
 def _follow(parent: int) -> None:
-    """A worker answers no Ctrl-C, which a terminal sends to all processes of a command, and ends soon after the process
-    `parent` that started it, however that ends."""
+    """Set up a worker: it ignores Ctrl-C, which a terminal sends to all processes of a command, and ends soon after
+    the process `parent` that started it.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_after, args=(parent,), daemon=True).start()
 
@@ -264,7 +294,7 @@ def _end_after(parent: int) -> None:
 
 
 def ended() -> None:
-    """Ends the local processes that wait for more work."""
+    """Stop the local processes that wait for work."""
     executor, _Processes.started = _Processes.started, None
     if executor is not None:
         executor.shutdown(wait=True, kill_workers=True)  # type: ignore[call-arg]  # loky's own
@@ -279,37 +309,37 @@ class _Cluster:
         self._looked, self._room, self._moved = -PATIENCE, AHEAD, time.monotonic()
 
     def room(self) -> int:
-        """Pieces that may be in hand at once; workers may come and go."""
+        """Find how many pieces may run or wait at once; workers may come and go."""
         if time.monotonic() - self._looked > 1.0:
             self._looked, self._room = time.monotonic(), AHEAD * max(self._threads(), 1)
         return self._room
 
     def submit(self, work: Work, arguments: tuple) -> Future:
-        """Hands out a piece. InputError where the scheduler is gone."""
+        """Submit a piece; InputError if the scheduler is gone."""
         try:
             return self._executor.submit(attempt, work, arguments)
-        except Exception:  # a client without a scheduler tells it in many ways
+        except Exception:  # a client without a scheduler raises various errors
             return self.renew()
 
     def check(self, moved: bool) -> None:
-        """Raises InputError where nobody has worked for long, since nobody is there."""
+        """Raise InputError if there has been no worker for too long."""
         if moved or self._threads():
             self._moved = time.monotonic()
         elif time.monotonic() - self._moved > PATIENCE:
-            raise InputError("--scheduler", f"no worker for {PATIENCE:g} s", "some", "start 'dask worker ADDRESS'")
+            raise InputError("scheduler", f"no worker for {PATIENCE:g} s", "a worker", "start 'dask worker ADDRESS'")
 
     def renew(self) -> NoReturn:
-        """A cluster looks after its workers itself; what it loses, it loses with its scheduler. InputError."""
-        what = "start it and the command again; what is done is kept"
-        raise InputError("--scheduler", "the scheduler went away", "one that stays", what)
+        """Raise InputError: a cluster restarts its workers itself, so lost pieces mean that its scheduler is gone."""
+        what = "start it and the command again; finished work is kept"
+        raise InputError("scheduler", "the scheduler has stopped", "a running scheduler", what)
 
     def close(self, going: Iterable[Future]) -> None:
-        """Takes back what nobody needs any more."""
+        """Cancel the pieces that are no longer needed."""
         for future in going:
             future.cancel()
 
     def _threads(self) -> int:
-        with contextlib.suppress(Exception):  # a scheduler that is gone answers in many ways
+        with contextlib.suppress(Exception):  # a scheduler that is gone raises various errors
             if self._client.status == "running":
                 return sum(worker["nthreads"] for worker in self._client.scheduler_info()["workers"].values())
         return 0
@@ -317,22 +347,22 @@ class _Cluster:
 
 @contextlib.contextmanager
 def _cluster(address: str) -> Iterator[object]:
-    """A client of the scheduler at `address`; InputError where none answers, or Dask is not installed."""
+    """Connect to the scheduler at `address`; InputError if it does not answer, or Dask is not installed."""
     try:
         from distributed import Client
     except ImportError as error:
-        raise InputError("--scheduler", f"Dask cannot be imported ({error})", "dask and distributed",
+        raise InputError("scheduler", f"Dask cannot be imported ({error})", "dask and distributed",
                          "pip install 'beyond-mocap[cluster]'") from None  # fmt: skip
     for name in [one for one in logging.root.manager.loggerDict if one.split(".")[0] == "distributed"]:
-        logging.getLogger(name).setLevel(logging.CRITICAL + 1)  # what is wrong is told here, in one line
+        logging.getLogger(name).setLevel(logging.CRITICAL + 1)  # errors are reported here, in one line
     try:
         client = Client(address, timeout=_ANSWERS, set_as_default=False)
     except (OSError, ValueError, TypeError) as error:
         found = f"{address} does not answer ({' '.join(str(error).split())[:120]})"
         expected = "the address of a Dask scheduler, such as tcp://127.0.0.1:8786"
-        raise InputError("--scheduler", found, expected, "start one with 'dask scheduler'") from None
+        raise InputError("scheduler", found, expected, "start one with 'dask scheduler'") from None
     try:
         yield client
     finally:
-        with contextlib.suppress(Exception):  # a scheduler that is gone cannot be said goodbye to
+        with contextlib.suppress(Exception):  # closing fails if the scheduler is gone
             client.close(timeout=2)

@@ -1,6 +1,8 @@
-"""The stages of a match that are spread over workers: search, everybody kept apart, figures. What is done already is
-found by the digest of all that it depends on, so that a run goes on where another ended, and after an edit makes only
-what the edit touches."""
+"""The stages of a match that are distributed over workers: search, collision avoidance, figures.
+
+Finished work is found by the digest of everything it depends on, so a run resumes where another ended, and after an
+edit only affected pieces are computed again.
+"""
 
 from __future__ import annotations
 
@@ -28,15 +30,25 @@ from .windows import Piece, keep_piece, kept_piece, spliced
 from .work import Finish, LibrarySource, finish_player, part_crowd, search_unit
 
 SEARCH, CROWD = "search", "crowd"
-"""The kinds of pieces that are kept."""
+"""The kinds of pieces that are stored."""
 
 Report = Callable[[float, str], None]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Job:
-    """What all stages share. source: the library as workers read it; library: as this process has it; place: who works;
-    report(fraction of the stage, text); cancelled()."""
+    """What all stages share.
+
+    Attributes:
+        request: the match's request.
+        folder: its folder.
+        state: its state.
+        source: the library as workers read it.
+        library: the library in this process.
+        workers: where work runs.
+        report: receives the share of the stage done and a text.
+        cancelled: called now and then; True cancels the work.
+    """
 
     order: MatchOrder
     folder: MatchFolder
@@ -48,22 +60,29 @@ class Job:
     cancelled: Callable[[], bool] | None = None
 
     def named(self, *values: object) -> str:
-        """The name of a piece of work that depends on the library and on `values`."""
+        """Build the name of a piece of work that depends on the library and on `values`."""
         return digest_of(FORM, self.source.key, *values)
 
 
 def _spread(job: Job, tasks, work, stage: str) -> Iterator[tuple]:
-    """(key, result) of a stage's tasks (`pool.run`)."""
+    """Run a stage's tasks; (key, result) as of `pool.run_tasks`."""
     return run(tasks, work, job.place, job.cancelled, job.state.spent(stage))
 
 
 def search(job: Job, parts: Sequence[Part]) -> dict[str, PlayerEdit]:
-    """Everybody's edit list, by id, each written as soon as it is there; who fails is told in the state."""
+    """Search every player's edit list; each is written as soon as it is complete.
+
+    Args:
+        job: what all stages share.
+        parts: the players' plans.
+    Returns:
+        Edit list by player id; failures are recorded in the state.
+    """
     return _Search(job, parts).done()
 
 
 class _Search:
-    """The windows of all players: those that are found again, and those that have to be searched."""
+    """The windows of all players: those that are stored, and those that have to be searched."""
 
     def __init__(self, job: Job, parts: Sequence[Part]):
         self._job, self._parts = job, {part.role.player.id: part for part in parts if part.plans}
@@ -74,12 +93,12 @@ class _Search:
         order = job.order
         for player, part in self._parts.items():
             bare = (replace(plan, timeline=Timeline(), solved=None, solve_touches=False) for plan in part.plans)
-            units = sum(len(units_of(plan, 0, order.window, order.overlap)) for plan in bare)  # of the track alone
+            units = sum(len(units_of(plan, 0, order.window, order.overlap)) for plan in bare)  # of the track
             job.state.players[player]["units"] = units
             self._count += units
 
     def done(self) -> dict[str, PlayerEdit]:
-        """Searches what is missing."""
+        """Search what is missing, then return the edit lists by id."""
         job = self._job
         for (player, name), result in _spread(job, self._missing(), search_unit, SEARCH):
             if isinstance(result, Failed):
@@ -87,11 +106,12 @@ class _Search:
                 continue
             path = job.folder.place(SEARCH, name)
             keep_piece(path, result)
-            self._take(player, kept_piece(path) or result)  # as a run that finds it would have it
+            self._take(player, kept_piece(path) or result)  # the stored form, as a later run reads it
         job.folder.forget(SEARCH, self._names)
         return {player: self._edits[player] for player in self._parts if player in self._edits}
 
     def _missing(self) -> Iterator[tuple[tuple[str, str], tuple]]:
+        """Iterate over the tasks that are not stored; add the stored pieces."""
         job = self._job
         for player, part in self._parts.items():
             for number, plan in enumerate(part.plans):
@@ -107,7 +127,7 @@ class _Search:
                         yield (player, name), (job.source, unit)
 
     def _take(self, player: str, piece: Piece) -> None:
-        """One more window; the last one makes the player's edit list."""
+        """Add one window; the last one completes the player's edit list."""
         job, mine = self._job, self._found[player]
         mine.append(piece)
         if self._failed(player):
@@ -136,7 +156,15 @@ class _Search:
 
 
 def keep_apart(job: Job, edits: dict[str, PlayerEdit], span: tuple[float, float]) -> dict[str, CrowdPart]:
-    """What the whole span says of each player, by id: windows of everybody on the match's clock."""
+    """Resolve the collisions of the whole span, in windows of all players on the match's clock.
+
+    Args:
+        job: what all stages share.
+        edits: edit list by player id.
+        span: (start, end) s.
+    Returns:
+        Correction by player id.
+    """
     players, names = list(edits), {}
     windows = _windows(span, min(job.order.window, LONGEST), job.order.fps)
     found: dict[int, tuple[CrowdPart, ...]] = {}
@@ -155,11 +183,11 @@ def keep_apart(job: Job, edits: dict[str, PlayerEdit], span: tuple[float, float]
         if isinstance(result, Failed):
             start, end = windows[number]
             when = f"{told_time(start)}-{told_time(end)} s"
-            job.state.told["notes"].append(f"{when}: bodies are not kept apart: {result.reason}")
+            job.state.told["notes"].append(f"{when}: collisions are not resolved: {result.reason}")
             continue
         keep_parts(job.folder.place(CROWD, names[number]), result)
         found[number] = result
-        job.report(len(found) / len(windows), f"Keeping bodies apart: {len(found)} of {len(windows)} windows")
+        job.report(len(found) / len(windows), f"Resolving collisions: {len(found)} of {len(windows)} windows")
     job.folder.forget(CROWD, names.values())
     rows = [(found[number], windows[number]) for number in sorted(found)]
     return {player: join_windows([(parts[place], window) for parts, window in rows], job.order.fps)
@@ -167,14 +195,14 @@ def keep_apart(job: Job, edits: dict[str, PlayerEdit], span: tuple[float, float]
 
 
 def _windows(span: tuple[float, float], window: float, fps: float) -> list[tuple[float, float]]:
-    """(start, end) s of windows over the span, on frames and on the grid."""
+    """Build the windows (start, end) s of the span, on frames and on the grid."""
     numbers = range(int(np.floor(span[0] / window)) + 1, int(np.ceil(span[1] / window)))
     edges = [span[0], *(number * window for number in numbers), span[1] + 1.0 / fps]
     return list(zip(edges, edges[1:]))
 
 
 def _unnamed(edits: Sequence[PlayerEdit]) -> tuple:
-    """Edit lists without the library's place, on which their motion does not depend."""
+    """Remove the library's path from edit lists, because their motion does not depend on it."""
     bare = [[replace(one, plan=replace(one.plan, library="")) for one in edit.stretches] for edit in edits]
     return tuple(replace(edit, stretches=tuple(stretches)) for edit, stretches in zip(edits, bare))
 
@@ -182,7 +210,15 @@ def _unnamed(edits: Sequence[PlayerEdit]) -> tuple:
 def finish(
     job: Job, parts: Sequence[Part], edits: dict[str, PlayerEdit], crowd: dict[str, CrowdPart], ball: BallPath
 ) -> None:
-    """Everybody's files: the edit list with its correction, and, where asked for, report, provenance and BVH."""
+    """Write all players' files: the corrected edit list and, where requested, report, provenance and BVH.
+
+    Args:
+        job: what all stages share.
+        parts: the players' plans.
+        edits: edit list by player id.
+        crowd: correction by player id.
+        ball: the match's ball.
+    """
     mine = {part.role.player.id: part for part in parts if part.role.player.id in edits}
     names: dict[str, str] = {}
     done = 0
@@ -211,7 +247,7 @@ def finish(
 
 
 def _is_finished(job: Job, part: Part, name: str) -> bool:
-    """Whether an earlier run wrote this player's files; then they are told again."""
+    """Say whether an earlier run wrote this player's files; if so, record them again."""
     endings = {"report": "report.json", "provenance": "provenance.csv"} if job.order.figures else {}
     endings |= {"bvh": "bvh"} if job.order.bvh else {}
     files = {kind: job.folder.of(part.file, ending) for kind, ending in endings.items()}
@@ -223,7 +259,7 @@ def _is_finished(job: Job, part: Part, name: str) -> bool:
 
 
 def _write(job: Job, part: Part, made, name: str) -> dict[str, str]:
-    """Writes a player's files; their names for his row. What an earlier run said of them holds no longer."""
+    """Write a player's files; return their names for the player's row and discard what an earlier run recorded."""
     job.state.player(part.role.player.id, finished=None)
     told = {"finished": name}
     for ending, content in made.files.items():

@@ -1,8 +1,8 @@
-"""A player's plan cut into windows of work, each of which any process can search by itself.
+"""Cut a player's plan into windows of work, each of which any process can search by itself.
 
-Windows lie on a fixed grid of the match's clock, so that the same second falls into the same window for everybody, and
-overlap, so that neighbours can be joined where both have found the same (`windows`). They begin and end with whole
-slots of the search, counted from the stretch's first frame: in the overlap both are offered the same source frames.
+Windows are on a fixed grid of the match's clock, so that the same second is in the same window for every player. They
+overlap, so that neighbours can be joined where both have found the same (`windows`). They start and end with whole
+slots of the search, counted from the stretch's first frame: in the overlap both have the same candidate frames.
 """
 
 from __future__ import annotations
@@ -20,32 +20,38 @@ from ...synthesis.search.offer import SLOT
 from ..player_edit import kept
 
 WINDOW = 300.0
-"""Seconds of a window's own part."""
+"""s of a window, without overlaps."""
 
 OVERLAP = 12.0
-"""Seconds that two neighbours share: two thirds before the edge between them, which the later one needs to find onto
-the way of who comes from further back, and one third behind it."""
+"""s that two neighbours share: two thirds before the edge between them, which the later one needs to converge to the
+sequence of the earlier one, and one third after it."""
 
 RUN_IN = 2.0 / 3.0
-"""Share of the overlap that lies before the edge."""
+"""Share of the overlap before the edge."""
 
 _SHORTEST = 0.25
-"""Share of a window below which the last or the first one goes to its neighbour."""
+"""A first or last window shorter than this share is merged with its neighbour."""
 
 _BEYOND = 0.5
-"""Seconds of the ball's course that are kept beyond both ends."""
+"""s of the ball's trajectory that are kept beyond both ends."""
 
 _SAME = 1e-9
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Unit:
-    """One player's window of work, with all that is needed to search it.
+    """One player's window of work, with everything needed to search it.
 
-    player: his id. stretch: which of his stretches on the pitch. number: of the window within the stretch. start, end:
-    s on the match's clock of the part that is its own. plan: his order of that and of the overlaps around it, as
-    `kept`. first: frame of the plan's first time, at the library's rate from the stretch's first time on. own: (first,
-    end) frames of its own part, counted in the same way."""
+    Attributes:
+        player: id.
+        number: index of the window within the stretch.
+        start: s on the match's clock, of its own part.
+        end: s on the match's clock, of its own part.
+        plan: of its own part and the overlaps around it, as stored in files.
+        stretch: index of the player's stretch on the pitch.
+        first: frame of the plan's first time, at the library's rate from the stretch's first time.
+        own: (first, end) frames of its own part, counted in the same way.
+    """
 
     player: str
     number: int
@@ -58,15 +64,22 @@ class Unit:
 
 
 def units_of(plan: Plan, stretch: int = 0, window: float = WINDOW, overlap: float = OVERLAP) -> tuple[Unit, ...]:
-    """The windows of one stretch of a player: `plan`, whose track's name is his id.
+    """Build the windows of one stretch of a player. Key moments move to the touches they mean before the plan is cut.
 
-    window: seconds; their edges are at multiples of it on the match's clock, to the nearest slot. overlap: seconds that
-    two neighbours share. Key moments are moved to the touches they mean before the plan is cut. InputError
-    for a window or an overlap that leaves no sense."""
+    Args:
+        plan: of the stretch; the name of its track is the player's id.
+        stretch: index of the stretch.
+        window: s; edges are at multiples of it on the match's clock, rounded to the nearest slot.
+        overlap: s that two neighbours share.
+    Returns:
+        The windows in order.
+    Raises:
+        InputError: for a window or an overlap outside its limits.
+    """
     if not 5.0 <= window <= 3600.0:
-        raise InputError("--window", f"{window:g} s", "5 to 3600 s")
+        raise InputError("window", f"{window:g} s", "5 to 3600 s")
     if not 1.0 <= overlap <= window / 2.0:
-        raise InputError("--overlap", f"{overlap:g} s", f"1 s to half of the window, {window / 2.0:g} s")
+        raise InputError("overlap", f"{overlap:g} s", f"1 s to half of the window, {window / 2.0:g} s")
     plan = kept(plan)
     begin, count = float(plan.track.times[0]), frame_count(plan)
     edges = window_edges(begin, count, window)
@@ -82,14 +95,22 @@ def units_of(plan: Plan, stretch: int = 0, window: float = WINDOW, overlap: floa
 
 
 def frame_count(plan: Plan, fps: float = FPS) -> int:
-    """Frames of the plan's track at `fps`, as `motion.track.sample` counts them."""
+    """Count the frames of the plan's track at `fps`, as `motion.track.sample` does."""
     return int(np.floor((plan.track.times[-1] - plan.track.times[0]) * fps + 1e-6)) + 1
 
 
 def window_edges(begin: float, count: int, window: float, fps: float = FPS, step: int = SLOT) -> list[int]:
-    """Frames, at `fps`, between which the windows of a stretch lie, which begins at `begin` s and has `count` frames:
-    0, the multiples of `step` frames nearest to multiples of `window` s on the match's clock, and count. A first or
-    last window that would be short goes to its neighbour. With a step of 1 a part of a stretch has the same ones."""
+    """Build the frames between which the windows of a stretch lie.
+
+    Args:
+        start: s, the start of the stretch.
+        count: its number of frames.
+        window: s; edges are close to multiples of it on the match's clock.
+        fps: frames per second.
+        step: edges are multiples of so many frames; with 1, a part of a stretch has the same edges.
+    Returns:
+        0, the edges, and count. A short first or last window is merged with its neighbour.
+    """
     end = begin + count / fps
     numbers = range(int(np.floor(begin / window)) + 1, int(np.ceil(end / window)))
     inner = [step * round((number * window - begin) * fps / step) for number in numbers]
@@ -98,10 +119,18 @@ def window_edges(begin: float, count: int, window: float, fps: float = FPS, step
 
 
 def cut_plan(plan: Plan, start: float, end: float) -> Plan:
-    """The plan from `start` to `end` seconds, both within its track.
+    """Cut a plan to a span within its track.
 
-    The track's first sample is at `start` and its last at `end`; where the feed has none then, it lies on the line
-    between its neighbours. Key moments and pins outside are left out; spans are kept whole where they reach into it."""
+    The track's first sample is at `start` and its last at `end`, interpolated where the feed has none. Key moments and
+    pins outside are left out; spans that reach into the time stay whole.
+
+    Args:
+        plan: the plan.
+        start: s.
+        end: s.
+    Returns:
+        The cut plan.
+    """
     inside = [key for key in plan.timeline.keys if start <= key.in_force <= end]
     spans = [span for span in plan.timeline.spans if span.start < end and span.end > start]
     return replace(
@@ -114,7 +143,7 @@ def cut_plan(plan: Plan, start: float, end: float) -> Plan:
 
 
 def cut_track(track: Track, start: float, end: float) -> Track:
-    """The samples from `start` to `end` seconds, with one at each of them."""
+    """Cut a track to the samples from `start` to `end` s, with one sample at each of both."""
     inside = track.times[(track.times > start + _SAME) & (track.times < end - _SAME)]
     times = np.concatenate([[start], inside, [end]])
     before = np.clip(np.searchsorted(track.times, times + _SAME, side="right") - 1, 0, len(track) - 1)
@@ -131,8 +160,10 @@ def cut_track(track: Track, start: float, end: float) -> Track:
 
 
 def _between(known: np.ndarray, values: np.ndarray, times: np.ndarray, before: np.ndarray, after: np.ndarray):
-    """(K, n): values (N, n) at known times (N,) on the line between the samples `before` (K,) and `after` (K,); the
-    very values where there is a sample."""
+    """Interpolate (K, n) values between the samples `before` (K,) and `after` (K,); exact values at samples.
+
+    known: (N,) s; values: (N, n).
+    """
     step = known[after] - known[before]
     share = np.where(step > 0.0, (times - known[before]) / np.where(step > 0.0, step, 1.0), 0.0)[:, None]
     return np.where(share == 0.0, values[before], values[before] * (1.0 - share) + values[after] * share)

@@ -1,8 +1,8 @@
-"""What the search finds for one window, no motion yet, only which clip is shown when: found, kept in a file until it is
-needed again (never pickled), and joined into one edit list.
+"""The result of the search for one window: which clip is used when, no motion yet. It is found, saved in a file (never
+pickled), and joined into one edit list.
 
-Windows are cut where two neighbours show the same frame of the same clip, so that it cannot be told where one ends;
-else at the cheapest transition that the overlap has.
+Windows are joined where two neighbours use the same frame of the same clip, so that the joint is invisible; otherwise
+at the transition with the lowest cost in the overlap.
 """
 
 from __future__ import annotations
@@ -35,17 +35,27 @@ from .units import Unit, cut_plan
 _ARRAYS = ("clip", "first", "rate", "length", "cut")
 _PLAIN = ("player", "stretch", "number", "first", "own", "seconds", "hurried")
 _APART = 4
-"""Frames that a transition keeps from other seams, so that it can be faded over."""
+"""Frames between a joint and other transitions, so that it can be blended."""
 
 _NEAR_SEAM, _NEAR_KEY = 10.0, 1000.0
-"""What a transition costs so close to another seam, and within the clip of a key moment."""
+"""Cost of a joint that close to another transition, and of one within the clip of a key moment."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Piece:
-    """What was found for a window. player, stretch, number, first, own: the unit's (`units.Unit`). edit: at the
-    library's rate, from the unit's first frame on. seconds: of processor time that it took. warnings: what the library
-    lacks of what is asked. hurried: frame of `edit` from which on it was searched in a hurry, or None."""
+    """The result for a window.
+
+    Attributes:
+        player: as in the unit (`units.Unit`).
+        stretch: as in the unit.
+        number: as in the unit.
+        first: as in the unit.
+        own: as in the unit.
+        edit: at the library's rate, from the unit's first frame.
+        seconds: s of processor time.
+        warnings: requested labels that the library lacks.
+        hurried: frame of `edit` from which the search was shortened, or None.
+    """
 
     player: str
     stretch: int
@@ -60,10 +70,20 @@ class Piece:
 
 def searched(library: Library, unit: Unit, cancelled: Callable[[], bool] | None = None,
              hurry: Callable[[], bool] | None = None) -> Piece:  # fmt: skip
-    """The edit list of one window of a player.
+    """Search the edit list of one window of a player. The same library, unit and numpy give the same bits.
 
-    library: the recordings; where the plan allows made clips, all windows are offered them, so that neighbours choose
-    from the same. Raises what `synthesize` raises. The same library, unit and numpy give the same bits."""
+    Args:
+        library: the clips. If the plan allows synthetic clips, all windows get them, so that neighbours choose from the
+            same ones.
+        unit: the window.
+        cancelled: called now and then; True cancels the work.
+        hurry: called now and then; True shortens the search.
+    Returns:
+        The result.
+    Raises:
+        InputError: as for `synthesize`.
+        Cancelled: if `cancelled` returns True.
+    """
     from threadpoolctl import threadpool_limits
 
     begun = time.process_time()
@@ -79,12 +99,12 @@ def searched(library: Library, unit: Unit, cancelled: Callable[[], bool] | None 
 
 
 def searched_library(library: Library, plan: Plan) -> Library:
-    """The library that all windows of a plan are searched in."""
+    """Build the library in which all windows of a plan are searched."""
     return with_chosen_gaits(library.extended if plan.made else library, dict(plan.gaits))
 
 
 def keep_piece(path: Path, piece: Piece) -> None:
-    """Writes a piece; InputError where that cannot be done."""
+    """Save a piece; InputError if it cannot be written."""
     header = {name: getattr(piece, name) for name in _PLAIN}
     header |= {"warnings": [[str(line), spans_of(line)] for line in piece.warnings]}
     header |= {"clips": piece.edit.clips, "keys": [asdict(key) for key in piece.edit.keys]}
@@ -95,7 +115,7 @@ def keep_piece(path: Path, piece: Piece) -> None:
 
 
 def kept_piece(path: Path) -> Piece | None:
-    """The piece that `keep_piece` wrote; None where there is none, or none that can be read whole."""
+    """Load the piece that `save_piece` wrote; None if there is no complete file."""
     try:
         with np.load(path, allow_pickle=False) as kept:
             header = json.loads(kept["header"].tobytes())
@@ -105,13 +125,18 @@ def kept_piece(path: Path) -> Piece | None:
         told = tuple(TimedLine(text, *spans) for text, spans in header["warnings"])
         header |= {"own": tuple(header["own"]), "warnings": told}
         return Piece(edit=NamedEdit(clips=clips, **arrays, keys=keys), **header)
-    except Exception:  # a damaged file can fail in any of zipfile's, zlib's, numpy's and our own ways
+    except Exception:  # a damaged file can raise any error of zipfile, zlib, numpy or this package
         return None
 
 
 @dataclass(frozen=True)
 class Joint:
-    """Where two windows were joined: frame of the stretch, at the library's rate; whether both show the same there."""
+    """Where two windows are joined.
+
+    Attributes:
+        frame: of the stretch, at the library's rate.
+        agreed: both windows use the same frame there.
+    """
 
     frame: int
     agreed: bool
@@ -120,10 +145,18 @@ class Joint:
 def spliced(
     library: Library, plans: Sequence[Plan], pieces: Sequence[Piece], window: float = LAYOUT
 ) -> tuple[PlayerEdit, tuple[Joint, ...]]:
-    """A player out of all of his windows, and how these were joined.
+    """Join all windows of a player.
 
-    library: in which they were searched. plans: one per stretch, from which `units_of` made its windows; pieces: all of
-    theirs, in any order; window: s of the windows in which he will be laid out. InputError where a piece is missing."""
+    Args:
+        library: in which they were searched.
+        plans: one per stretch, as given to `build_units`.
+        pieces: of all windows, in any order.
+        window: s of the windows in which the motion will be constructed.
+    Returns:
+        The player's edit list, and the joints.
+    Raises:
+        InputError: if a piece is missing.
+    """
     stretches, joints = [], []
     for number, plan in enumerate(plans):
         plan = kept(plan)
@@ -143,7 +176,7 @@ def spliced(
 
 
 def _joined(library: Library, plan: Plan, pieces: list[Piece]) -> tuple[NamedEdit, list[Joint]]:
-    """The edit list of a stretch, and where its windows were joined."""
+    """Join the windows of a stretch; return its edit list and the joints."""
     clips = table([piece.edit for piece in pieces])
     pieces = [replace(piece, edit=retabled(piece.edit, clips)) for piece in pieces]
     joints = [_joint(library, plan, *pair) for pair in zip(pieces, pieces[1:])]
@@ -156,19 +189,20 @@ def _joined(library: Library, plan: Plan, pieces: list[Piece]) -> tuple[NamedEdi
 
 
 def _frame(plan: Plan, key: NamedKey) -> float:
-    """The frame of the stretch at which a key moment is played."""
+    """Find the frame of the stretch at which a key moment is played."""
     moment = next(moment for moment in plan.timeline.keys if moment.time == key.time)
     return (moment.in_force - float(plan.track.times[0])) * FPS
 
 
 def _joint(library: Library, plan: Plan, before: Piece, after: Piece) -> Joint:
-    """Where one window is left for the next: nearest to the edge between them where both agree."""
+    """Find the joint of two windows: closest to the edge between them where both agree, else where it costs least."""
     low, high, edge = after.first, before.first + len(before.edit), after.own[0]
     (clip, frame), (other, there) = (
         tuple(values[low - piece.first : high - piece.first] for values in piece.edit.frames())
         for piece in (before, after)
     )
     same = (clip == other) & (np.abs(frame - there) < CONTINUES)
+    # Both the frame and the one before must agree, so that the joint continues the clip.
     at = np.flatnonzero(same[1:] & same[:-1]) + 1
     if len(at):
         return Joint(low + int(at[np.argmin(np.abs(low + at - edge))]), True)
@@ -176,7 +210,7 @@ def _joint(library: Library, plan: Plan, before: Piece, after: Piece) -> Joint:
 
 
 def _costs(library: Library, plan: Plan, before: Piece, after: Piece, low: int, high: int) -> np.ndarray:
-    """(high - low - 1,) what it costs to leave one window for the next at frames low + 1 .. high."""
+    """Compute the costs (high - low - 1,) of joints at frames low + 1 .. high."""
     library = searched_library(library, plan)
     begin = float(plan.track.times[0])
     here = cut_plan(plan, begin + low / FPS, begin + (high - 1) / FPS)
@@ -185,6 +219,7 @@ def _costs(library: Library, plan: Plan, before: Piece, after: Piece, low: int, 
     costs = PathCosts(library, order, balanced(plan.alpha))
     step = np.gradient(leaves.frame)
     step[np.append(leaves.seams, leaves.seams - 1)] = 1.0
+    # The cut goes from the frame after each left one to the frame the other window has there.
     terms = costs.cut_terms(leaves.frame[:-1] + step[:-1], enters.frame[1:])
     cost = np.diagonal(sum(values for _, values in terms)).copy()
     at = np.arange(1, high - low)

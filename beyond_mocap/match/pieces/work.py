@@ -1,6 +1,9 @@
-"""The three kinds of work that a match is made of, as functions that any process can be given: each takes all that it
-needs, but the library, which a worker reads by itself, once, and the same one everywhere. The last one makes a player's
-files: with the figures of every report over all stretches, and second by second."""
+"""The three kinds of work of a match, as functions for any process.
+
+Each takes everything it needs except the library, which a worker reads by itself, once, and which is the same
+everywhere. The last kind writes a player's files: with the figures of every report over all stretches, and second by
+second.
+"""
 
 from __future__ import annotations
 
@@ -34,8 +37,16 @@ _MOST, _LEAST, _SUMMED = {"max", "support_max"}, {"min"}, {"frames", "duration_s
 
 @dataclass(frozen=True)
 class LibrarySource:
-    """Where a library is, and which one it is. folder, cache, skeleton, unit: as `build` has them. key: of its content
-    and of what it is read with (`Library.kept`); "" where it is not known yet."""
+    """Where a library is, and which one it is.
+
+    Attributes:
+        folder: as for `build`.
+        cache: as for `build`.
+        skeleton: as for `build`.
+        unit: as for `build`.
+        seed: it is read with.
+        key: of its content and of what it is read with (`Library.kept`); "" if not known yet.
+    """
 
     folder: Path
     cache: Path | None = None
@@ -50,23 +61,29 @@ _held: dict[LibrarySource, Library] = {}
 
 
 def library_of(source: LibrarySource) -> Library:
-    """The library, from memory where this process has read it before; it holds one at a time.
+    """Load the library, from memory if this process has read it before; one is held at a time.
 
-    InputError where what is found there is not the library that the work was ordered with: recordings have been
-    changed, or this machine computes with another numpy, so that results would differ."""
-    with _lock:  # several threads of one worker ask at once
+    Args:
+        source: where it is.
+    Returns:
+        The library.
+    Raises:
+        InputError: if it is not the requested library: clips have changed, or this machine uses another numpy, so that
+            results would differ.
+    """
+    with _lock:  # several threads of one worker may ask at the same time
         if source not in _held:
             built = build(source.folder, cache_dir=source.cache, skeleton=source.skeleton, unit=source.unit,
                           seed=source.seed)
             if source.key and built.kept[1] != source.key:
-                raise InputError(source.folder, "another library than the one this work was ordered with",
-                                 "the same recordings and the same numpy for all workers", "start the command again")
+                raise InputError(source.folder, "a different library from the one of this match",
+                                 "the same clips and the same numpy for all workers", "start the command again")
             hold(source, built)
         return _held[source]
 
 
 def hold(source: LibrarySource, library: Library) -> None:
-    """Lets work in this process use a library that is read already."""
+    """Set the library that work in this process uses."""
     with _lock:
         _held.clear()
         _held[source] = library
@@ -74,7 +91,12 @@ def hold(source: LibrarySource, library: Library) -> None:
 
 @dataclass(frozen=True, eq=False)
 class PlayerFiles:
-    """report: a player's report, None where no figures are asked for. files: ending -> content of his files."""
+    """A player's files.
+
+    Attributes:
+        report: the player's report, None if no figures are requested.
+        files: content by ending of the file name.
+    """
 
     report: dict | None
     files: dict[str, bytes]
@@ -82,9 +104,17 @@ class PlayerFiles:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Finish:
-    """What is needed to finish a player. edit: his edit list, with its correction; measured: his tracks, one
-    per stretch; ball: the match's; frames (K,) of the match's clock at which he is in somebody, depth (K,) m how deep.
-    figures, bvh: whether report and provenance, and BVH, are asked for."""
+    """What is needed to finish a player.
+
+    Attributes:
+        edit: the edit list, with its correction.
+        measured: tracks, one per stretch.
+        ball: the match's ball.
+        frames: (K,) frames of the match's clock at which the player overlaps another one.
+        depth: (K,) m of that overlap.
+        figures: write report and provenance.
+        bvh: write BVH.
+    """
 
     edit: PlayerEdit
     measured: tuple[Track, ...]
@@ -96,17 +126,24 @@ class Finish:
 
 
 def search_unit(source: LibrarySource, unit: Unit) -> Piece:
-    """Searches one window of one player."""
+    """Search one window of one player (`windows.search_window`)."""
     return searched(library_of(source), unit)
 
 
 def part_crowd(source: LibrarySource, edits: Sequence[PlayerEdit], start: float, end: float) -> tuple[CrowdPart, ...]:
-    """Keeps everybody apart in one window."""
+    """Resolve the collisions of all players in one window (`crowd.window.resolve_window`)."""
     return crowd_window(library_of(source), edits, start, end)
 
 
 def finish_player(source: LibrarySource, order: Finish) -> PlayerFiles:
-    """Makes a player's whole motion, its figures and its files."""
+    """Construct a player's whole motion, its figures and its files.
+
+    Args:
+        source: where the library is.
+        request: what is needed.
+    Returns:
+        The files.
+    """
     from threadpoolctl import threadpool_limits
 
     library = library_of(source)
@@ -130,10 +167,20 @@ def finish_player(source: LibrarySource, order: Finish) -> PlayerFiles:
 def player_report(
     library: Library, takes: Sequence[Take], tracks: Sequence[Track], overlap: Sequence[np.ndarray], ball: BallPath
 ) -> dict:
-    """The figures of a player with one take, one measured track and the overlap (T,) m with others' bodies for each
-    stretch in which he is there; in the form of the contract's Report JSON, with `time_lost_s` and `per_second` beside.
+    """Build a player's report over all stretches, in the form of the contract's Report JSON with `time_lost_s` and
+    `per_second` added.
 
-    ball: the match's, as written out. InputError where a take has another skeleton than the library."""
+    Args:
+        library: the clips.
+        takes: one per stretch.
+        tracks: measured, one per stretch.
+        overlap: (T,) m of overlap with other bodies, one per stretch.
+        ball: the match's ball, as written.
+    Returns:
+        The report.
+    Raises:
+        InputError: if a take has another skeleton than the library.
+    """
     reports = [evaluate(take, track, library) for take, track in zip(takes, tracks)]
     out = combined(reports, [len(take.motion) for take in takes])
     out["time_lost_s"] = time_lost(out["warning_seconds"])
@@ -142,16 +189,24 @@ def player_report(
 
 
 def combined(reports: Sequence[dict], weights: Sequence[float]) -> dict:
-    """One report for several stretches: means, shares and percentiles weighted by `weights`, largest and least values
-    the largest and least, numbers of frames and seconds summed, lists one behind the other; what only some know is
-    theirs."""
+    """Merge the reports of several stretches.
+
+    Means, shares and percentiles are weighted averages; maxima and minima stay so; numbers of frames and seconds are
+    summed; lists are joined. A value that only some reports have is taken from these.
+
+    Args:
+        reports: one per stretch.
+        weights: of each stretch.
+    Returns:
+        One report.
+    """
     if len(reports) == 1:
         return dict(reports[0])
     return {name: _joined(name, [one.get(name) for one in reports], weights) for name in reports[0]}
 
 
 def time_lost(warning_seconds: Sequence[Sequence[Sequence[float]]]) -> float:
-    """Seconds in which something gave way: what the warnings are about, each second once."""
+    """Measure the seconds in which a request was not met: the spans of the warnings, each second once."""
     spans = sorted((first, last) for line in warning_seconds for first, last in line)
     lost, until = 0.0, -np.inf
     for first, last in spans:
@@ -163,9 +218,17 @@ def time_lost(warning_seconds: Sequence[Sequence[Sequence[float]]]) -> float:
 def per_second(
     played: Sequence[Played], tracks: Sequence[Track], overlap: Sequence[np.ndarray], ball: BallPath
 ) -> dict:
-    """Whole seconds of the match's clock from `start_s` on, None where he is away: `root_error_m` (mean), `skate_cm_s`
-    (mean over feet that stand), `overlap_m` (deepest), `ball_m` (nearest distance of his hips from the ball, on the
-    ground)."""
+    """Measure figures for whole seconds of the match's clock.
+
+    Args:
+        played: one per stretch.
+        tracks: one per stretch.
+        overlap: (T,) m, one per stretch.
+        ball: the match's ball.
+    Returns:
+        `start_s`, and lists with None where the player is absent: `root_error_m` (mean), `skate_cm_s` (mean over feet
+        in contact), `overlap_m` (deepest), `ball_m` (least horizontal distance of the hips from the ball).
+    """
     start = int(np.floor(min(one.start_time for one in played) + 1e-6))
     end = int(np.floor(max(one.times[-1] for one in played) + 1e-6)) + 1
     names = ("root_error_m", "skate_cm_s", "overlap_m", "ball_m")
@@ -181,7 +244,7 @@ def per_second(
 
 
 def _overlap(take: Take, order: Finish) -> np.ndarray:
-    """(T,) m by which a take's body is in others."""
+    """Build (T,) m by which a take's body overlaps others."""
     out = np.zeros(len(take.motion))
     at = order.frames - round(take.start_time * take.motion.fps)
     inside = (at >= 0) & (at < len(out))
@@ -190,7 +253,7 @@ def _overlap(take: Take, order: Finish) -> np.ndarray:
 
 
 def _join_provenance(tables: Sequence[Provenance]) -> Provenance:
-    """The provenance of several stretches, one behind the other."""
+    """Join the provenance of several stretches."""
     arrays = {name: np.concatenate([getattr(one, name) for one in tables])
               for name in ("times", "clip_frame", "mirrored", "contacts")}  # fmt: skip
     return Provenance(clip=tuple(clip for one in tables for clip in one.clip),
@@ -198,7 +261,7 @@ def _join_provenance(tables: Sequence[Provenance]) -> Provenance:
 
 
 def _written(write) -> bytes:
-    """What `write(path)` writes."""
+    """Return what `write(path)` writes."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "content"
         write(path)
@@ -206,6 +269,7 @@ def _written(write) -> bytes:
 
 
 def _joined(name: str, values: list, weights: Sequence[float]):
+    """Merge one value of several reports by its type and name; dicts are merged key by key."""
     known = [(value, weight) for value, weight in zip(values, weights) if value is not None]
     if not known:
         return None
@@ -226,7 +290,7 @@ def _joined(name: str, values: list, weights: Sequence[float]):
 
 
 def _curves(played: Played, track: Track, overlap: np.ndarray, ball: BallPath):
-    """(name, values (T,) or (T, 2), what stands for a second of them)."""
+    """Compute (name, values (T,) or (T, 2), how a second is summarised)."""
     wanted = movement.track_at(track, played.times)
     skate = np.full((len(played.motion), 2), np.nan)
     skate[1:] = 100.0 * movement.contact_speeds(played.feet, played.contacts, played.motion.fps)

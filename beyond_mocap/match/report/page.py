@@ -1,5 +1,6 @@
 """The report over a whole match as one page for a browser: it loads nothing and runs nothing, and all names are
-escaped."""
+escaped.
+"""
 
 from __future__ import annotations
 
@@ -40,12 +41,12 @@ from .results import (
 )
 
 Thumbnail = Callable[[str, float], "np.ndarray | None"]
-"""Player's id and second on the match clock -> his picture as `appearance.picture.pose_picture` draws it, or None."""
+"""Player's id and second on the match clock -> picture as of `appearance.picture.pose_picture`, or None."""
 
-_AROUND = 15.0  # seconds before and after a bad second that are shown beside it
-_TITLES = {"root_error_m": "off the track", "skate_cm_s": "feet that stand slide", "overlap_m": "bodies in each other"}
+_AROUND = 15.0  # s before and after a bad second, shown in its strip
+_TITLES = {"root_error_m": "off the track", "skate_cm_s": "feet in contact slide", "overlap_m": "bodies overlap"}
 _TOLD = {
-    "root_error_m": ("{:.1f} cm off the track", 100.0), "skate_cm_s": ("standing feet slide at {:.1f} cm/s", 1.0),
+    "root_error_m": ("{:.1f} cm off the track", 100.0), "skate_cm_s": ("feet in contact slide at {:.1f} cm/s", 1.0),
     "overlap_m": ("{:.1f} cm deep in another body", 100.0), "ball_m": ("ball {:.1f} m away", 1.0),
 }
 _STYLE = """
@@ -64,10 +65,16 @@ details { border-bottom: 1px solid #eee; padding: .3em 0 } summary { cursor: poi
 
 
 def page(folder: Path, thumbnail: Thumbnail | None = None) -> str:
-    """The page, as text, of what 'beyond-mocap match' wrote into `folder`; players that failed or are not yet done are
-    marked. thumbnail: draws a player in a second, for the worst of them; without it they have no picture.
+    """Build the page of what 'beyond-mocap match' wrote, as text; failed and unfinished players are marked.
 
-    InputError where match.json is missing or cannot be read."""
+    Args:
+        folder: the match's folder.
+        thumbnail: renders a player in a second, for the worst seconds; None: no pictures.
+    Returns:
+        HTML.
+    Raises:
+        InputError: if match.json is missing or cannot be read.
+    """
     match = read_match_results(Path(folder))
     anchors = {player.id: f"player-{number}" for number, player in enumerate(match.players, 1)}
     worst, span = worst_seconds(match.players), _span(match)
@@ -81,7 +88,7 @@ def page(folder: Path, thumbnail: Thumbnail | None = None) -> str:
 
 
 def _span(match: MatchResults) -> tuple[float, float]:
-    """First and last second that the page shows: what was asked for, else what there is; LONGEST at most."""
+    """Choose the first and last second of the page: those requested, else those available; LONGEST at most."""
     known = [one for one in match.players if one.per_second]
     first, last = match.start, match.end
     if not math.isfinite(first):
@@ -92,26 +99,28 @@ def _span(match: MatchResults) -> tuple[float, float]:
 
 
 def _head(match: MatchResults, span: tuple[float, float]) -> Html:
+    """Build the title and the summary of who is finished."""
     made, missing = sum(one.made for one in match.players), [one for one in match.players if not one.made]
     rate = f", {match.fps:g} frames a second" if math.isfinite(match.fps) else ""
     told = (f"{_clock(span[0])} to {_clock(span[1])} on the match clock{rate}; {made} of {len(match.players)} "
-            "players made")  # fmt: skip
+            "players finished")  # fmt: skip
     parts = [element("h1", match.title), element("p", told, class_="quiet")]
     if missing:
         names = ", ".join(one.called for one in missing)
-        parts.append(element("p", f"Partial: {len(missing)} not made: {names}", class_="missed"))
+        parts.append(element("p", f"Partial: {len(missing)} not finished: {names}", class_="missed"))
     elif match.status and match.status != "done":
         parts.append(element("p", f"Partial: {match.status}", class_="missed"))
     return fragment(*parts, between="\n")
 
 
 def _worst(match: MatchResults, worst: tuple[WorstSecond, ...], anchors: Mapping[str, str], thumbnail) -> Html:
+    """Build the section with the worst seconds."""
     title = "Worst seconds"
     if not any(player.per_second for player in match.players):
-        return build_section(title, element("p", "No report tells figures by the second.", class_="quiet"))
+        return build_section(title, element("p", "No report has figures by the second.", class_="quiet"))
     track, overlap = 100 * LIMITS["root_error_m"], 100 * LIMITS["overlap_m"]
-    limits = (f"beyond {track:g} cm off the track, {LIMITS['skate_cm_s']:g} cm/s of a standing foot, or {overlap:g} cm "
-              "of two bodies in each other")  # fmt: skip
+    limits = (f"beyond {track:g} cm off the track, {LIMITS['skate_cm_s']:g} cm/s of foot sliding, or {overlap:g} cm "
+              "of overlap of two bodies")  # fmt: skip
     if not worst:
         return build_section(title, element("p", f"No second is {limits}.", class_="met"))
     lines = [_worst_line(match, place, one, anchors, thumbnail) for place, one in enumerate(worst, 1)]
@@ -119,6 +128,7 @@ def _worst(match: MatchResults, worst: tuple[WorstSecond, ...], anchors: Mapping
 
 
 def _worst_line(match: MatchResults, place: int, one: WorstSecond, anchors: Mapping[str, str], thumbnail) -> Html:
+    """Build one line of the worst seconds, with picture, figures and strip."""
     pose = thumbnail(one.player.id, one.time + 0.5) if thumbnail is not None else None
     strip = _strip(one.player, (one.time - _AROUND, one.time + _AROUND + 1.0), "wide")
     other = (" (in ", _linked(one.other, anchors), ")") if one.other is not None else ()
@@ -133,7 +143,7 @@ def _worst_line(match: MatchResults, place: int, one: WorstSecond, anchors: Mapp
 
 
 def _figures_at(one: WorstSecond) -> list[str]:
-    """What is wrong in this second, the worst figure first, and how far the ball is."""
+    """Describe what is wrong in this second, the worst figure first, and how far away the ball is."""
     row = round(one.time - one.player.start)
     values = {figure: column[row] for figure, column in one.player.per_second.items() if np.isfinite(column[row])}
     wrong = [figure for figure in values if figure not in LIMITS or values[figure] > LIMITS[figure]]
@@ -142,6 +152,7 @@ def _figures_at(one: WorstSecond) -> list[str]:
 
 
 def _teams(match: MatchResults, span: tuple[float, float], anchors, everybody: tuple[str, ...]) -> list[Html]:
+    """Build a table of players per team."""
     strips = {player.id: _strip(player, span) for player in match.players}
     parts = []
     for team in match.teams:
@@ -156,6 +167,7 @@ def _teams(match: MatchResults, span: tuple[float, float], anchors, everybody: t
 
 
 def _players(match: MatchResults, worst: tuple[WorstSecond, ...], span, anchors, everybody: tuple[str, ...]) -> Html:
+    """Build the details of every player."""
     parts = []
     for player in match.players:
         reason = f": {player.reason}" if player.reason else ""
@@ -192,7 +204,7 @@ def _image(data: bytes, look: str) -> Html:
 
 
 def _pose(player: PlayerResult, pose: np.ndarray) -> Html:
-    """A picture of `appearance.picture`, whose lowest row is the first."""
+    """Build the image of a picture of `appearance.picture`, whose lowest row is the first."""
     return build_image(png(np.rint(255.0 * np.clip(pose[::-1], 0.0, 1.0)).astype(np.uint8)), player.called, "pose")
 
 
@@ -205,8 +217,7 @@ def _moment_anchor(one: WorstSecond, anchors: Mapping[str, str]) -> str:
 
 
 def _frame(match: MatchResults, time: float) -> str:
-    """Which frame of the span it is, counted from the first on the clock's grid, as in ball.csv; nothing where rate or
-    beginning are not known."""
+    """Describe the frame of the span, counted from the first on the clock's grid as in ball.csv; "" if unknown."""
     if not math.isfinite(match.start * match.fps):
         return ""
     first = math.ceil(match.start * match.fps - 1e-6)
@@ -218,13 +229,21 @@ def _go_to(one: WorstSecond) -> str:
 
 
 def _clock(seconds: float) -> str:
-    """Seconds as the page says them: 754 s (12:34)."""
+    """Format seconds for the page: 754 s (12:34)."""
     return f"{told_time(seconds)} s ({int(seconds // 60)}:{int(seconds % 60):02d})"
 
 
 @dataclass(frozen=True)
 class Column:
-    """A figure of the table: its dotted name in the report, the title, its unit, what it is multiplied by, digits."""
+    """A figure of the table.
+
+    Attributes:
+        figure: dotted name in the report.
+        title: column title.
+        unit: shown unit.
+        scale: factor from the report's unit to the shown one.
+        digits: after the decimal point.
+    """
 
     figure: str
     title: str
@@ -238,23 +257,23 @@ COLUMNS = (
     Column("root_error_m.mean", "off the track", "cm", 100.0, 2),
     Column("root_error_m.p95", "in 95 %", "cm", 100.0, 2),
     Column("skate.contact_cm_s", "skate", "cm/s"),
-    Column("skate.source_contact_cm_s", "recordings'", "cm/s"),
+    Column("skate.source_contact_cm_s", "in clips", "cm/s"),
     Column("skate.stances_over_21mm", "sliding steps", "%", 100.0),
-    Column("seam_jerk_ratio.share_above_real", "hard seams", "%", 100.0),
+    Column("seam_jerk_ratio.share_above_real", "hard transitions", "%", 100.0),
     Column("loop_share", "repeated", "%", 100.0),
     Column("overlap_m.max", "overlap", "cm", 100.0),
 )
-_OVERLAP = 0.02  # metres that two bodies may be in each other
+_OVERLAP = 0.02  # m of overlap of two bodies that is accepted
 
 
 def shared_warnings(players: Sequence[PlayerResult]) -> tuple[str, ...]:
-    """Lines that all reports have, which are about the library and not about a player; none for a single player."""
+    """Find the warnings that all reports share: they are about the library, not a player; none for a single player."""
     told = [own_warnings(player, ()) for player in players if player.report]
     return tuple(line for line in told[0] if all(line in other for other in told)) if len(told) > 1 else ()
 
 
 def own_warnings(player: PlayerResult, everybody: tuple[str, ...]) -> tuple[str, ...]:
-    """A player's warnings, each once, without those that `everybody` has."""
+    """Select a player's warnings, each once, without those in `shared`."""
     lines = dict.fromkeys(map(str, player.report.get("warnings") or ()))
     return tuple(line for line in lines if line not in everybody)
 
@@ -262,8 +281,16 @@ def own_warnings(player: PlayerResult, everybody: tuple[str, ...]) -> tuple[str,
 def team_table(
     players: Sequence[PlayerResult], strips: Mapping[str, Html], anchors: Mapping[str, str], everybody: tuple[str, ...]
 ) -> Html:
-    """The table: a row for each player, then their mean and the worst of them. strips: each player's strip by his id;
-    anchors: of his own part of the page; everybody: warnings that are not counted."""
+    """Build a team's table: a row per player, then their mean and the worst of them.
+
+    Args:
+        players: of the team.
+        strips: strip by player id.
+        anchors: anchor of each player's part of the page, by id.
+        shared: warnings that are not counted.
+    Returns:
+        The table.
+    """
     titles = [build_title(column.title, column.unit) for column in COLUMNS]
     head = ("player", *titles, build_title("warnings"), "second by second")
     rows = [_row(player, element("td", strips[player.id]), anchors[player.id], everybody) for player in players]
@@ -271,6 +298,7 @@ def team_table(
 
 
 def _row(player: PlayerResult, strip: Html, anchor: str, everybody: tuple[str, ...]) -> Html:
+    """Build a player's row; without a report, only status and strip."""
     link = element("a", player.called, href=f"#{anchor}")
     if not player.report:
         why = element("td", _why(player), colspan=len(COLUMNS) + 1, class_="missed")
@@ -287,7 +315,7 @@ def _why(player: PlayerResult) -> str:
 
 
 def _summary(players: Sequence[PlayerResult], everybody: tuple[str, ...]) -> list[Html]:
-    """The mean and the largest over all players with a report; nothing for a single one."""
+    """Build the rows with mean and maximum over all players with a report; none for a single one."""
     made = [player for player in players if player.report]
     if len(made) < 2:
         return []
@@ -302,7 +330,7 @@ def _summary(players: Sequence[PlayerResult], everybody: tuple[str, ...]) -> lis
 
 
 def _value(player: PlayerResult, figure: str, found: Mapping[str, object]) -> float:
-    """The figure; overlap from the seconds where the report has it only there."""
+    """Find a figure; overlap from the seconds if the report has it only there."""
     told = number(found.get(figure))
     if math.isnan(told) and figure == "overlap_m.max":
         column = [value for value in player.per_second.get("overlap_m", ()) if math.isfinite(value)]

@@ -1,5 +1,6 @@
-"""Pictures of the page over a match: how bad it is for a player from left to right, as a strip that needs no library to
-draw, and players at a second."""
+"""Pictures for the page over a match: how bad a player is over time, as a strip that needs no library, and players at a
+second.
+"""
 
 from __future__ import annotations
 
@@ -18,18 +19,26 @@ from ..player_edit import read_player
 from ..shown import shown
 
 CELLS = 900
-"""Most cells of a strip; where a match has more seconds, each cell shows the worst of its own."""
+"""Most cells of a strip; if a match has more seconds, each cell shows the worst of its seconds."""
 FULL = 3.0
-"""Times the limit at which the colour is at its end."""
+"""Multiple of the limit at which the colour scale ends."""
 _GOOD, _LIMIT, _BAD = np.array([[226, 240, 229], [250, 205, 110], [170, 20, 20]], float)
 _NOBODY = np.array([236, 236, 236], float)
 SIZE = 224
-"""Pixels of a side of a player's picture."""
+"""Pixels, side of a player's picture."""
 
 
 def heat_strip(bad: np.ndarray, start: float, span: tuple[float, float], height: int = 1) -> bytes:
-    """The strip of one player as a PNG. bad: (S,) times the limit, a row a second from second `start` on, NaN where he
-    has no motion. span: the first and last second that the strip shows."""
+    """Render the strip of one player.
+
+    Args:
+        bad: (S,) multiples of the limit, one per second, NaN where the player has no motion.
+        start: s of the first value.
+        span: first and last second of the strip.
+        height: pixels.
+    Returns:
+        PNG.
+    """
     first, count = int(np.floor(span[0])), max(int(np.ceil(span[1]) - np.floor(span[0])), 1)
     whole = np.full(count, np.nan)
     rows = np.arange(len(bad)) + round(start) - first
@@ -41,8 +50,17 @@ def heat_strip(bad: np.ndarray, start: float, span: tuple[float, float], height:
 
 
 def thumbnails(library: Library, folder: Path) -> Callable[[str, float], np.ndarray | None]:
-    """What draws a player at a second of the match: (SIZE, SIZE, 4) as `pose_picture` does, None where he has no motion
-    then or his edit list cannot be read. InputError where the folder has no match.json."""
+    """Build a function that renders a player at a second of the match.
+
+    Args:
+        library: the clips.
+        folder: the match's folder.
+    Returns:
+        A function of id and second that gives (PICTURE_SIZE, PICTURE_SIZE, 4) as `pose_picture` does, or None if the
+        player has no motion then or their edit list cannot be read.
+    Raises:
+        InputError: if the folder has no match.json.
+    """
     files: Mapping[str, str] = {row["id"]: str(row.get("file", row["id"])) for row in read_state(folder)["players"]}
 
     def drawn(player: str, second: float) -> np.ndarray | None:
@@ -57,8 +75,9 @@ def thumbnails(library: Library, folder: Path) -> Callable[[str, float], np.ndar
 
 
 def colours(bad: np.ndarray) -> np.ndarray:
-    """(..., 3) uint8 for badness (...): pale green up to half the limit, amber at it, dark red from FULL on, grey for
-    NaN."""
+    """Compute colours (..., 3) uint8 of badness (...): pale green up to half the limit, amber at it, dark red from
+    FULL_COLOUR, grey for NaN.
+    """
     known = np.clip(np.nan_to_num(np.asarray(bad, float))[..., None], 0.0, FULL)
     below = _GOOD + (_LIMIT - _GOOD) * np.clip(2.0 * known - 1.0, 0.0, 1.0)
     above = _LIMIT + (_BAD - _LIMIT) * (known - 1.0) / (FULL - 1.0)
@@ -67,8 +86,13 @@ def colours(bad: np.ndarray) -> np.ndarray:
 
 
 def png(pixels: np.ndarray) -> bytes:
-    """A picture (H, W, 3) or (H, W, 4) uint8, the upper row first, as a PNG (ISO/IEC 15948): one chunk of rows without
-    filter."""
+    """Encode a picture as a PNG (ISO/IEC 15948): one chunk of rows without filter.
+
+    Args:
+        pixels: (H, W, 3) or (H, W, 4) uint8, the upper row first.
+    Returns:
+        The file's bytes.
+    """
     high, wide, channels = pixels.shape
     head = struct.pack(">IIBBBBB", wide, high, 8, 2 if channels == 3 else 6, 0, 0, 0)
     rows = np.concatenate([np.zeros((high, 1), np.uint8), np.ascontiguousarray(pixels).reshape(high, -1)], axis=1)

@@ -1,5 +1,7 @@
-"""What a folder with a match holds of its players, read from match.json and the players' reports, whole or not; and
-which seconds came out worst, of all players."""
+"""Read what a folder of a match has about its players, from match.json and the players' reports, complete or not; find
+the
+worst seconds of all players.
+"""
 
 from __future__ import annotations
 
@@ -19,22 +21,32 @@ MADE = "done"
 FIGURES = ("root_error_m", "skate_cm_s", "overlap_m", "ball_m")
 """Keys of a report's `per_second`, beside its `start_s`."""
 LONGEST = 6 * 3600
-"""Most seconds of one match that a page shows."""
-_LATEST = 1e11  # seconds: some clocks count from 1970
+"""s: the longest span of a match that a page shows."""
+_LATEST = 1e11  # s: some clocks count from 1970
 LIMITS = {"root_error_m": 0.015, "skate_cm_s": 7.0, "overlap_m": 0.02}
-"""Figure -> what it is to stay below in a second: 1.5 cm off the track, two bodies 2 cm into each other; 7 cm/s is a
-standing foot that goes 21 mm, which eyes notice, within a step of 0.3 s."""
+"""Limit of each figure in a second: 1.5 cm off the track, 2 cm of overlap of two bodies; at 7 cm/s a foot in contact
+slides 21 mm, which is visible, within a step of 0.3 s."""
 MOST = 10
 APART = 3
-"""Seconds within which a player's bad seconds are one."""
+"""s within which a player's bad seconds count as one."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class PlayerResult:
-    """One player. id: in the feed. team: name of his team. status: "done", or how far he came; reason: why he came no
-    further, "" where that is not told. data: lines on what was read of him. report: his report, {} where there is none.
-    start: seconds on the match clock of the first row of per_second, which has one array (S,) for each of FIGURES, NaN
-    where nothing is known, empty where the report tells nothing by the second."""
+    """One player.
+
+    Attributes:
+        id: in the feed.
+        name: of the player.
+        number: on the shirt.
+        team: name of the team.
+        status: "done", or how far the player got.
+        reason: why the player got no further, "" if unknown.
+        data: messages about the data that were read.
+        report: the player's report, {} if there is none.
+        start: s on the match clock of the first row of `per_second`.
+        per_second: array (S,) for each of FIGURES, NaN where unknown; empty if the report has none.
+    """
 
     id: str
     name: str
@@ -49,19 +61,24 @@ class PlayerResult:
 
     @property
     def made(self) -> bool:
-        """Whether there is a report of a finished motion."""
+        """True if there is a report of a finished motion."""
         return self.status == MADE and bool(self.report)
 
     @property
     def called(self) -> str:
-        """Number and name, as the page says it; where the name has the number in it, the name alone."""
+        """Number and name for the page; the name alone if it includes the number."""
         name = self.name or self.id
         return name if not self.number or self.number in re.findall(r"\d+", name) else f"{self.number} {name}"
 
 
 @dataclass(frozen=True)
 class TeamResult:
-    """A team by name, its colour as "#rrggbb", "" where the feed has none."""
+    """A team.
+
+    Attributes:
+        name: of the team.
+        colour: "#rrggbb", "" if the feed has none.
+    """
 
     name: str
     colour: str = ""
@@ -69,8 +86,19 @@ class TeamResult:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class MatchResults:
-    """A match. title; status: of the whole. fps: of the motions, NaN where not told. start, end: seconds on the match
-    clock, NaN where not told. seconds: what the making took, by stage. lines: what was told of the data."""
+    """A match.
+
+    Attributes:
+        title: of the match.
+        status: of the whole.
+        fps: of the motions, NaN if unknown.
+        start: s on the match clock, NaN if unknown.
+        end: s on the match clock, NaN if unknown.
+        teams: the teams.
+        players: the players.
+        seconds: s of each stage.
+        lines: messages about the data.
+    """
 
     title: str
     status: str
@@ -84,14 +112,21 @@ class MatchResults:
 
 
 def read_match_results(folder: Path) -> MatchResults:
-    """The results in a folder. InputError where its match.json is missing or is not of the form in
-    docs/match/match-report.md; a player whose report is missing or broken is kept, with the reason."""
+    """Read the results in a folder.
+
+    Args:
+        folder: the match's folder.
+    Returns:
+        The results; a player whose report is missing or damaged is included, with the reason.
+    Raises:
+        InputError: if match.json is missing or not of the form in docs/match/match-report.md.
+    """
     path = Path(folder) / "match.json"
     told = _object(path)
     rows = told.get("players", ())
     if not isinstance(rows, list) or not all(isinstance(row, Mapping) and _text(row.get("id")) for row in rows):
         expected = "a list of objects with an id"
-        raise InputError(path, "its players are not told one by one", expected, "make the match again")
+        raise InputError(path, "its players are not listed one by one", expected, "run the match again")
     teams = _teams(told.get("teams"))
     players = tuple(_player(Path(folder), row, teams) for row in rows)
     known = {team.name for team in teams.values()}
@@ -108,7 +143,7 @@ def read_match_results(folder: Path) -> MatchResults:
 
 
 def _teams(told) -> dict[str, TeamResult]:
-    """The teams by their ground, else by name; two of one name are told apart by it."""
+    """Parse the teams by their ground, else by name; two teams of the same name get their ground added."""
     rows = [row for row in told if isinstance(row, Mapping)] if isinstance(told, list) else []
     names = [_text(row.get("name")) for row in rows]
     out = {}
@@ -120,6 +155,7 @@ def _teams(told) -> dict[str, TeamResult]:
 
 
 def _player(folder: Path, row: Mapping, teams: Mapping[str, TeamResult]) -> PlayerResult:
+    """Parse a player's row and report."""
     name, (status, _, reason) = str(row["id"]), _text(row.get("status")).partition(":")
     report: Mapping = {}
     trouble = ""
@@ -137,13 +173,13 @@ def _player(folder: Path, row: Mapping, teams: Mapping[str, TeamResult]) -> Play
     start, per_second = _by_second(report.get("per_second"))
     return PlayerResult(id=name, name=_text(row.get("name") or report.get("name")),
                         number=_text(row.get("number") or report.get("number")),
-                        team=teams[ground].name if ground in teams else ground, status=status.strip() or "not told",
+                        team=teams[ground].name if ground in teams else ground, status=status.strip() or "unknown",
                         reason=trouble or _text(row.get("reason")) or reason.strip(), data=_lines(row), report=report,
                         start=start, per_second=per_second)  # fmt: skip
 
 
 def _by_second(told) -> tuple[float, dict[str, np.ndarray]]:
-    """The first second, and the columns (S,) of FIGURES, filled with NaN to one length."""
+    """Parse the first second, and the columns (S,) of FIGURES, filled with NaN to one length."""
     if not isinstance(told, Mapping) or not math.isfinite(start := _time(told.get("start_s", 0.0))):
         return 0.0, {}
     lists = {key: told[key][:LONGEST] for key in FIGURES if isinstance(told.get(key), list)}
@@ -153,13 +189,13 @@ def _by_second(told) -> tuple[float, dict[str, np.ndarray]]:
 
 
 def _lines(told: Mapping) -> tuple[str, ...]:
-    """What is told of data and work, in its order, each line once."""
+    """Collect the messages about data and work, in order, each once."""
     lines = [line for key in ("data", "notes", "warnings") if isinstance(told.get(key), list) for line in told[key]]
     return tuple(dict.fromkeys(_text(line) for line in lines))
 
 
 def number(value) -> float:
-    """A number from JSON; NaN for anything else, and for one that no computer can count with."""
+    """Convert a JSON number to float; NaN for anything else, or if it is too large."""
     try:
         return float(value) if isinstance(value, (int, float)) and not isinstance(value, bool) else math.nan
     except OverflowError:
@@ -167,7 +203,7 @@ def number(value) -> float:
 
 
 def _time(value) -> float:
-    """Seconds on a match clock; NaN for anything else."""
+    """Convert seconds on a match clock; NaN for anything else."""
     seconds = number(value)
     return seconds if abs(seconds) <= _LATEST else math.nan
 
@@ -177,7 +213,7 @@ def _text(value) -> str:
 
 
 def _colour(value) -> str:
-    """A colour "#rrggbb", "" for anything else."""
+    """Convert a colour "#rrggbb"; "" for anything else."""
     text = _text(value)
     return text if len(text) == 7 and text[0] == "#" and all(c in "0123456789abcdefABCDEF" for c in text[1:]) else ""
 
@@ -185,7 +221,7 @@ def _colour(value) -> str:
 def _report(path: Path) -> Mapping:
     found = _object(path)
     if not isinstance(found.get("warnings", []), list):
-        raise InputError(path, "cannot be read: its warnings are no list", "a player's report", "make the match again")
+        raise InputError(path, "cannot be read: its warnings are no list", "a player's report", "run the match again")
     return found
 
 
@@ -197,17 +233,25 @@ def _object(path: Path) -> Mapping:
     except (ValueError, RecursionError) as error:
         found, trouble = None, str(error)
     else:
-        trouble = "holds no object"
+        trouble = "not an object"
     if not isinstance(found, Mapping):
-        raise InputError(path, f"cannot be read: {trouble}", "what 'beyond-mocap match' writes", "make the match again")
+        raise InputError(path, f"cannot be read: {trouble}", "a file of 'beyond-mocap match'", "run the match again")
     check_depth(found, path)
     return found
 
 
 @dataclass(frozen=True, kw_only=True)
 class WorstSecond:
-    """One bad second. player: who; time: its beginning, s on the match clock. figure: the one of LIMITS that is worst
-    there, value in its unit, times: over its limit. other: the player into whom he runs, None where nobody is told."""
+    """One bad second.
+
+    Attributes:
+        player: who.
+        time: s on the match clock, its start.
+        figure: the one of LIMITS that is worst.
+        value: of the figure, in its unit.
+        times: multiple of its limit.
+        other: the player they overlap, None if unknown.
+    """
 
     player: PlayerResult
     time: float
@@ -218,7 +262,7 @@ class WorstSecond:
 
 
 def badness(player: PlayerResult) -> np.ndarray:
-    """(S,) how many times the limit the worst figure of each second is; NaN where nothing is known."""
+    """Measure (S,) by how much the worst figure of each second exceeds its limit, as a multiple; NaN where unknown."""
     rows = [player.per_second[figure] / limit for figure, limit in LIMITS.items() if figure in player.per_second]
     if not rows:
         return np.zeros(0)
@@ -226,8 +270,16 @@ def badness(player: PlayerResult) -> np.ndarray:
 
 
 def worst_seconds(players: Sequence[PlayerResult], most: int = MOST) -> tuple[WorstSecond, ...]:
-    """At most `most` seconds beyond their limits, the worst first; of a player's seconds that follow each other within
-    APART the worst stands for all, and two bodies in each other are one."""
+    """Find the worst seconds beyond their limits.
+
+    Of a player's seconds within GROUP_SECONDS the worst stands for all; an overlap of two bodies counts once.
+
+    Args:
+        players: of the match.
+        limit: the most seconds.
+    Returns:
+        The seconds, the worst first.
+    """
     found: list[WorstSecond] = []
     for who, row, times in _in_order(players):
         player, time = players[who], players[who].start + row
@@ -243,7 +295,7 @@ def worst_seconds(players: Sequence[PlayerResult], most: int = MOST) -> tuple[Wo
 
 
 def _in_order(players: Sequence[PlayerResult]) -> list[tuple[int, int, float]]:
-    """(player, row of per_second, badness) of all seconds beyond a limit, the worst first."""
+    """Sort (player, row of per_second, badness) of all seconds beyond a limit, the worst first."""
     each = [(who, badness(player)) for who, player in enumerate(players)]
     rows = [(who, int(row), float(bad[row])) for who, bad in each for row in np.flatnonzero(np.nan_to_num(bad) > 1.0)]
     return sorted(rows, key=lambda entry: (-entry[2], entry[0], entry[1]))
@@ -256,14 +308,18 @@ def _worst_figure(player: PlayerResult, row: int) -> str:
 
 
 def _same(one: WorstSecond, player: PlayerResult, time: float, figure: str, value: float) -> bool:
-    """Whether this second is told already: his own nearby, or the same two bodies from the other's side."""
+    """Say whether this second is in the list already: the same player nearby, or the same overlap from the other
+    player.
+    """
     if abs(one.time - time) > APART:
         return False
     return one.player is player or (figure == one.figure == "overlap_m" and one.other is player)
 
 
 def _other(players: Sequence[PlayerResult], player: PlayerResult, time: float, value: float) -> PlayerResult | None:
-    """Who is as deep in somebody in that second, to the millimetre; None where nobody or more than one is."""
+    """Find the player with the same overlap in that second, to the millimetre; None if there is none or more than
+    one.
+    """
     like = [one for one in players if one is not player and abs(_at(one, "overlap_m", time) - value) < 1e-3]
     return like[0] if len(like) == 1 else None
 

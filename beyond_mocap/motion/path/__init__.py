@@ -1,1 +1,1 @@
-"""Paths: curves with a parameter, their length, and the line that a body follows."""
+"""Paths: curves with a parameter, their length, and the path that a body's root follows."""

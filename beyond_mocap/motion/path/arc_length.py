@@ -1,8 +1,8 @@
-"""How many metres a path has run at a parameter, and back (Path editing §3.2, eq. 4.1, by quadrature instead of steps).
+"""Arc length of a path: metres at a parameter, and back (Path editing §3.2, eq. 4.1, by quadrature instead of steps).
 
-The speed is integrated piece by piece: on each piece it is taken at Gauss-Legendre nodes and told as a Legendre series,
-whose integral is a polynomial. A piece whose series has not died away is halved, so that corners of the speed (where it
-vanishes and comes back) end up in pieces too short to matter. The table then answers without looking at the path again.
+The speed is integrated piece by piece: on each piece it is sampled at Gauss-Legendre nodes and written as a Legendre
+series, whose integral is a polynomial. A piece whose series has not converged is halved, so that corners of the speed
+(where it vanishes and returns) end up in pieces too short to matter. The table then needs no more path evaluations.
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ import numpy as np
 from .path import Path
 
 TOLERANCE = 1e-8
-"""Metres that the length of a whole path may be off; a share of _ROUNDING of it where it is longer than a city."""
+"""Allowed error of a whole path's length, metres; for very long paths the share _ROUNDING of the length."""
 
-_ROUNDING = 1e-11  # of the speed: what is smaller is not told from the rounding of large coordinates
+_ROUNDING = 1e-11  # share of the speed below which errors are indistinguishable from rounding of large coordinates
 _MOST = 50_000  # pieces halved at a time
 
 _ORDER = 8
@@ -24,13 +24,16 @@ _NEWTON = 60
 
 
 def _series() -> np.ndarray:
-    """(ORDER, ORDER): values at the nodes -> Legendre coefficients."""
+    """Build the matrix (ORDER, ORDER) from values at the nodes to Legendre coefficients."""
     values = np.polynomial.legendre.legvander(_NODES, _ORDER - 1)
     return (values * _WEIGHTS[:, None] * (np.arange(_ORDER) + 0.5)).T
 
 
 def _integral() -> np.ndarray:
-    """(ORDER + 1, ORDER): values at the nodes -> coefficients of 1, x, x^2, ... of the integral from -1 to x."""
+    """Build the matrix (ORDER + 1, ORDER) from values at the nodes to coefficients of 1, x, x^2, ... of the integral
+    from -1
+    to x.
+    """
     legendre = np.polynomial.legendre
     columns = [legendre.leg2poly(legendre.legint(unit, lbnd=-1)) for unit in np.eye(_ORDER)]
     powers = np.zeros((_ORDER + 1, _ORDER))
@@ -43,10 +46,14 @@ _SERIES, _INTEGRAL = _series(), _integral()
 
 
 class ArcLength:
-    """The table of one path. length: of the whole path, metres."""
+    """The arc length table of one path.
+
+    Attributes:
+        length: of the whole path, metres.
+    """
 
     def __init__(self, path: Path):
-        """`path`: any path, also one that stands still somewhere."""
+        """Build the table of any path, also one with zero speed somewhere."""
         starts, widths, values = _pieces(path)
         self._edges = np.append(starts, path.domain[1])
         self._widths = widths
@@ -56,14 +63,14 @@ class ArcLength:
         self.length = float(self._before[-1])
 
     def at(self, u: np.ndarray) -> np.ndarray:
-        """Metres (N,) from the path's beginning to parameters u (N,), which are taken to the domain's ends."""
+        """Return the metres (N,) from the path's start to parameters u (N,), which are clamped to the domain."""
         u = np.clip(np.asarray(u, dtype=float), self._edges[0], self._edges[-1])
         piece = np.clip(np.searchsorted(self._edges, u, side="right") - 1, 0, len(self._widths) - 1)
         local = 2.0 * (u - self._edges[piece]) / self._widths[piece] - 1.0
         return self._before[piece] + _value(self._powers[:, piece], local)
 
     def parameter(self, s: np.ndarray) -> np.ndarray:
-        """The parameters (N,) at which the path has run s (N,) metres, which are taken to 0 .. length."""
+        """Return the parameters (N,) at arc lengths s (N,) metres, which are clamped to 0 .. length."""
         s = np.clip(np.asarray(s, dtype=float), 0.0, self.length)
         piece = np.clip(np.searchsorted(self._before, s, side="right") - 1, 0, len(self._widths) - 1)
         wanted = s - self._before[piece]
@@ -72,13 +79,18 @@ class ArcLength:
 
 
 def _pieces(path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Where pieces begin (P,), how wide they are (P,) and the speed at their nodes (P, ORDER), in rising order."""
+    """Split the path into pieces on which the series of the speed converges.
+
+    Returns:
+        Starts (P,), widths (P,) and the speed at their nodes (P, ORDER), in rising order.
+    """
     edges = np.asarray(path.breaks, dtype=float)
     starts, widths, done = edges[:-1], np.diff(edges), []
     allowed = TOLERANCE / (path.domain[1] - path.domain[0])
     for halving in range(_HALVINGS):
         at = starts[:, None] + 0.5 * (_NODES + 1.0) * widths[:, None]
         values = np.linalg.norm(path.at(at.ravel(), 1), axis=1).reshape(at.shape)
+        # a piece is fine when the last two coefficients of its series are negligible
         tail = np.abs(values @ _SERIES[-2:].T).sum(axis=1)
         fine = tail <= max(allowed, _ROUNDING * values.max())
         if halving == _HALVINGS - 1 or np.count_nonzero(~fine) > _MOST:
@@ -94,7 +106,7 @@ def _pieces(path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _value(powers: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """Polynomials (K, N), one for each x (N,), by Horner's rule."""
+    """Evaluate polynomials (K, N), one for each x (N,), by Horner's rule."""
     value = powers[-1]
     for row in powers[-2::-1]:
         value = value * x + row
@@ -102,7 +114,8 @@ def _value(powers: np.ndarray, x: np.ndarray) -> np.ndarray:
 
 
 def _solved(powers: np.ndarray, speeds: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-    """x (N,) in [-1, 1] at which rising polynomials (K, N) reach `wanted` (N,): Newton, else by halves."""
+    """Solve x (N,) in [-1, 1] at which rising polynomials (K, N) reach `targets` (N,): Newton's method, else bisection.
+    """
     low, high = np.full(len(wanted), -1.0), np.ones(len(wanted))
     whole = powers.sum(axis=0)
     x = np.clip(2.0 * wanted / np.where(whole > 0.0, whole, 1.0) - 1.0, -1.0, 1.0)

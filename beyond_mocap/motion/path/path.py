@@ -1,8 +1,7 @@
-"""Paths: smooth curves in space with a parameter, that a motion is told relative to and can be laid on (Path editing
-§3.1).
+"""Paths: smooth parametric curves in space that a motion is described relative to and can follow (Path editing §3.1).
 
-A path lies on the ground under the body. Its parameter is seconds where it was fitted to a motion, and anything that
-rises along it where it was drawn; `arc_length` turns it into metres.
+A path lies on the ground under the body. Its parameter is seconds where it was fitted to a motion, and any rising value
+where it was drawn; `arc_length` converts it to metres.
 """
 
 from __future__ import annotations
@@ -17,22 +16,24 @@ from ..skeleton import frozen_array
 
 
 class Path:
-    """A curve in space, twice continuously differentiable, also over the seam where it is closed.
+    """A curve in space, twice continuously differentiable, also where a closed curve joins its start.
 
-    domain: its first and last parameter. breaks: (K,) rising parameters, the domain's ends among them, between which it
-    is one polynomial. closed: whether it ends where it begins; then parameters beyond the domain go round, else they
-    are taken to its ends."""
+    Attributes:
+        domain: first and last parameter.
+        breaks: (K,) rising parameters, the domain's ends among them, between which it is one polynomial.
+        closed: whether it ends where it starts. Parameters beyond the domain then wrap around, else they are clamped.
+    """
 
     domain: tuple[float, float]
     breaks: np.ndarray
     closed: bool = False
 
     def at(self, u: np.ndarray, derivative: int = 0) -> np.ndarray:
-        """Places (N, 3) in metres at parameters u (N,); with `derivative` 1, 2, ... their change with it."""
+        """Return the positions (N, 3) in metres at parameters u (N,), or their derivative of order `derivative`."""
         raise NotImplementedError
 
     def _inside(self, u: np.ndarray) -> np.ndarray:
-        """Parameters (N,) within the domain."""
+        """Wrap or clamp parameters (N,) to the domain."""
         low, high = self.domain
         u = np.asarray(u, dtype=float)
         return low + (u - low) % (high - low) if self.closed else np.clip(u, low, high)
@@ -40,9 +41,12 @@ class Path:
 
 @dataclass(frozen=True, eq=False)
 class PolynomialPath(Path):
-    """One polynomial over the whole domain, as a series of Legendre polynomials, which keeps high degrees exact.
+    """One polynomial over the whole domain, as a series of Legendre polynomials, which stays exact for high degrees.
 
-    coefficients: (degree + 1, 3) metres. domain: see Path."""
+    Attributes:
+        coefficients: (degree + 1, 3) metres.
+        domain: see `Path`.
+    """
 
     coefficients: np.ndarray
     domain: tuple[float, float]
@@ -52,7 +56,7 @@ class PolynomialPath(Path):
 
     @property
     def breaks(self) -> np.ndarray:
-        return np.linspace(*self.domain, len(self.coefficients))  # one would do: its bends ask for as many
+        return np.linspace(*self.domain, len(self.coefficients))  # one piece would do, but its bends need as many
 
     def at(self, u: np.ndarray, derivative: int = 0) -> np.ndarray:
         low, high = self.domain
@@ -66,8 +70,12 @@ class PolynomialPath(Path):
 class SplinePath(Path):
     """A B-spline.
 
-    knots: (P + degree + 1,) not falling. coefficients: (P, 3) metres, its control points. degree: at least 1 (below 3
-    it is less smooth than a Path is to be: what a user asks for). closed: the last `degree` points repeat the first."""
+    Attributes:
+        knots: (P + degree + 1,) not falling.
+        coefficients: (P, 3) metres, its control points.
+        degree: at least 1 (below 3 it is less smooth than a Path should be: at the user's request).
+        closed: the last `degree` points repeat the first.
+    """
 
     knots: np.ndarray
     coefficients: np.ndarray
@@ -99,6 +107,6 @@ class SplinePath(Path):
         return BSpline(self.knots, self.coefficients - self.coefficients[0], self.degree)
 
     def at(self, u: np.ndarray, derivative: int = 0) -> np.ndarray:
-        # about the first control point: far from the origin derivatives would lose their digits
+        # relative to the first control point: far from the origin derivatives would lose precision
         values = self._spline(self._inside(u), derivative)
         return values if derivative else values + self.coefficients[0]

@@ -1,11 +1,11 @@
-"""Smoothing splines, and by them the line that a body follows over the ground, without the sway of its steps: what game
-engines call root motion.
+"""Smoothing splines, and the path that a body's root follows over the ground, without the sway of its steps: root
+motion.
 
-They are cubic B-splines near many values that pay for every bend: penalized least squares (Eilers and Marx 1996), with
-the exact integral of a derivative as the price (O'Sullivan 1986). On every piece of the curve value and price are
-squares of sums over the same four coefficients, so that all of it is one list of rows of four numbers, and one banded
-system. A body's line is the curve of least acceleration that stays within a hand's breadth of the pelvis (Kimodo's
-smoothed root: 6 cm); the facing is smoothed alike. Straight is the line from where it begins to where it ends.
+They are cubic B-splines near many values with a penalty on every bend: penalized least squares (Eilers and Marx 1996),
+with the exact integral of a squared derivative as penalty (O'Sullivan 1986). On every piece of the curve, value and
+penalty are squares of sums over the same four coefficients, so that all of it is one list of rows of four numbers, and
+one banded system. A body's path is the curve of least acceleration that stays near the pelvis (Kimodo's smoothed root:
+6 cm); the heading is smoothed alike. A straight path is the line from where it starts to where it ends.
 """
 
 from __future__ import annotations
@@ -16,16 +16,16 @@ from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 DEGREE = 3
 _WIDTH = DEGREE + 1
-_FINE = 4  # pieces in a stretch of `stiff`
+_FINE = 4  # pieces within a length of `stiff`
 _ROUNDS = 8
-_AROUND = 0.5  # of `stiff`: as far as a value pulls its neighbours along
-_NEAR = 0.7  # of the slack: farther values pull more
+_AROUND = 0.5  # share of `stiff` over which a value pulls its neighbours along
+_NEAR = 0.7  # share of the slack beyond which values pull more
 SLACK = 0.06
-"""Metres that the line may be off the pelvis."""
+"""Metres that the path may be off the pelvis."""
 
 TURN_SLACK = np.radians(25.0)
 SECONDS = 0.4
-"""Sway slower than about six times this is a way taken, faster is sway."""
+"""Movement slower than about six times this belongs to the path, faster movement is sway."""
 
 WAYS = ("smooth", "straight")
 
@@ -34,17 +34,29 @@ def smoothing_spline(
     values: np.ndarray, at: np.ndarray, pieces: int, stiff: float, order: int = 2, weights: np.ndarray | None = None,
     closed: bool = False, ends_met: bool = False, domain: tuple[float, float] | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Knots (P + 4,) and coefficients (P, K) of the cubic spline that minimizes the mean over the values of
-    w |x - v|^2 plus stiff^(2 order) times the mean over the domain of |the derivative of that order|^2.
+    """Fit a cubic smoothing spline.
 
-    values: (N, K). at: (N,) parameters, rising. pieces: how many of even width. stiff: in the parameter's unit; waves
-    shorter than some six times it are taken out. order: 2 or 3. weights: (N,), else 1. closed: the end joins the
-    beginning (`domain` then is one round, `pieces` at least 8). ends_met: the first and last value are kept exactly.
-    domain: the first and last parameter, else of `at`."""
+    It minimizes the mean over the values of w |x - v|^2 plus stiff^(2 order) times the mean over the domain of |the
+    derivative of that order|^2.
+
+    Args:
+        values: (N, K).
+        at: (N,) parameters, rising.
+        pieces: number of pieces of even width.
+        stiff: in the parameter's unit; waves shorter than some six times it are removed.
+        order: 2 or 3.
+        weights: (N,), else 1.
+        closed: the end joins the start (`domain` is then one round, `pieces` at least 8).
+        keep_ends: keep the first and last value exactly.
+        domain: first and last parameter, else of `at`.
+    Returns:
+        Knots (P + 4,) and coefficients (P, K).
+    Source: Eilers and Marx 1996; O'Sullivan 1986.
+    """
     low, high = domain or (float(at[0]), float(at[-1]))
     knots = _knots(low, high, pieces, closed)
     values = np.asarray(values, dtype=float)
-    origin = values.mean(axis=0)  # what is far from the origin loses no digits
+    origin = values.mean(axis=0)  # keeps precision far from the origin
     basis, left = _basis(at, knots)
     weights = np.full(len(at), 1.0 / len(at)) if weights is None else weights / len(at)
     bends, price = _bends(knots, order, stiff ** (2 * order) / (high - low))
@@ -62,10 +74,19 @@ def smoothing_spline(
 def spline_within(
     values: np.ndarray, at: np.ndarray, pieces: int, stiff: float, slack: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """`smoothing_spline` of least acceleration that is nowhere much farther than `slack` from the values.
+    """Fit the `fit_smoothing_spline` of least acceleration that is nowhere much farther than `slack` from the values.
 
-    Where it is, the values around pull more, round by round: it is as smooth as it may be elsewhere. pieces: to begin
-    with; where pulling does not help they are halved, down to one from value to value."""
+    Where it is farther, the values around it get more weight, round by round: elsewhere it stays as smooth as possible.
+
+    Args:
+        values: (N, K).
+        at: (N,) parameters, rising.
+        pieces: number to begin with; where weights do not help they are halved, down to one from value to value.
+        stiff: as for `fit_smoothing_spline`.
+        slack: allowed distance, in the unit of the values.
+    Returns:
+        Knots (P + 4,) and coefficients (P, K).
+    """
     from scipy.interpolate import BSpline
 
     weights, around = np.ones(len(at)), int(_AROUND * stiff * (len(at) - 1) / (at[-1] - at[0])) + 1
@@ -83,28 +104,35 @@ def spline_within(
 
 
 def spline_pieces(length: float, stiff: float) -> int:
-    """How many pieces a spline of this length takes so that finer ones would change nothing."""
+    """Count the pieces that a spline of this length needs so that finer ones would change nothing."""
     return max(int(np.ceil(_FINE * length / stiff)), 4)
 
 
 def ground_path(places: np.ndarray, facing: np.ndarray, fps: float, way: str = "smooth"):
-    """The line (T, 2) metres and its facing (T,) radians, from the pelvis's places (T, 2) and facing (T,), unwrapped.
+    """Compute the root's path over the ground and its heading.
 
-    way: one of WAYS."""
+    Args:
+        places: (T, 2) metres, the pelvis on the ground.
+        facing: (T,) radians, unwrapped.
+        fps: frames per second.
+        kind: "smooth" or "straight".
+    Returns:
+        The path (T, 2) in metres and its heading (T,) in radians.
+    """
     line = _within(places, fps, SLACK)
     if way == "smooth":
         return line, _within(facing[:, None], fps, TURN_SLACK)[:, 0]
     along = places[-1] - places[0]
     length = np.linalg.norm(along)
     turn = np.full(len(places), np.mean(facing))
-    if length < 0.3:  # it stays where it is
+    if length < 0.3:  # the body stays where it is
         return np.repeat(places.mean(axis=0)[None], len(places), axis=0), turn
     along = along / length
     return places[0] + ((line - places[0]) @ along)[:, None] * along, turn
 
 
 def _within(values: np.ndarray, fps: float, slack: float) -> np.ndarray:
-    """The smooth curve (T, K) that is nowhere much farther than `slack` from `values` (T, K)."""
+    """Smooth values (T, K) by a curve that is nowhere much farther than `slack` from them: (T, K)."""
     from scipy.interpolate import BSpline
 
     if len(values) < 2:
@@ -114,6 +142,7 @@ def _within(values: np.ndarray, fps: float, slack: float) -> np.ndarray:
 
 
 def _knots(low: float, high: float, pieces: int, closed: bool) -> np.ndarray:
+    """Build the knots: repeated at the ends of an open curve, continued evenly beyond those of a closed one."""
     inner = np.linspace(low, high, pieces + 1)
     if not closed:
         return np.concatenate([[low] * DEGREE, inner, [high] * DEGREE])
@@ -122,13 +151,16 @@ def _knots(low: float, high: float, pieces: int, closed: bool) -> np.ndarray:
 
 
 def _basis(at: np.ndarray, knots: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The four B-splines (N, 4) that are not zero at parameters (N,), and the first of them (N,): Cox and de Boor."""
+    """Evaluate the four B-splines (N, 4) that are not zero at parameters (N,), and the first of them (N,): Cox and de
+    Boor.
+    """
     inner = knots[DEGREE : len(knots) - DEGREE]
     pieces = len(inner) - 1
     left = np.clip(((at - inner[0]) * (pieces / (inner[-1] - inner[0]))).astype(int), 0, pieces - 1)
     basis = np.ones((1, len(at)))
     for degree in range(1, DEGREE + 1):
         more = np.zeros((degree + 1, len(at)))
+        # each B-spline of one degree less adds to the one that starts with it and to the one that starts a knot earlier
         for own in range(degree):
             end, begin = knots[left + DEGREE + 1 + own], knots[left + DEGREE + 1 + own - degree]
             share = basis[own] / (end - begin)
@@ -139,11 +171,12 @@ def _basis(at: np.ndarray, knots: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _bends(knots: np.ndarray, order: int, factor: float) -> tuple[np.ndarray, np.ndarray]:
-    """Rows (M, 4) over each piece's coefficients and weights (M,) whose squares add up to factor times the integral of
-    the squared derivative.
+    """Build rows (M, 4) over each piece's coefficients and weights (M,) of the penalty.
 
-    The third derivative is constant on a piece; the second runs evenly from a to b: the integral of its square is
-    h ((a + b) / 2)^2 + h (b - a)^2 / 12."""
+    Their weighted squares add up to factor times the integral of the squared derivative. The third derivative is
+    constant
+    on a piece; the second runs evenly from a to b: the integral of its square is h ((a + b) / 2)^2 + h (b - a)^2 / 12.
+    """
     piece = np.arange(len(knots) - 2 * DEGREE - 1)[:, None]
     rows = np.broadcast_to(np.eye(_WIDTH), (len(piece), _WIDTH, _WIDTH))
     for level in range(order):
@@ -158,7 +191,7 @@ def _bends(knots: np.ndarray, order: int, factor: float) -> tuple[np.ndarray, np
 
 
 def _band(rows: np.ndarray, left: np.ndarray, weights: np.ndarray, count: int) -> np.ndarray:
-    """The sum of w r r' as a band (4, count): [d, a] stands for coefficients a and a + d, round and round."""
+    """Build the sum of w r r' as a band (4, count): [d, a] is the entry of coefficients a and a + d, cyclic."""
     band = np.zeros((_WIDTH, count))
     for i in range(_WIDTH):
         weighted, own = weights * rows[:, i], (left + i) % count
@@ -168,7 +201,7 @@ def _band(rows: np.ndarray, left: np.ndarray, weights: np.ndarray, count: int) -
 
 
 def _right(rows: np.ndarray, left: np.ndarray, weights: np.ndarray, values: np.ndarray, count: int) -> np.ndarray:
-    """The sum of w r v: (count, K)."""
+    """Build the sum of w r v: (count, K)."""
     out = np.zeros((count, values.shape[1]))
     for i in range(_WIDTH):
         own, weighted = (left + i) % count, weights * rows[:, i]
@@ -178,21 +211,24 @@ def _right(rows: np.ndarray, left: np.ndarray, weights: np.ndarray, values: np.n
 
 
 def _pinned(band: np.ndarray, right: np.ndarray, ends: np.ndarray) -> np.ndarray:
-    """Coefficients (P, K) of which the first and the last are `ends` (2, K)."""
+    """Solve the coefficients (P, K) of which the first and the last are `ends` (2, K)."""
     last = len(right) - 1
-    for below in range(1, _WIDTH):  # what the known ones do to their neighbours
+    for below in range(1, _WIDTH):  # move the known coefficients' terms to the right side
         right[below] -= band[below, 0] * ends[0]
         right[last - below] -= band[below, last - below] * ends[1]
     return np.concatenate([ends[:1], solveh_banded(band[:, 1:-1], right[1:-1], lower=True), ends[1:]])
 
 
 def _cyclic(band: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """Coefficients (P, K) of a closed curve: the last three are solved for after all others (Schur complement)."""
+    """Solve the coefficients (P, K) of a closed curve: the last three are solved after all others (Schur complement).
+    """
     count = len(right)
     inner = count - DEGREE
     beside, corner = np.zeros((inner, DEGREE)), np.zeros((DEGREE, DEGREE))
     for below in range(_WIDTH):
         for own in range(inner - DEGREE, count):
+            # entries that couple the inner coefficients with the last three go to `beside`, those among the three to
+            # `corner`
             low, high = sorted((own, (own + below) % count))
             if low < inner <= high:
                 beside[low, high - inner] = band[below, own]

@@ -1,4 +1,4 @@
-"""Ground of any shape, asked for its height: triangles sorted into a grid of square cells seen from above."""
+"""Ground height of any mesh: triangles sorted into a grid of square cells seen from above."""
 
 from __future__ import annotations
 
@@ -7,16 +7,26 @@ import numpy as np
 from ...base.errors import InputError
 from ..skeleton import frozen_array
 
-_EDGE = 1e-9  # barycentric: who stands on an edge stands on both its triangles
-_STEEPEST = 1e-6  # of a triangle's normal, upwards: walls have no height
-_ENTRIES = 8  # per triangle, in all cells together
+_EDGE = 1e-9  # barycentric tolerance: a point on an edge is on both its triangles
+_STEEPEST = 1e-6  # upward part of a triangle's normal below which it is a wall, which has no height
+_ENTRIES = 8  # entries per triangle in all cells together, at most
 
 
 class Terrain:
-    """A mesh to stand on. Walls are no ground, bridges are: every surface counts, whichever way its normal points."""
+    """A mesh to stand on.
+
+    Walls are no ground, bridges are: every surface counts, in whichever direction its normal points.
+    """
 
     def __init__(self, vertices: np.ndarray, triangles: np.ndarray):
-        """`vertices`: (V, 3) metres. `triangles`: (F, 3) vertices each. InputError where they do not fit."""
+        """Build the grid of a mesh.
+
+        Args:
+            vertices: (V, 3) metres, world.
+            triangles: (F, 3) vertex indices.
+        Raises:
+            InputError: if an index is out of range or a vertex is not finite.
+        """
         corners = _corners(vertices, triangles)
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         size = np.linalg.norm(normals, axis=1)
@@ -30,15 +40,21 @@ class Terrain:
         self._sort(corners[:, :, :2].min(axis=1), corners[:, :, :2].max(axis=1))
 
     def heights(self, places: np.ndarray, below: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The highest ground not above `below` (N,) metres at places (N, 2): heights (N,), unit normals (N, 3) up.
+        """Find the highest ground not above a limit.
 
-        NaN where there is none."""
+        Args:
+            places: (N, 2) metres, world.
+            below: (N,) metres, the limits.
+        Returns:
+            Heights (N,) in metres and unit normals (N, 3), upward; NaN where there is no ground.
+        """
         places, below = np.asarray(places, dtype=float), np.asarray(below, dtype=float)
         asked, triangle = self._candidates(places)
         shares = np.einsum("pi,pij->pj", places[asked] - self._first[triangle, :2], self._inverse[triangle])
         height = self._first[triangle, 2] + np.einsum("pi,pi->p", shares, self._rise[triangle])
         inside = (shares >= -_EDGE).all(axis=1) & (shares.sum(axis=1) <= 1.0 + _EDGE) & (height <= below[asked])
         asked, triangle, height = asked[inside], triangle[inside], height[inside]
+        # sorted by place, then height: the last entry of each place is its highest ground
         order = np.lexsort((height, asked))
         asked, triangle, height = asked[order], triangle[order], height[order]
         highest = np.flatnonzero(np.diff(asked, append=-1))
@@ -47,7 +63,7 @@ class Terrain:
         return heights, normals
 
     def _sort(self, low: np.ndarray, high: np.ndarray) -> None:
-        """Lays the grid, as fine as the triangles allow; from their bounds (F, 2) each."""
+        """Build the grid, as fine as the triangles allow, from their bounds (F, 2) each."""
         self._origin = low.min(axis=0) if len(low) else np.zeros(2)
         extent = high.max(axis=0) - self._origin if len(low) else np.ones(2)
         self._cell = max(np.sqrt(np.prod(extent) / max(len(low), 1)), 1e-6)
@@ -59,6 +75,8 @@ class Terrain:
                 break
             self._cell *= 2.0
         self._shape = np.floor(extent / self._cell).astype(int) + 1
+        # one entry for every cell that a triangle's bounds cover, row by row; then sorted by cell, `_begin` pointing to
+        # each
         triangle = np.repeat(np.arange(len(low)), count)
         step = np.arange(len(triangle)) - np.repeat(np.cumsum(count) - count, count)
         row, column = first[triangle, 0] + step // wide[triangle, 1], first[triangle, 1] + step % wide[triangle, 1]
@@ -67,7 +85,7 @@ class Terrain:
         self._begin = np.concatenate([[0], np.cumsum(np.bincount(cell, minlength=np.prod(self._shape)))])
 
     def _candidates(self, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Pairs of an asked place and a triangle in the same cell: (P,) and (P,), the places rising."""
+        """Find pairs of a requested place and a triangle in the same cell: (P,) and (P,), the places rising."""
         cell = np.floor((places - self._origin) / self._cell)
         on = np.flatnonzero(((cell >= 0) & (cell < self._shape)).all(axis=1))
         number = cell[on].astype(int) @ np.array([self._shape[1], 1])
@@ -77,7 +95,7 @@ class Terrain:
 
 
 def _corners(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Places (F, 3, 3) of the triangles' corners, or InputError."""
+    """Collect the positions (F, 3, 3) of the triangles' corners, or raise InputError."""
     vertices, triangles = np.asarray(vertices, dtype=float).reshape(-1, 3), np.asarray(triangles).reshape(-1, 3)
     if not np.isfinite(vertices).all():
         raise InputError("ground", "a vertex that is not finite", "metres")

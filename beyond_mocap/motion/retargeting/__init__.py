@@ -1,1 +1,1 @@
-"""A motion on other bones: anatomy, neutral stance, bone maps."""
+"""Retargeting a motion to other bones: anatomy, neutral stance, bone maps."""

@@ -1,9 +1,10 @@
-"""The project's own body: an adult of 1.80 m in 22 joints, named as Mixamo and LAFAN1 do, arms hanging at rest.
+"""The project's own body: an adult of 1.80 m in 22 joints, named as in Mixamo and LAFAN1, arms hanging at rest.
 
 Segment lengths are shares of the stature H after Drillis and Contini 1966 as printed in Winter 2009 ("Biomechanics and
 motor control of human movement", fig. 4.1): thigh .245 H, shank .246 H, ankle .039 H, upper arm .186 H, forearm .146 H,
 shoulder (acromion) height .818 H; hip joint centres half as far apart as .191 H. Joint centres of shoulder and hip are
-set inwards from these surface landmarks by 2 to 4 cm."""
+set inwards from these surface landmarks by 2 to 4 cm.
+"""
 
 from __future__ import annotations
 
@@ -28,11 +29,17 @@ _CENTRE_TIPS = (("Head", (10, 0, 125)),)
 _LIMB_TIPS = (("Hand", (0, 0, -100)), ("ToeBase", (38, 0, -3)))
 STATURE = 1.80
 LEG = 0.873
-"""m, thigh and shank of the adult of whom published figures of gait tell."""
+"""Metres, thigh plus shank of the adult to whom published figures of gait apply."""
 
 
 def adult_skeleton(stature: float = STATURE) -> Skeleton:
-    """The made adult's skeleton at `stature` metres: rest pose standing, facing +X, arms hanging."""
+    """Build the adult's skeleton.
+
+    Args:
+        stature: metres.
+    Returns:
+        22 joints; the rest pose stands facing +X, arms hanging.
+    """
     rows = list(_CENTRE)
     tips = list(_CENTRE_TIPS)
     for side, sign in (("Left", 1), ("Right", -1)):

@@ -1,16 +1,16 @@
-"""Where a body's segments point, seen in each joint's own axes: what makes a retarget independent of rest poses.
+"""Directions of a body's segments in each joint's own axes: what makes a retarget independent of rest poses.
 
-Rest poses and axes of rigs differ (CMU's legs splay, LAFAN1's limbs all lie along X, arms hang or stand in a T). What
-is the same in all of them is the body: a thigh runs from hip to knee and its knee bends backward about one axis. For
-each joint j we look for the anatomical frame F_j: the rotation whose columns are the segment's forward, left and up
-directions in the joint's own axes when the body stands upright, facing +X, arms hanging. Then W_j F_j, with W_j the
-joint's rotation in the world, is how the *segment* is turned, in words that hold for any skeleton, without rest poses.
+Rest poses and axes of rigs differ (CMU's legs splay, LAFAN1's limbs all lie along X, arms hang or form a T). What is
+the same in all of them is the body: a thigh runs from hip to knee, and its knee bends backward about one axis. For each
+joint j this module estimates the anatomical frame F_j: the rotation whose columns are the segment's forward, left and
+up directions in the joint's own axes when the body stands upright, facing +X, arms hanging. Then W_j F_j, with W_j the
+joint's world rotation, is the rotation of the *segment*, in terms that hold for any skeleton, without rest poses.
 
 Directions along bones and between hips are known from the offsets alone. What they leave open comes from recorded
 frames: knees and elbows are hinges, so thigh x shank is the knee's axis wherever it bends; a sole is level while the
-foot stands; the trunk's joints, collar bones and hands without a tip take their mean posture over the upright frames as
-neutral. Every such mean is taken in the joint's own axes, so that other axes (another rest pose of the same recording)
-give the same motion. Without a recording the rest pose is the only frame there is.
+foot is in contact; the trunk's joints, collar bones and hands without a tip take their mean posture over the upright
+frames as neutral. Every such mean is taken in the joint's own axes, so that other axes (another rest pose of the same
+recording) give the same motion. Without a recording the rest pose is the only frame.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ from .structure import list_between
 
 _UP = np.array([0.0, 0.0, 1.0])
 _LEFT = np.array([0.0, 1.0, 0.0])
-_FRAMES = 400  # of an example that are looked at
-_FEW = 3  # fewer frames are a pose that is shown, no recording: a foot that looks flat in it is taken to be flat
+_FRAMES = 400  # frames of an example that are used
+_FEW = 3  # fewer frames are a single pose, no recording: a foot that looks flat in it counts as flat
 # frames count by the cosine of the trunk's lean to this power: 10 degrees 0.74, 20 degrees 0.29, 45 degrees 0.001
 _UPRIGHT = 20
-# how much a straight knee or elbow (sine of its bend: 0) is taken to bend about the body's own axes
+# weight of the body's own axes against a knee's or elbow's hinge (sine of its bend): decides where the limb is straight
 _STRAIGHT = 0.03
 # slopes of the line from ankle to toe in a flat foot, radians: least, usual, steepest
 _SLOPE = np.radians((-6.0, 22.0, 50.0))
@@ -45,9 +45,16 @@ _BALL, _LOWEST_ANKLE = 0.022, 0.06
 class Anatomy:
     """A skeleton's segments.
 
-    axes (J, 4): F_j as quaternions, for the joints in `known`; the identity for others. still (J, 4): mean local
-    rotations, for joints without a meaning. leg: thigh plus shank, metres. ankle: its height over the ground when the
-    foot is flat, metres. ball: the toe joint's height then."""
+    Attributes:
+        skeleton: J joints.
+        body: the joints by meaning.
+        axes: (J, 4) F_j as quaternions, for the joints in `known_joints`; the identity for others.
+        known_joints: joints with an anatomical frame.
+        mean_rotations: (J, 4) mean local rotations, for joints without a meaning.
+        leg: thigh plus shank, metres.
+        ankle: its height above the ground when the foot is flat, metres.
+        ball: the toe joint's height then, metres.
+    """
 
     skeleton: Skeleton
     body: Humanoid
@@ -60,7 +67,7 @@ class Anatomy:
 
 
 def spine_shares(skeleton: Skeleton, body: Humanoid) -> np.ndarray:
-    """How far along the trunk each joint of `body.spine` turns: (S,), pelvis 0, chest 1, by arc length."""
+    """Compute how far along the trunk each joint of `body.spine` rotates: (S,), pelvis 0, chest 1, by arc length."""
     if not body.spine:
         return np.zeros(0)
     top = next((joint for joint in (body.neck, body.head) if joint is not None), None)
@@ -72,7 +79,7 @@ def spine_shares(skeleton: Skeleton, body: Humanoid) -> np.ndarray:
 
 
 def head_chain(skeleton: Skeleton, body: Humanoid) -> tuple[int, ...]:
-    """The joints from neck to head, from below; one or none where the body lacks them."""
+    """List the joints from neck to head, from below; one or none where the body lacks them."""
     if body.head is None or body.neck is None:
         return tuple(joint for joint in (body.neck, body.head) if joint is not None)
     return (body.neck, *list_between(skeleton.parents, body.neck, body.head), body.head)
@@ -81,10 +88,17 @@ def head_chain(skeleton: Skeleton, body: Humanoid) -> tuple[int, ...]:
 def study(
     skeleton: Skeleton, body: Humanoid, example: Motion | None = None, standing: np.ndarray | None = None
 ) -> Anatomy:
-    """The anatomy of `skeleton`, whose joints mean what `body` says.
+    """Estimate the anatomy of a skeleton.
 
-    example: a recording on it (its bones' lengths are not looked at); without one the rest pose is taken. standing (T,
-    2) bool: which foot of the example stands; without it feet count as standing where they are low."""
+    Args:
+        skeleton: J joints.
+        body: their meaning.
+        example: a recording on the skeleton (its bones' lengths are not used); None uses the rest pose.
+        foot_contacts: (T, 2) bool, feet of the example in contact; without it feet count as in contact where they are
+            low.
+    Returns:
+        The anatomy.
+    """
     return _Study(skeleton, body, example, standing).anatomy()
 
 
@@ -111,6 +125,7 @@ class _Study:
         self.known: set[int] = set()
 
     def _top(self) -> np.ndarray:
+        """Find the top of the trunk (T, 3) m, world: neck, head, the middle of the shoulders, or the chest."""
         body = self.body
         top = next((joint for joint in (body.neck, body.head) if joint is not None), None)
         if top is not None:
@@ -120,28 +135,28 @@ class _Study:
         return self.places[:, body.chest] if body.spine else self.pelvis
 
     def _across_chest(self) -> np.ndarray:
-        """From right to left shoulder (T, 3), unit."""
+        """Compute the unit vectors (T, 3) from right to left shoulder."""
         arms = (self.body.left.upper_arm, self.body.right.upper_arm)
         if None in arms:
             return self.across_hips
         return unit_vectors(self.places[:, arms[0]] - self.places[:, arms[1]], self.across_hips)
 
     def mean(self, joint: int, vectors: np.ndarray, weight: np.ndarray | None = None) -> np.ndarray:
-        """The weighted sum of world vectors (T, 3) seen in a joint's axes, over the weights' sum: (3,)."""
+        """Average world vectors (T, 3) seen in a joint's axes, weighted: (3,)."""
         weight = self.weight if weight is None else weight
         seen = quaternion.rotate(quaternion.inverse(self.world[:, joint]), vectors)
         return weight @ seen / max(weight.sum(), 1e-12)
 
     def segment(self, joint: int) -> np.ndarray:
-        """How the segment of a known joint is turned: (T, 4)."""
+        """Compute the world rotation (T, 4) of a known joint's segment."""
         return quaternion.multiply(self.world[:, joint], self.axes[joint])
 
     def direction(self, joint: int, column: int) -> np.ndarray:
-        """The segment's forward (0), left (1) or up (2) in the world: (T, 3)."""
+        """Compute the segment's forward (0), left (1) or up (2) direction in the world: (T, 3)."""
         return quaternion.rotate(self.segment(joint), np.eye(3)[column])
 
     def settle(self, joint: int, up: np.ndarray, left: np.ndarray, first: str = "up") -> None:
-        """F of a joint from its up and left direction (3,), of which the one named `first` is kept exactly."""
+        """Set F of a joint from its up and left direction (3,), of which the one named `first` is kept exactly."""
         if first == "up":
             up = unit_vectors(up, _UP)
             left = unit_vectors(left - (left @ up) * up, _any_normal(up))
@@ -153,12 +168,13 @@ class _Study:
         self.known.add(joint)
 
     def follow(self, joint: int, segment: np.ndarray) -> None:
-        """F of a joint whose segment is turned like `segment` (T, 4) on the mean."""
+        """Set F of a joint so that its segment rotates like `segment` (T, 4) on average."""
         seen = quaternion.multiply(quaternion.inverse(self.world[:, joint]), segment)
         self.axes[joint] = _mean_rotation(seen, self.weight)
         self.known.add(joint)
 
     def anatomy(self) -> Anatomy:
+        """Build the anatomy: trunk first, then the limbs, which refer to it."""
         self._trunk()
         for limb in (self.body.left, self.body.right):
             self._leg(limb)
@@ -171,6 +187,7 @@ class _Study:
                        ankle=self._ankle_height(), ball=_BALL * self._leg_length())
 
     def _trunk(self) -> None:
+        """Estimate hips, spine, neck and head from the trunk's line and the axes across hips and chest."""
         body = self.body
         self.settle(body.hips, self.mean(body.hips, self.trunk), self.mean(body.hips, self.across_hips), "left")
         for joint, share in zip(body.spine, spine_shares(self.skeleton, body)):
@@ -185,6 +202,7 @@ class _Study:
             self.settle(joint, up, self.mean(joint, self.across_chest))
 
     def _arm(self, limb: Limb) -> None:
+        """Estimate an arm: bones give its line, the elbow's bend its hinge."""
         chest = self.body.chest
         if limb.shoulder is not None:
             self._collar(limb)
@@ -208,7 +226,8 @@ class _Study:
             self.settle(limb.hand, -fingers, self.mean(limb.hand, self.direction(limb.lower_arm, 1)))
 
     def _collar(self, limb: Limb) -> None:
-        """A collar bone is as it is held on the mean; sideways where that cannot be (folded-up rest poses)."""
+        """Estimate a collar bone: held as it is on average; sideways where that is implausible (folded-up rest poses).
+        """
         self.follow(limb.shoulder, self.segment(self.body.chest))
         neutral = quaternion.inverse(self.axes[limb.shoulder])
         held = unit_vectors(quaternion.rotate(neutral, self._bone(limb.shoulder, limb.upper_arm)), _UP)
@@ -218,6 +237,7 @@ class _Study:
             self.axes[limb.shoulder] = quaternion.inverse(neutral)
 
     def _leg(self, limb: Limb) -> None:
+        """Estimate thigh and shank: bones give their line, the knee's bend the hinge."""
         thigh = unit_vectors(self.places[:, limb.lower_leg] - self.places[:, limb.upper_leg], -_UP)
         shank = unit_vectors(self.places[:, limb.foot] - self.places[:, limb.lower_leg], -_UP)
         hinge = cross(thigh, shank)
@@ -229,13 +249,14 @@ class _Study:
         self.settle(limb.lower_leg, -self._bone(limb.lower_leg, limb.foot), self.mean(limb.lower_leg, hinge + beside))
 
     def _bone(self, joint: int, child: int) -> np.ndarray:
-        """From `joint` to a joint below it, in the first one's axes, metres: (3,); on the mean over joints between."""
+        """Measure the vector (3,) from `joint` to a joint below it, in its axes, metres; averaged over joints between.
+        """
         if self.skeleton.parents[child] == joint:
             return self.skeleton.offsets[child]
         return self.mean(joint, self.places[:, child] - self.places[:, joint])
 
     def _foot(self, limb: Limb) -> None:
-        """Flat is how the sole lies, on the mean, in the frames that stand with the ankle low."""
+        """Estimate a foot: flat is how the sole lies, on average, in the frames in contact with the ankle low."""
         ahead = self._ahead(limb)
         left = self.mean(limb.foot, self.direction(limb.lower_leg, 1))
         if ahead is None:
@@ -252,13 +273,15 @@ class _Study:
             self._toe(limb, level)
 
     def _ahead(self, limb: Limb) -> np.ndarray | None:
-        """From ankle to toe joint or to the foot's tip, in the foot's axes, metres; None where the foot is a point."""
+        """Find the vector from ankle to toe joint or to the foot's tip, in the foot's axes, metres; None for a foot
+        without.
+        """
         if limb.toe is not None:
             return self._bone(limb.foot, limb.toe)
         return _tip(self.skeleton, limb.foot)
 
     def _level_frames(self, limb: Limb) -> np.ndarray | None:
-        """Weights (T,) of the frames in which the foot is flat on the ground; None where there are none."""
+        """Weight the frames (T,) in which the foot is flat on the ground; None where there are none."""
         heights = self.places[:, limb.foot, 2]
         if self.still:
             upright = self.trunk[0, 2] > 0.9 and self.direction(limb.lower_leg, 2)[0, 2] > 0.7
@@ -286,6 +309,7 @@ class _Study:
         return total / 2.0
 
     def _ankle_height(self) -> float:
+        """Measure the ankle's height above the ground, mean of both feet, metres."""
         leg, heights = self._leg_length(), []
         for limb in (self.body.left, self.body.right):
             ahead = self._ahead(limb)
@@ -297,20 +321,21 @@ class _Study:
 
 
 def _tip(skeleton: Skeleton, joint: int) -> np.ndarray | None:
-    """The joint's end site (3,) metres, None where it has none or one of no length."""
+    """Find the joint's end site (3,) metres; None where it has none or one of no length."""
     offset = skeleton.tip(joint)
     return offset if np.linalg.norm(offset) > 1e-3 else None
 
 
 def _fingers(skeleton: Skeleton, hand: int) -> np.ndarray | None:
-    """Where the hand's fingers begin, on the mean, in its axes; its tip where it has none; None without either."""
+    """Find the mean position of the first finger joints, in the hand's axes; else the hand's tip; None without either.
+    """
     offsets = skeleton.offsets[list(skeleton.children(hand))].reshape(-1, 3)
     mean = offsets.mean(axis=0) if len(offsets) else np.zeros(3)
     return mean if np.linalg.norm(mean) > 1e-3 else _tip(skeleton, hand)
 
 
 def _mean_rotation(rotations: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """The weighted mean (4,) of rotations (T, 4): the eigenvector of sum w q q^T (Markley et al. 2007)."""
+    """Average rotations (T, 4) by weight: the eigenvector (4,) of sum w q q^T (Markley et al. 2007)."""
     q = np.linalg.eigh(np.einsum("t,ti,tj->ij", weight, rotations, rotations))[1][:, -1]
     return q if q[0] >= 0.0 else -q
 

@@ -1,7 +1,8 @@
 """The neutral stance of any humanoid skeleton: upright, facing +X, legs straight down, arms hanging, soles flat.
 
-Skeletons rest in all kinds of poses (CMU's legs splay, LAFAN1's limbs all lie along X, Mixamo stands in a T). Whatever
-is said in anatomical terms ("thigh 20 degrees forward") is said relative to this one stance, so it holds for all."""
+Skeletons rest in all kinds of poses (CMU's legs splay, LAFAN1's limbs all lie along X, Mixamo forms a T). Everything in
+anatomical terms ("thigh 20 degrees forward") is relative to this one stance, so it holds for all of them.
+"""
 
 from __future__ import annotations
 
@@ -18,13 +19,13 @@ from .structure import below
 
 _UP = np.array([0.0, 0.0, 1.0])
 _DOWN = -_UP
-# a collar bone that lies within this angle of sideways is left as the skeleton has it
+# a collar bone within this angle of sideways is left as the skeleton has it
 _COLLAR_TOLERANCE = np.radians(40.0)
-# a spine this near to upright, a toe this near to level is left as it is
+# a spine within this angle of upright, a toe within this angle of level, is left as it is
 _NEARLY = np.radians(25.0)
-# legs that hang at least so steeply stand
+# legs within this angle of the vertical count as standing
 _SPLAYED = np.radians(40.0)
-# slope of the line ankle-ball of a flat foot, and of a foot joint that hangs on nothing
+# usual slope of the line ankle-ball of a flat foot
 _SOLE_SLOPE = np.radians(22.0)
 # height of the ball of the foot (the toe joint) above the ground, share of the leg's length
 _BALL_HEIGHT = 0.022
@@ -34,10 +35,16 @@ _BALL_HEIGHT = 0.022
 class Neutral:
     """A skeleton in its neutral stance.
 
-    rotations (J, 4): world rotation of each joint. positions (J, 3): metres, the ground at z = 0, mid-hip above the
-    origin. leg: length of thigh plus shank, metres. ankle_height: metres. ball (2, 3): from ankle to toe joint (left,
-    right) with the sole flat. heel: metres from the ankle's foot point back to the heel. tip: metres from toe joint to
-    toe tip."""
+    Attributes:
+        skeleton: J joints.
+        rotations: (J, 4) world rotation of each joint.
+        positions: (J, 3) metres, the ground at z = 0, mid-hip above the origin.
+        leg: thigh plus shank, metres.
+        ankle_height: metres.
+        ball: (2, 3) metres from ankle to toe joint (left, right) with the sole flat.
+        heel: metres from the ankle's foot point back to the heel.
+        tip: metres from toe joint to toe tip.
+    """
 
     skeleton: Skeleton
     rotations: np.ndarray
@@ -50,12 +57,19 @@ class Neutral:
 
 
 def neutral_stance(skeleton: Skeleton, example: Motion | None = None) -> Neutral:
-    """The neutral stance of `skeleton`.
+    """Build the neutral stance of a skeleton.
 
-    example: a recording on the same skeleton; its most upright frames then say how bones are twisted about their own
-    length and how a flat foot lies, which bone directions alone leave open. Wanted where made and recorded motion are
-    to be blended, and where a skeleton's rest pose is no standing one (LAFAN1, Bandai). Raises InputError where hips or
-    legs cannot be found."""
+    Args:
+        skeleton: J joints.
+        example: a recording on the skeleton. Its most upright frames show how bones are twisted about their own length
+            and
+            how a flat foot lies, which bone directions alone leave open. Needed where synthetic and recorded motion are
+            blended, and where a skeleton's rest pose does not stand (LAFAN1, Bandai).
+    Returns:
+        The stance.
+    Raises:
+        InputError: if hips or legs cannot be found.
+    """
     body = identify(skeleton)
     world = np.array(_start(skeleton, body, example))
     slopes = [_sole_slope(skeleton, limb, world, example) for limb in (body.left, body.right)]
@@ -78,7 +92,8 @@ def rests_upright(skeleton: Skeleton) -> bool:
 
 
 def _start(skeleton: Skeleton, body: Humanoid, example: Motion | None) -> np.ndarray:
-    """World rotations (J, 4) to begin with, facing +X: the example's upright frames, or the rest pose set upright."""
+    """Build the initial world rotations (J, 4), facing +X: the example's upright frames, or the rest pose set upright.
+    """
     if example is not None:
         return _mean_upright(skeleton, body, example)
     places, _ = pose_kinematics(skeleton, np.zeros((1, 3)), quaternion.identity(1, len(skeleton)))
@@ -98,7 +113,9 @@ def _start(skeleton: Skeleton, body: Humanoid, example: Motion | None) -> np.nda
 
 
 def _mean_upright(skeleton: Skeleton, body: Humanoid, example: Motion) -> np.ndarray:
-    """Mean world rotations (J, 4) over the tenth of the frames that look most like standing, each turned to face +X."""
+    """Average the world rotations (J, 4) of the tenth of the frames that look most like standing, each turned to face
+    +X.
+    """
     places, world = forward_kinematics(example)
     score = _uprightness(body, places)
     chosen = np.argsort(-score, kind="stable")[: max(len(score) // 10, 1)]
@@ -109,7 +126,7 @@ def _mean_upright(skeleton: Skeleton, body: Humanoid, example: Motion) -> np.nda
 
 
 def _uprightness(body: Humanoid, places: np.ndarray) -> np.ndarray:
-    """How much each frame (T,) looks like standing: limbs that hang, a head that is high."""
+    """Score how much each frame (T,) looks like standing: limbs that hang, a head that is high."""
     score = np.zeros(len(places))
     for limb in (body.left, body.right):
         for high, low in (
@@ -121,7 +138,7 @@ def _uprightness(body: Humanoid, places: np.ndarray) -> np.ndarray:
 
 
 def _straighten(skeleton: Skeleton, body: Humanoid, world: np.ndarray, slopes: list[float]) -> None:
-    """Turn limbs in `world` (J, 4), parents first, each with all that hangs on it, on the short way."""
+    """Rotate limbs in `world` (J, 4), parents first, each with all that hangs on it, in the shorter direction."""
     for limb, side, slope in ((body.left, 1.0, slopes[0]), (body.right, -1.0, slopes[1])):
         if limb.shoulder is not None and limb.upper_arm is not None:
             sideways = np.array([0.0, side, 0.0])
@@ -136,10 +153,12 @@ def _straighten(skeleton: Skeleton, body: Humanoid, world: np.ndarray, slopes: l
 
 
 def _sole_slope(skeleton: Skeleton, limb: Limb, world: np.ndarray, example: Motion | None) -> float:
-    """How steeply, radians, the line from ankle to toe joint falls while the sole is flat.
+    """Measure how steeply, in radians, the line from ankle to toe joint falls while the sole is flat.
 
-    In the example: where the ankle is in its lowest quarter. Else as the skeleton rests, or a usual slope where that is
-    no standing foot."""
+    In the example: where the ankle is in its lowest quarter. Else as the skeleton rests, or a usual slope where that
+    pose
+    shows no flat foot.
+    """
     if example is not None and limb.toe is not None:
         places, _ = forward_kinematics(example)
         ankle = places[:, limb.foot]
@@ -165,7 +184,9 @@ def _has_tip(skeleton: Skeleton, joint: int) -> bool:
 
 
 def _direction(skeleton: Skeleton, world: np.ndarray, joint: int, child: int | None) -> np.ndarray:
-    """World direction (3,) of the bone from `joint` to `child` (or to its tip, or its parent's bone going on)."""
+    """Compute the world direction (3,) of the bone from `joint` to `child` (or to its tip, or continuing its parent's
+    bone).
+    """
     if child is not None:
         return unit_vectors(_world_offset(skeleton, world, joint, child), _DOWN)
     offset = skeleton.tip(joint) if _has_tip(skeleton, joint) else skeleton.offsets[joint]
@@ -173,7 +194,7 @@ def _direction(skeleton: Skeleton, world: np.ndarray, joint: int, child: int | N
 
 
 def _world_offset(skeleton: Skeleton, world: np.ndarray, joint: int, below: int) -> np.ndarray:
-    """From `joint` to a joint `below` it, metres, world: (3,)."""
+    """Compute the vector (3,) from `joint` to a joint `below` it, metres, world."""
     total = np.zeros(3)
     while below != joint:
         total = total + quaternion.rotate(world[skeleton.parents[below]], skeleton.offsets[below])
@@ -186,7 +207,7 @@ def _angle(skeleton: Skeleton, world: np.ndarray, joint: int, child: int | None,
 
 
 def _point(skeleton: Skeleton, world: np.ndarray, joint: int, child: int | None, wanted: np.ndarray) -> None:
-    """Turn `joint` and all below it so that its bone points along `wanted`; half a turn is made about the body's X."""
+    """Rotate `joint` and all below it so that its bone points along `target`; a half turn is about the body's X."""
     direction = _direction(skeleton, world, joint, child)
     turn = quaternion.between(direction, wanted)
     if np.dot(direction, wanted) < -0.999:
@@ -196,6 +217,7 @@ def _point(skeleton: Skeleton, world: np.ndarray, joint: int, child: int | None,
 
 
 def _measure(skeleton: Skeleton, body: Humanoid, world: np.ndarray, places: np.ndarray) -> Neutral:
+    """Measure the stance: leg and foot lengths, and positions with the ground at z = 0."""
     limbs = (body.left, body.right)
     legs = [
         np.linalg.norm(places[limb.lower_leg] - places[limb.upper_leg])
@@ -218,7 +240,7 @@ def _measure(skeleton: Skeleton, body: Humanoid, world: np.ndarray, places: np.n
 
 
 def _ball(places: np.ndarray, limb: Limb, leg: float) -> np.ndarray:
-    """From ankle to ball of the foot (3,), metres; a usual one where the skeleton has no toe joint."""
+    """Measure the vector (3,) m from ankle to ball of the foot; a usual one where the skeleton has no toe joint."""
     if limb.toe is None:
         return leg * np.array([0.155, 0.0, -0.065])
     return places[limb.toe] - places[limb.foot]

@@ -1,7 +1,8 @@
-"""A body's movement in anatomical terms, and how any humanoid skeleton takes it on.
+"""A body's movement in anatomical terms, and its conversion to the motion of any humanoid skeleton.
 
-A `Posture` says where the pelvis is and how it is turned, how the trunk bends, what the arms do, and where the feet
-are. Nothing in it speaks of a particular skeleton's joints, rest pose or axes: `to_motion` does, through `neutral`."""
+A `Posture` contains the position and rotation of the pelvis, the bend of the trunk, the angles of the arms, and the
+positions of the feet. Nothing in it depends on a skeleton's joints, rest pose or axes: `to_motion` does, via `neutral`.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +18,7 @@ from ..humanoid import Humanoid, Limb, identify
 from ..motion import Motion, local_rotations, pose_kinematics
 from .neutral import Neutral
 
-# metres below full stretch from where a leg eases: less than what `gait` leaves, so that standing feet are met exactly
+# metres below full length from where a leg eases: less than what `gait` leaves, so that feet in contact are exact
 _SOFT = 0.003
 _X, _Y, _Z = np.eye(3)
 
@@ -26,14 +27,25 @@ _X, _Y, _Z = np.eye(3)
 class Posture:
     """T frames of a body, metres and radians, world Z up.
 
-    hips (T, 3): the middle between the hip joints. heading (T,): the body's facing about Z. pelvis (T, 3): turn of the
-    pelvis relative to the heading as a rotation vector about (X forward, Y left, Z up): list, forward tilt, turn. spine
-    (T, 3): rotation vector of the chest relative to the pelvis, shared by the joints of the spine. head (T, 3): of the
-    head relative to the chest, shared with the neck. arms (T, 2, 5), left and right: flexion (arm forward positive),
-    abduction (sideways), inward turn about the upper arm, elbow flexion, turn of the forearm. wrists (T, 2): hand
-    flexion towards the palm. ankles (T, 2, 3): where the ankles are. feet (T, 2, 3): rotation of each foot in the
-    world: roll (sole outwards-in, about the foot's length), pitch (toes down positive), yaw. toes (T, 2): the toes'
-    bend against the foot, up positive. knees (T, 2): extra turn of the knees outwards."""
+    Attributes:
+        fps: frames per second.
+        hips: (T, 3) the middle between the hip joints.
+        heading: (T,) the body's facing about Z.
+        pelvis: (T, 3) rotation vector of the pelvis relative to the heading about (X forward, Y left, Z up): list,
+            forward
+            tilt, rotation.
+        spine: (T, 3) rotation vector of the chest relative to the pelvis, shared by the joints of the spine.
+        head: (T, 3) of the head relative to the chest, shared with the neck.
+        arms: (T, 2, 5), left and right: flexion (arm forward positive), abduction (sideways), inward rotation about the
+            upper arm, elbow flexion, rotation of the forearm.
+        wrists: (T, 2) hand flexion towards the palm.
+        ankles: (T, 2, 3) positions of the ankles.
+        feet: (T, 2, 3) rotation of each foot in the world: roll (sole outwards-in, about the foot's length), pitch
+            (toes
+            down positive), yaw.
+        toes: (T, 2) the toes' bend against the foot, up positive.
+        knees: (T, 2) extra outward rotation of the knees.
+    """
 
     fps: float
     hips: np.ndarray
@@ -52,22 +64,29 @@ class Posture:
         return len(self.hips)
 
     def changed(self, **arrays: Any) -> "Posture":
-        """The same posture with some arrays replaced."""
+        """Return the same posture with some arrays replaced."""
         return replace(self, **arrays)
 
     @classmethod
     def joined(cls, parts: Sequence["Posture"]) -> "Posture":
-        """The frames of several, one after the other, at the first one's rate."""
+        """Join the frames of several postures, one after the other, at the first one's rate."""
         arrays = {f.name: np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(cls) if f.name != "fps"}
         return cls(fps=parts[0].fps, **arrays)
 
     def frames(self, where: slice) -> "Posture":
-        """A stretch of the frames."""
+        """Return a slice of the frames."""
         return replace(self, **{f.name: getattr(self, f.name)[where] for f in fields(self) if f.name != "fps"})
 
 
 def to_motion(posture: Posture, neutral: Neutral) -> Motion:
-    """The motion of `neutral.skeleton` that takes on `posture`, legs reaching for the ankles by inverse kinematics."""
+    """Convert a posture to a motion of a skeleton; the legs reach for the ankles by inverse kinematics.
+
+    Args:
+        posture: T frames.
+        neutral: the skeleton's neutral stance.
+    Returns:
+        The motion of `neutral.skeleton`.
+    """
     skeleton = neutral.skeleton
     body = identify(skeleton)
     turns = _turns(posture, neutral, body)
@@ -79,12 +98,12 @@ def to_motion(posture: Posture, neutral: Neutral) -> Motion:
 
 
 def pelvis_rotation(posture: Posture) -> np.ndarray:
-    """World turn (T, 4) of the pelvis relative to the neutral stance."""
+    """Compute the world rotation (T, 4) of the pelvis relative to the neutral stance."""
     return quaternion.multiply(quaternion.about_up(posture.heading), quaternion.from_rotation_vector(posture.pelvis))
 
 
 def hip_joints(posture: Posture, neutral: Neutral) -> np.ndarray:
-    """World positions (T, 2, 3) of the hip joints, metres."""
+    """Compute the world positions (T, 2, 3) of the hip joints, metres."""
     body = identify(neutral.skeleton)
     turn = pelvis_rotation(posture)
     apart = neutral.positions[body.left.upper_leg] - neutral.positions[body.right.upper_leg]
@@ -93,7 +112,9 @@ def hip_joints(posture: Posture, neutral: Neutral) -> np.ndarray:
 
 
 def foot_rotation(feet: np.ndarray) -> np.ndarray:
-    """World turns (..., 4) of feet given as roll, pitch, yaw (..., 3), relative to a flat foot that points along +X."""
+    """Compute world rotations (..., 4) of feet from roll, pitch, yaw (..., 3), relative to a flat foot that points
+    along +X.
+    """
     return quaternion.multiply(
         quaternion.about_up(feet[..., 2]),
         quaternion.multiply(quaternion.about_axis(_Y, feet[..., 1]), quaternion.about_axis(_X, feet[..., 0])),
@@ -101,7 +122,9 @@ def foot_rotation(feet: np.ndarray) -> np.ndarray:
 
 
 def _turns(posture: Posture, neutral: Neutral, body: Humanoid) -> np.ndarray:
-    """World turn of every joint relative to the neutral stance (T, J, 4); other joints follow their parents."""
+    """Compute the world rotation of every joint relative to the neutral stance (T, J, 4); other joints follow their
+    parents.
+    """
     skeleton = neutral.skeleton
     said = _trunk(posture, body)
     chest = said[body.chest]
@@ -116,6 +139,7 @@ def _turns(posture: Posture, neutral: Neutral, body: Humanoid) -> np.ndarray:
 
 
 def _trunk(posture: Posture, body: Humanoid) -> dict[int, np.ndarray]:
+    """Compute the rotations (T, 4) of pelvis, spine, neck and head, by joint."""
     pelvis = pelvis_rotation(posture)
     said = {body.hips: pelvis}
     count = max(len(body.spine), 1)
@@ -129,11 +153,12 @@ def _trunk(posture: Posture, body: Humanoid) -> dict[int, np.ndarray]:
 
 
 def _arm(posture: Posture, joints: Limb, side: int, chest: np.ndarray) -> dict[int, np.ndarray]:
+    """Compute the rotations (T, 4) of one arm, by joint."""
     if joints.upper_arm is None:
         return {}
     sign = 1.0 if side == 0 else -1.0
     flex, abduct, inward, elbow, pronate = np.moveaxis(posture.arms[:, side], -1, 0)
-    # a raised arm takes its collar bone along: about a third of the way beyond 30 degrees (scapulohumeral rhythm)
+    # a raised arm raises its collar bone: by about a third of what exceeds 30 degrees (scapulohumeral rhythm)
     raised = np.maximum(np.hypot(flex * (flex > 0), abduct) - np.radians(30.0), 0.0)
     collar = quaternion.multiply(chest, quaternion.about_axis(_X, sign * 0.22 * raised))
     upper = quaternion.multiply(chest, quaternion.about_axis(_X, sign * abduct))
@@ -150,6 +175,7 @@ def _arm(posture: Posture, joints: Limb, side: int, chest: np.ndarray) -> dict[i
 
 
 def _leg(posture: Posture, neutral: Neutral, joints: Limb, side: int) -> dict[int, np.ndarray]:
+    """Solve the rotations (T, 4) of one leg, by joint."""
     places = neutral.positions
     upper = float(np.linalg.norm(places[joints.lower_leg] - places[joints.upper_leg]))
     lower = float(np.linalg.norm(places[joints.foot] - places[joints.lower_leg]))
@@ -167,7 +193,8 @@ def _leg(posture: Posture, neutral: Neutral, joints: Limb, side: int) -> dict[in
 
 
 def knee_pole(posture: Posture, top: np.ndarray, side: int) -> np.ndarray:
-    """Where the knee points (T, 3): between pelvis and foot, carried along as the leg swings."""
+    """Compute the direction (T, 3) in which the knee points: between pelvis and foot, carried along as the leg swings.
+    """
     pelvis = pelvis_rotation(posture)
     sign = 1.0 if side == 0 else -1.0
     yaw = quaternion.wrapped(posture.feet[:, side, 2] - quaternion.yaw(pelvis))

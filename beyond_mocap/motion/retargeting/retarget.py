@@ -1,6 +1,6 @@
-"""The same motion on other bones, whatever the rest poses of the two skeletons are.
+"""Retargeting: the same motion on other bones, independent of the rest poses of the two skeletons.
 
-Per joint the world turn of the *segment* is carried over (see `anatomy`), so every bone points and is twisted as the
+Per joint the world rotation of the *segment* is transferred (see `anatomy`), so every bone points and is twisted as the
 source's: W' = W F F'^-1, with F and F' the segment's axes in the source's and the target's joint. Spines and necks of
 other lengths share the bend by arc length. Then size: everything on the ground is scaled by the ratio s of leg lengths
 (thigh plus shank), with the ankle's own height kept,
@@ -8,16 +8,16 @@ other lengths share the bend by arc length. Then size: everything on the ground 
     x' = s x,   z' = floor + a' + s (z - floor - a),
 
 for the middle between the hip joints and for both ankles, which the target's legs reach by two-bone inverse kinematics
-with the knees pointing where the source's point. Travel is scaled with the legs, so a foot that stands still goes on
-standing still; where places count (a pitch, a ball) travel is kept instead, x' = x, and the legs take longer or shorter
-steps than their own. Joints that a skeleton lacks go with the segment that carries them.
+with the knees pointing where the source's point. Travel is scaled with the legs, so a foot in contact stays still;
+where positions matter (a pitch, a ball) travel is kept instead, x' = x, and the legs take longer or shorter steps than
+their own. Joints that a skeleton lacks follow the segment that carries them.
 
-Which joint is which: by a saved map, by names, and where these say nothing by structure. A map is a JSON object, source
-joint -> target joint, as users of other tools keep them:
+Joints are matched by a saved map, by names, and where these say nothing by structure. A map is a JSON object, source
+joint -> target joint, as other tools use it:
 
     {"Bip001 Pelvis": "Hips", "Bip001 L Thigh": "LeftUpLeg"}
 
-It need not be complete: a joint that it leaves out is found by its name or by its place in the body (`humanoid`).
+It need not be complete: a joint that it leaves out is found by its name or by its position in the body (`humanoid`).
 """
 
 from __future__ import annotations
@@ -42,40 +42,52 @@ _LIMB_PARTS = ("shoulder", "upper_arm", "lower_arm", "hand", "upper_leg", "lower
 _CARRIED_BY = {"upper_arm": "shoulder", "lower_arm": "upper_arm", "hand": "lower_arm", "toe": "foot"}
 # two rigs are the same, axes and all, when their bones point the same way in their rest pose within this angle
 _SAME_RIG = np.cos(np.radians(12.0))
-_TRUNK_ROUNDS = 3  # of turning the trunk and seeing what is left
+_TRUNK_ROUNDS = 3  # rounds of rotating the trunk and measuring the remaining error
 _UP = np.array([0.0, 0.0, 1.0])
 _FORM = '{"source joint": "target joint", ...}'
 
 
 class Retargeter:
-    """Carries recordings of one rig to another, at their own rate: both are studied once.
+    """Retargets recordings of one rig to another, at their own rate: both rigs are analysed once.
 
-    Root positions are metres, world, Z up; heights are kept over the same floor. The skeleton itself given as target
-    gives the motion back."""
+    Root positions are metres, world, Z up; heights stay above the same floor. A skeleton given as its own target
+    returns
+    the same motion.
+    """
 
     def __init__(
         self, sample: Motion, skeleton: Skeleton, bone_map: dict[str, str] | str | Path | None = None, *,
         example: Motion | None = None, standing: np.ndarray | None = None, example_standing: np.ndarray | None = None,
         keeps_travel: bool = False,
     ):
-        """sample: frames of the recordings (their order does not matter).
+        """Match the joints and analyse both rigs.
 
-        bone_map: source joint -> target joint, or the path of a JSON file that holds such an object (`load_bone_map`);
-        pairs in it go before those found by names and structure. example: a recording on `skeleton`, which tells how
-        its rig twists its bones and holds its trunk; without it the rest pose does. standing, example_standing (T, 2)
-        bool: left and right foot on the ground in `sample` and in `example`, which tells how soles lie; without it low
-        feet count as standing. keeps_travel: footprints and the way over the ground stay where they are, whatever the
-        legs' length. Raises InputError where either skeleton has no legs or the map names an unknown joint."""
+        Args:
+            sample: frames of the recordings (their order does not matter).
+            skeleton: the target.
+            bone_map: source joint -> target joint, or the path of a JSON file with such an object (`read_bone_map`);
+                its pairs
+                override those found by names and structure.
+            example: a recording on `skeleton`, which shows how its rig twists its bones and holds its trunk; without it
+                the
+                rest pose does.
+            standing, example_standing: (T, 2) bool, left and right foot on the ground in `sample` and in `example`,
+                which shows
+                how soles lie; without it low feet count as in contact.
+            keeps_travel: footprints and the path over the ground stay where they are, whatever the legs' length.
+        Raises:
+            InputError: if either skeleton has no legs or the map names an unknown joint.
+        """
         self.keeps_travel = keeps_travel
         self.pairs = pair_joints(sample, skeleton, bone_map, example)
         self.source = study(sample.skeleton, self.pairs.source, sample, standing)
         same = _same_rig(sample.skeleton, skeleton) if example is None else sample.skeleton.same_bones(skeleton)
-        if same:  # its own recording says best how the rig is used: this very skeleton gets this very motion
+        if same:  # its own recording shows best how the rig is used: the same skeleton gets the same motion
             example, example_standing = replace(sample, skeleton=skeleton), standing
         self.target = study(skeleton, self.pairs.target, example, example_standing)
 
     def carry(self, motion: Motion) -> Motion:
-        """`motion`, a recording of the sample's skeleton, on the other skeleton."""
+        """Retarget `motion`, a recording of the sample's skeleton, to the other skeleton."""
         return _Transfer(motion, self.source, self.target, self.pairs, self.keeps_travel).motion()
 
 
@@ -89,7 +101,7 @@ def _same_rig(a: Skeleton, b: Skeleton) -> bool:
 
 
 class _Transfer:
-    """One motion on its way from `source` to `target`."""
+    """The transfer of one motion from `source` to `target`."""
 
     def __init__(self, motion: Motion, source: Anatomy, target: Anatomy, pairs: Pairs, keeps_travel: bool = False):
         self.fps, self.source, self.target, self.pairs = motion.fps, source, target, pairs
@@ -102,7 +114,7 @@ class _Transfer:
         self.wanted: dict[int, np.ndarray] = {}
 
     def motion(self) -> Motion:
-        """The motion on the target's skeleton."""
+        """Build the motion on the target's skeleton."""
         self._trunk()
         sides = list(zip(self._limbs(self.source), self._limbs(self.target)))
         for mine, theirs in sides:
@@ -119,14 +131,15 @@ class _Transfer:
         return anatomy.body.left, anatomy.body.right
 
     def _turn(self, joint: int) -> np.ndarray:
-        """How the source's segment is turned: (T, 4)."""
+        """Compute the rotation (T, 4) of the source's segment."""
         return quaternion.multiply(self.world[:, joint], self.source.axes[joint])
 
     def _give(self, joint: int, turn: np.ndarray) -> None:
-        """Asks the target's segment to be turned so."""
+        """Set the rotation (T, 4) of the target's segment."""
         self.wanted[joint] = quaternion.multiply(turn, quaternion.inverse(self.target.axes[joint]))
 
     def _trunk(self) -> None:
+        """Transfer the rotations of pelvis, spine, neck and head; joints between share them by arc length."""
         source, target = self.source.body, self.target.body
         pelvis, chest = self._turn(source.hips), self._turn(source.chest)
         self._give(target.hips, pelvis)
@@ -142,7 +155,8 @@ class _Transfer:
             self._give(joint, _between(shares, turns, (number + 1) / len(chain)))
 
     def _limb(self, mine: Limb, theirs: Limb) -> None:
-        """Asks for one side's turns; what the source lacks goes with the part that carries it, in the end the chest."""
+        """Transfer one side's rotations; what the source lacks follows the part that carries it, in the end the chest.
+        """
         for part in _LIMB_PARTS:
             joint = getattr(theirs, part)
             if joint in self.target.known:
@@ -150,7 +164,8 @@ class _Transfer:
                 self._give(joint, self._turn(getattr(mine, known[0]) if known else self.source.body.chest))
 
     def _world(self) -> np.ndarray:
-        """World rotations (T, J, 4) of all target joints: those asked for, and the others carried along."""
+        """Compute the world rotations (T, J, 4) of all target joints: those that are set, and the others carried along.
+        """
         skeleton = self.target.skeleton
         world = np.empty((len(self.world), len(skeleton), 4))
         for joint, parent in enumerate(skeleton.parents):
@@ -165,7 +180,7 @@ class _Transfer:
         return world
 
     def _own_turn(self, joint: int) -> np.ndarray:
-        """The world turn (T, 4) of a source joint beyond being carried by its parent."""
+        """Compute the world rotation (T, 4) of a source joint beyond that of its parent."""
         parent = self.source.skeleton.parents[joint]
         if parent < 0:
             return quaternion.identity(len(self.world))
@@ -173,7 +188,9 @@ class _Transfer:
         return quaternion.multiply(self.world[:, joint], quaternion.inverse(carried))
 
     def _trunk_line(self, world: np.ndarray) -> np.ndarray:
-        """Bends the trunk, below the chest where there are joints, so that the neck lies in the source's direction."""
+        """Align the trunk, bending it below the chest where there are joints, so that the neck lies in the source's
+        direction.
+        """
         spine, tops = self.target.body.spine, self.pairs.tops
         bending = spine[:-1] or spine
         if not bending or tops is None:
@@ -191,18 +208,20 @@ class _Transfer:
         return world
 
     def _size(self, positions: np.ndarray) -> np.ndarray:
-        """Source positions (T, 3) at the target's size."""
+        """Scale source positions (T, 3) to the target's size."""
         ground = self.floor + self.source.ankle
         heights = self.floor + self.target.ankle + self.scale * (positions[:, 2] - ground)
         return np.column_stack([self.travel * positions[:, :2], heights])
 
     def _root(self, world: np.ndarray) -> np.ndarray:
-        """Where the target's root is, (T, 3): its hip joints' middle stands where the source's does."""
+        """Compute the target's root (T, 3): its hip joints' middle is where the source's is."""
         middle = _mid_hips(_laid(self.target.skeleton, world), self.target)
         return self._size(_mid_hips(self.places, self.source)) - middle
 
     def _reach(self, places: np.ndarray, mine: Limb, theirs: Limb) -> None:
-        """Puts an ankle where the source's is, the knee pointing as it does; `places` (T, J, 3): as yet."""
+        """Move an ankle to the source's, the knee pointing like the source's; `places` (T, J, 3): positions before
+        that.
+        """
         hip, knee, ankle = (places[:, j] for j in (theirs.upper_leg, theirs.lower_leg, theirs.foot))
         goal = self._size(self.places[:, mine.foot])
         upper, lower = (np.linalg.norm(b - a, axis=1) for a, b in ((hip, knee), (knee, ankle)))
@@ -219,8 +238,12 @@ class _Transfer:
 
 
     def _pole(self, mine: Limb, hip: np.ndarray, knee: np.ndarray, ankle: np.ndarray, height: np.ndarray) -> np.ndarray:
-        """Where a knee points (T, 3): as the source's, which says little where it is straighter than the target's will
-        be, `height` (T,) metres off the line hip-ankle; the rest of the way it bends about the thigh's own hinge."""
+        """Compute where a knee points (T, 3).
+
+        As the source's, which shows little where it is straighter than the target's will be, `height` (T,) metres off
+        the line
+        hip-ankle; the rest of the bend is about the thigh's own hinge.
+        """
         line = unit_vectors(ankle - hip, -_UP)
         ahead = quaternion.rotate(self._turn(mine.upper_leg), np.array([1.0, 0.0, 0.0]))
         off, ahead = (v - np.sum(v * line, axis=1, keepdims=True) * line for v in (knee - hip, ahead))
@@ -229,13 +252,13 @@ class _Transfer:
 
 
 def _bend_height(reach: np.ndarray, upper: np.ndarray, lower: np.ndarray) -> np.ndarray:
-    """How far the middle joint of a limb stands off the line between its ends, `reach` (T,) metres apart: (T,)."""
+    """Compute the distance (T,) of a limb's middle joint from the line between its ends, `reach` (T,) metres apart."""
     along = (upper**2 - lower**2 + reach**2) / np.maximum(2.0 * reach, 1e-9)
     return np.sqrt(np.maximum(upper**2 - along**2, 0.0))
 
 
 def _carriers(part: str) -> list[str]:
-    """A limb's part and those above it that carry it, from below."""
+    """List a limb's part and those above it that carry it, from below."""
     found = [part]
     while found[-1] in _CARRIED_BY:
         found.append(_CARRIED_BY[found[-1]])
@@ -243,19 +266,19 @@ def _carriers(part: str) -> list[str]:
 
 
 def _in_reach(hip: np.ndarray, ankle: np.ndarray, goal: np.ndarray, longest: np.ndarray) -> np.ndarray:
-    """The goal (T, 3), neared softly where it would stretch a leg straighter than the source's directions have it."""
+    """Limit the goal (T, 3) softly where it would stretch a leg straighter than the source's directions do."""
     asked, own = np.linalg.norm(goal - hip, axis=1), np.linalg.norm(ankle - hip, axis=1)
     played = np.maximum(limb.soft_distance(asked, longest, _SOFT), np.minimum(asked, own))
     return hip + (goal - hip) * (played / np.maximum(asked, 1e-9))[:, None]
 
 
 def _mid_hips(places: np.ndarray, anatomy: Anatomy) -> np.ndarray:
-    """The middle between the hip joints: (T, 3) from positions (T, J, 3)."""
+    """Compute the middle between the hip joints: (T, 3) from positions (T, J, 3)."""
     return 0.5 * (places[:, anatomy.body.left.upper_leg] + places[:, anatomy.body.right.upper_leg])
 
 
 def _between(shares: Sequence[float] | np.ndarray, turns: list[np.ndarray], share: float) -> np.ndarray:
-    """The turn (T, 4) at `share` among `turns` that are known at rising `shares`."""
+    """Interpolate the rotation (T, 4) at `share` among `rotations` that are known at rising `shares`."""
     high = min(int(np.searchsorted(shares, share - 1e-9)), len(shares) - 1)
     low = max(high - 1, 0)
     width = shares[high] - shares[low]
@@ -265,7 +288,7 @@ def _between(shares: Sequence[float] | np.ndarray, turns: list[np.ndarray], shar
 
 
 def _laid(skeleton: Skeleton, world: np.ndarray) -> np.ndarray:
-    """Positions (T, J, 3) for world rotations (T, J, 4), the root at the origin."""
+    """Compute positions (T, J, 3) from world rotations (T, J, 4), the root at the origin."""
     parents = list(skeleton.parents[1:])
     bones = quaternion.rotate(world[:, parents], skeleton.offsets[1:])
     places = np.zeros((len(world), len(skeleton), 3))
@@ -276,10 +299,12 @@ def _laid(skeleton: Skeleton, world: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Pairs:
-    """Two bodies and what they share.
+    """Two bodies and the joints they share.
 
-    source, target: which joint is what. others: target joint -> source joint for joints without a meaning (fingers,
-    twist bones). tops: the joints of source and target that end the trunk in the same place, None where there are none.
+    Attributes:
+        source, target: the joints by meaning.
+        others: target joint -> source joint for joints without a meaning (fingers, twist bones).
+        trunk_tops: the joints of source and target that end the trunk at the same part; None where there are none.
     """
 
     source: Humanoid
@@ -289,20 +314,28 @@ class Pairs:
 
 
 def load_bone_map(path: str | Path) -> dict[str, str]:
-    """A saved map; InputError where the file cannot be read or is not a JSON object of names."""
+    """Read a saved bone map.
+
+    Args:
+        path: a JSON file.
+    Returns:
+        Source joint -> target joint.
+    Raises:
+        InputError: if the file cannot be read or is not a JSON object of names.
+    """
     try:
         found = json.loads(Path(path).read_text(encoding="utf-8"))
     except OSError as error:
         raise InputError(path, f"cannot be read ({error.strerror})", "a bone map (JSON)", "check the path") from None
     except (ValueError, RecursionError) as error:
-        raise InputError(path, f"not JSON ({error})", _FORM, "mend the file") from None
+        raise InputError(path, f"not JSON ({error})", _FORM, "correct the file") from None
     if not isinstance(found, dict) or not all(isinstance(name, str) for name in found.values()):
-        raise InputError(path, "not an object of names", _FORM, "mend the file")
+        raise InputError(path, "not an object of names", _FORM, "correct the file")
     return found
 
 
 def save_bone_map(path: str | Path, pairs: Pairs, source: Skeleton, target: Skeleton) -> None:
-    """Writes the joints that belong together as a map for `load_bone_map`; spines are shared by length, not in it."""
+    """Write the matching joints as a map for `read_bone_map`; spines are shared by length and not part of it."""
     theirs = roles_of(pairs.target)
     named = {joint: theirs[role] for role, joint in roles_of(pairs.source).items() if role in theirs}
     named |= {mine: its for its, mine in pairs.others.items()}
@@ -314,10 +347,18 @@ def pair_joints(
     motion: Motion, skeleton: Skeleton, bone_map: Mapping[str, str] | str | Path | None = None,
     example: Motion | None = None,
 ) -> Pairs:
-    """The joints of `motion`'s skeleton and of `skeleton` that belong together.
+    """Match the joints of `motion`'s skeleton and of `skeleton`.
 
-    bone_map: as `load_bone_map` returns it, or a path. example: a recording on `skeleton`, whose poses show left from
-    right where its names do not. Raises InputError for a map with unknown names and for skeletons without legs."""
+    Args:
+        motion: a recording on the source.
+        skeleton: the target.
+        bone_map: as from `read_bone_map`, or a path.
+        example: a recording on `skeleton`, whose poses show left and right where its names do not.
+    Returns:
+        The pairs.
+    Raises:
+        InputError: for a map with unknown names and for skeletons without legs.
+    """
     where = str(bone_map) if isinstance(bone_map, (str, Path)) else "bone map"
     table = load_bone_map(bone_map) if isinstance(bone_map, (str, Path)) else dict(bone_map or {})
     links = {_index(motion.skeleton, mine, where): _index(skeleton, its, where) for mine, its in table.items()}
@@ -331,12 +372,12 @@ def pair_joints(
 
 def _index(skeleton: Skeleton, name: str, where: str) -> int:
     if name not in skeleton.names:
-        raise InputError(where, f"no joint {name!r}", f"one of {', '.join(skeleton.names)}", "mend the name")
+        raise InputError(where, f"no joint {name!r}", f"one of {', '.join(skeleton.names)}", "correct the name")
     return skeleton.names.index(name)
 
 
 def _roles(skeleton: Skeleton, recording: Motion | None) -> dict[str, int]:
-    """What names or structure tell; empty where they tell nothing."""
+    """Find the roles that names or structure show; empty where they show nothing."""
     try:
         return roles_of(identify(skeleton) if recording is None else identify_posed(recording))
     except InputError:
@@ -344,7 +385,7 @@ def _roles(skeleton: Skeleton, recording: Motion | None) -> dict[str, int]:
 
 
 def _linked(source: dict[str, int], target: dict[str, int], links: dict[int, int]):
-    """Both bodies' roles with the map's pairs put through: a mapped joint takes its partner's role."""
+    """Apply the map's pairs to both bodies' roles: a mapped joint takes its partner's role."""
     back = {joint: role for role, joint in target.items()}
     source, target = dict(source), dict(target)
     for mine, its in links.items():
@@ -356,14 +397,14 @@ def _linked(source: dict[str, int], target: dict[str, int], links: dict[int, int
 
 
 def _others(source: Skeleton, target: Skeleton, mine: Humanoid, its: Humanoid, links: dict[int, int]) -> dict[int, int]:
-    """Target joint -> source joint where neither has a meaning: mapped ones, and those of the same name."""
+    """Pair joints without a meaning, target -> source: mapped ones, and those of the same name."""
     taken = [set(roles_of(body).values()) | set(body.spine) for body in (mine, its)]
     same = {source.names.index(name): joint for joint, name in enumerate(target.names) if name in source.names}
     return {b: a for a, b in {**same, **links}.items() if a not in taken[0] and b not in taken[1]}
 
 
 def _tops(source: Humanoid, target: Humanoid) -> tuple[int, int] | None:
-    """Where both trunks end: at the neck, else at the head."""
+    """Find where both trunks end: at the neck, else at the head."""
     for part in ("neck", "head"):
         joints = getattr(source, part), getattr(target, part)
         if None not in joints:

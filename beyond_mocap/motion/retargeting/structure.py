@@ -1,7 +1,7 @@
-"""Legs, arms, neck and head of a tree of joints without telling names: two limbs alike that hang on one joint.
+"""Legs, arms, neck and head in a tree of joints without useful names: two similar limbs that hang on one joint.
 
-Limbs come in pairs whose bones are of one length. The two longest pairs are legs and arms; the legs hang nearer to the
-root. Left and right are told by the poses: toes point forward and knees bend backward, from there left is up x forward.
+Limbs come in pairs whose bones have equal lengths. The two longest pairs are legs and arms; the legs hang nearer to the
+root. Left and right follow from the poses: toes point forward and knees bend backward, and left is up x forward.
 """
 
 from __future__ import annotations
@@ -14,15 +14,21 @@ import numpy as np
 from ...base.vectors import unit_vectors
 
 _ALIKE = 0.15  # relative difference of two bones that count as left and right
-_SHORTEST = 0.3  # of the longest pair: upper plus lower bones of a pair
+_SHORTEST = 0.3  # least length of a pair (upper plus lower bones), share of the longest pair
 _NEARLY = 0.6
 _TELLING = 1e-2
 
 
 def find(parents: Sequence[int], places: np.ndarray, tips: np.ndarray) -> dict[str, int] | None:
-    """Roles ("left upper_leg", ...) -> joint from poses (T, J, 3) in metres; None where no pair of legs is found.
+    """Find the roles of joints from poses.
 
-    tips (T, J, 3): where each joint's bone ends, the joint itself where unknown; shows how toeless feet point."""
+    Args:
+        parents: J indices, -1 for the root.
+        places: (T, J, 3) metres.
+        tips: (T, J, 3) where each joint's bone ends, the joint itself where unknown; shows how toeless feet point.
+    Returns:
+        Roles ("left upper_leg", ...) -> joint; None if no pair of legs is found.
+    """
     lengths = np.array([np.linalg.norm(places[0, j] - places[0, p]) if p >= 0 else 0.0 for j, p in enumerate(parents)])
     pairs = _limb_pairs(list(parents), lengths)
     if not pairs:
@@ -47,7 +53,7 @@ def find(parents: Sequence[int], places: np.ndarray, tips: np.ndarray) -> dict[s
 
 
 def _limb_pairs(parents, lengths) -> list[tuple[tuple[int, ...], tuple[int, ...]]]:
-    """Pairs of limbs (upper, middle, end joint) that hang on one joint and are alike, longest first."""
+    """Find pairs of limbs (upper, middle, end joint) that hang on one joint and are alike, longest first."""
     onward, found = _onward(parents, lengths), []
     for joint in {p for p in parents if parents.count(p) > 1 and p >= 0}:
         limbs = [limb for child in children(parents, joint) if (limb := _limb(lengths, onward, child))]
@@ -61,8 +67,9 @@ def _limb_pairs(parents, lengths) -> list[tuple[tuple[int, ...], tuple[int, ...]
 
 
 def _onward(parents, lengths) -> list[int]:
-    """For each joint the one below it on the way to its farthest end, -1 at an end."""
+    """Find for each joint the child towards its farthest end, -1 at an end."""
     reach, onward = np.zeros(len(parents)), [-1] * len(parents)
+    # children come after their parents, so going backwards every joint's own reach is complete when its parent needs it
     for joint in range(len(parents) - 1, 0, -1):
         if onward[parents[joint]] < 0 or reach[joint] + lengths[joint] >= reach[parents[joint]]:
             reach[parents[joint]] = reach[joint] + lengths[joint]
@@ -71,7 +78,7 @@ def _onward(parents, lengths) -> list[int]:
 
 
 def _limb(lengths, onward, start: int) -> tuple[int, ...] | None:
-    """The three joints around the two longest bones in a row on the way from `start` to its farthest end."""
+    """Find the three joints around the two longest consecutive bones from `start` to its farthest end."""
     chain = [start]
     while onward[chain[-1]] >= 0:
         chain.append(onward[chain[-1]])
@@ -84,7 +91,7 @@ def _limb(lengths, onward, start: int) -> tuple[int, ...] | None:
 
 
 def _legs_and_arms(parents, pairs):
-    """Of the longest two pairs that share no joint, the one that hangs nearer to the root, and the other or None."""
+    """Split the longest two pairs without a common joint into legs (nearer to the root) and arms, or None."""
     first = pairs[0]
     taken = {j for limb in first for j in limb}
     second = next((pair for pair in pairs[1:] if not taken & {j for limb in pair for j in limb}), None)
@@ -95,7 +102,7 @@ def _legs_and_arms(parents, pairs):
 
 
 def _sided(legs, places, tips, parents, arms):
-    """The pair of legs as (left, right): by feet that point forward and knees that bend backward, else as is."""
+    """Order the pair of legs as (left, right): by feet that point forward and knees that bend backward, else as is."""
     a, b = legs
     hips = 0.5 * (places[:, a[0]] + places[:, b[0]])
     ends = [arm[0] for arm in arms] if arms is not None else [0]
@@ -112,12 +119,12 @@ def _sided(legs, places, tips, parents, arms):
 
 
 def _toe(parents, lengths, foot: int) -> int | None:
-    """The longest bone's joint that hangs on the foot."""
+    """Find the joint of the longest bone that hangs on the foot."""
     return max(children(parents, foot), key=lambda j: lengths[j], default=None)
 
 
 def neck_and_head(parents, chest: int, taken: set[int], roles: Mapping[str, int]) -> dict[str, int]:
-    """Roles "neck" and "head" for the longest chain that hangs on the chest and is no limb; what `roles` has stays."""
+    """Find "neck" and "head" on the longest chain that hangs on the chest and is no limb; those in `roles` stay."""
     if "neck" in roles:
         chain = _straight(parents, roles["neck"])
     else:
@@ -129,7 +136,7 @@ def neck_and_head(parents, chest: int, taken: set[int], roles: Mapping[str, int]
 
 
 def _straight(parents, start: int) -> list[int]:
-    """`start` and the joints below it as long as there is just one."""
+    """List `start` and the joints below it as long as there is only one child."""
     chain = [start]
     while len(children(parents, chain[-1])) == 1:
         chain += children(parents, chain[-1])
@@ -137,8 +144,10 @@ def _straight(parents, start: int) -> list[int]:
 
 
 def mirrored(parents, pairs: Iterable[tuple[int, int]]) -> tuple[int, ...]:
-    """For each joint the one on the other side: of `pairs`, of what they hang on before they meet, and, child by child,
-    of what hangs on them."""
+    """Find for each joint the one on the other side: of `pairs`, of their ancestors up to the common one, and, child by
+    child,
+    of their descendants.
+    """
     out = list(range(len(parents)))
     pairs = [(a, b) for pair in pairs for a, b in zip(path(parents, pair[0]), path(parents, pair[1])) if a != b]
     known = {joint for pair in pairs for joint in pair}
@@ -152,12 +161,12 @@ def mirrored(parents, pairs: Iterable[tuple[int, int]]) -> tuple[int, ...]:
 
 
 def children(parents, joint: int) -> list[int]:
-    """The joints that hang on `joint`."""
+    """List the joints that hang on `joint`."""
     return [i for i, p in enumerate(parents) if p == joint]
 
 
 def path(parents, joint: int) -> list[int]:
-    """From `joint` up to the root, both included."""
+    """List the joints from `joint` up to the root, both included."""
     found = []
     while joint >= 0:
         found.append(joint)
@@ -166,13 +175,13 @@ def path(parents, joint: int) -> list[int]:
 
 
 def list_between(parents, low: int, high: int) -> list[int]:
-    """Joints strictly between `low` and `high`, from below; empty where `high` does not hang on `low`."""
+    """List the joints strictly between `low` and `high`, from below; empty where `high` does not hang on `low`."""
     chain = path(parents, high)
     return chain[1 : chain.index(low)][::-1] if low in chain else []
 
 
 def below(parents, joint: int) -> list[int]:
-    """`joint` and everything that hangs on it."""
+    """List `joint` and everything that hangs on it."""
     found = {joint}
     for other, parent in enumerate(parents):
         if parent in found:
@@ -181,6 +190,6 @@ def below(parents, joint: int) -> list[int]:
 
 
 def common_ancestor(parents, joints: Sequence[int]) -> int:
-    """The lowest joint from which all of `joints` hang (itself not counted as hanging on itself unless it is one)."""
+    """Find the lowest joint that all of `joints` hang on, or that is one of them."""
     shared = set(path(parents, joints[0])).intersection(*(path(parents, j) for j in joints[1:]))
     return max(shared, key=lambda j: len(path(parents, j)))

@@ -1,8 +1,8 @@
-"""A tracked player: samples as a feed delivers them, put right, and brought to an even rate.
+"""A tracked player: samples as a feed delivers them, corrected, and brought to an even rate.
 
     track = files.tracking.tracking.read_track_csv("player.csv")
-    track, report = clean(track)
-    sampled = sample(track, fps=30)
+    track, report = clean_track(track)
+    sampled = sample_track(track, fps=30)
 """
 
 from .cleaning import FASTEST, DataReport, clean

@@ -1,4 +1,4 @@
-"""The ball's path over a take: where it is at which time, and whether that was measured."""
+"""The ball's trajectory over a take: its position over time, and whether that was measured."""
 
 from __future__ import annotations
 
@@ -9,8 +9,14 @@ import numpy as np
 
 @dataclass(frozen=True, eq=False)
 class BallPath:
-    """The ball at the output's rate: times (T,) s on the track's clock, positions (T, 3) m of its centre, measured (T,)
-    bool; rotations (T, 4) of its body, None where nobody knows how it turns."""
+    """The ball at the output's rate.
+
+    Attributes:
+        times: (T,) seconds on the track's clock.
+        positions: (T, 3) metres, the ball's centre, world.
+        measured: (T,) bool.
+        rotations: (T, 4) of its body; None where its spin is unknown.
+    """
 
     times: np.ndarray
     positions: np.ndarray

@@ -1,8 +1,8 @@
-"""What is wrong with a feed's samples, put right and told.
+"""Errors in a feed's samples, corrected and reported.
 
-How real feeds err: samples are missing, or kept going at constant velocity while the player was out of sight, and then
-snap back by 0.4-1.4 m from one sample to the next, some 8 times per player and half; single samples jump away and
-return; an absent ball stands at a sentinel (z = -10, or exactly at the origin).
+How real feeds err: samples are missing, or continue at constant velocity while the player is out of sight and then snap
+back by 0.4-1.4 m from one sample to the next, some 8 times per player and half; single samples jump away and return; an
+absent ball is at a sentinel (z = -10, or exactly at the origin).
 """
 
 from __future__ import annotations
@@ -17,25 +17,34 @@ from .data import Track, at_sentinel
 from .sampling import GAP_INTERVALS, LONG_GAP
 
 FASTEST = 12.0
-"""m/s; nobody runs faster, so a sample that wants it is wrong."""
+"""m/s; no player runs faster, so a sample that would need it is wrong."""
 
 _HARDEST = 12.0  # m/s^2, hardest acceleration of a player
-_SPIKE = 0.2  # metres off the line between the neighbours that a spike has at least, beyond what acceleration explains
-_EXCURSION = 0.5  # seconds that a feed may be away and still be seen to return
-_COAST = (0.2, 0.9)  # seconds before a snap that are not believed: at least, and at most while the feed coasts
-_CATCH_UP = 3.0  # m/s; so much faster than before may a snap be made up for, which asks for more seconds than the least
+_SPIKE = 0.2  # metres off its neighbours' line from which a sample is a spike, beyond what acceleration explains
+_EXCURSION = 0.5  # seconds within which a jump away has to return to count as an excursion
+_COAST = (0.2, 0.9)  # seconds before a snap that are replaced: at least, and at most while the feed coasts
+_CATCH_UP = 3.0  # m/s by which the player may be faster while making up for a snap; large snaps need more time
 _COAST_EXACT = 0.012  # metres: a coasting feed keeps to its line up to rounding to centimetres
 _STRAY = 2  # samples before a jump at the track's start, or after one at its end, that are taken for strays
-_SNAP_LIMIT = 3.0  # metres; a longer step is another player, or truth: told, not repaired
+_SNAP_LIMIT = 3.0  # metres; a longer step is another player, or real: reported, not repaired
 _LEAN = 0.3  # seconds whose slope is the velocity next to a gap
-_LONGEST_GAP = 3600.0
+_LONGEST_GAP = 3600.0  # seconds
 
 
 @dataclass(frozen=True, kw_only=True)
 class DataReport:
-    """What `clean` found. lines: for people, one finding each, with times. rate: samples per second (median). dropped:
-    rows without a time. merged: rows whose time repeated. filled, outliers: samples put in and replaced. gaps: (start,
-    end) seconds between measured samples. ball_unknown: samples without it. warnings: lines that ask for attention."""
+    """What `clean_track` found.
+
+    Attributes:
+        lines: text for people, one finding each, with times.
+        rate: samples per second (median).
+        dropped: rows without a time.
+        merged: rows whose time repeated.
+        filled, outliers: samples inserted and replaced.
+        gaps: (start, end) seconds between measured samples.
+        ball_unknown: samples without the ball.
+        warnings: those lines that need attention.
+    """
 
     lines: tuple[str, ...]
     rate: float
@@ -49,14 +58,25 @@ class DataReport:
 
 
 def clean(track: Track) -> tuple[Track, DataReport]:
-    """The track in order of time, with one believable position per sample, and a report of what that took.
+    """Clean a track: in order of time, with one plausible position per sample, and a report of the changes.
 
     Rows without a time are dropped, repeated times merged to their mean, times sorted. Spikes, excursions and the
-    coasted samples before a snap are marked `outlier`; missing samples, and those of gaps longer than three sample
-    intervals, are put in and marked `filled`. Both get a cubic between the believed neighbours that starts and ends
-    with their velocities (beyond one second only as curved as the distance allows); before the first and after the last
-    believed sample, the velocity fades (to a third in half a second). A track that is already clean comes back equal.
-    InputError where fewer than two samples have a position, or a gap is longer than an hour."""
+    coasted
+    samples before a snap are marked `outlier`; missing samples, and those of gaps longer than three sample intervals,
+    are
+    inserted and marked `filled`. Both get a cubic between the valid neighbours that starts and ends with their
+    velocities
+    (beyond one second only as curved as the distance allows). Before the first and after the last valid sample the
+    velocity
+    fades (to a third in half a second). A track that is already clean comes back equal.
+
+    Args:
+        track: samples as the feed has them, pitch frame.
+    Returns:
+        The cleaned track, and the report.
+    Raises:
+        InputError: if fewer than two samples have a position, or a gap is longer than an hour.
+    """
     times, positions, ball, notes, dropped, merged = _in_order(track)
     ball, notes = _real_ball(ball, notes)
     times, positions, ball = _with_missing_rows(times, positions, ball, track.name)
@@ -73,16 +93,16 @@ def clean(track: Track) -> tuple[Track, DataReport]:
 
 
 def _in_order(track: Track):
-    """Rows sorted by time, repeated times merged, unknown times dropped; with notes and counts of what was done."""
+    """Sort rows by time, merge repeated times and drop unknown ones; with notes and counts of the changes."""
     timed = np.isfinite(track.times)
     rows = np.column_stack([track.positions, track.ball])[timed]
     rows[~np.isfinite(rows[:, :2]).all(axis=1), :2] = np.nan
     rows[:, 4] = np.where(track.ball_height_known[timed], rows[:, 4], np.nan)
-    notes = [f"{np.count_nonzero(~timed)} rows without a time left out"] if not timed.all() else []
+    notes = [f"{np.count_nonzero(~timed)} rows without a time dropped"] if not timed.all() else []
     times = track.times[timed]
     if np.any(np.diff(times) < 0):
         late = times[1:][np.diff(times) < 0]
-        notes.append(f"times out of order put in order: {_places(late)}")
+        notes.append(f"times out of order sorted: {_places(late)}")
     order = np.argsort(times, kind="stable")
     times, rows = times[order], rows[order]
     starts = np.flatnonzero(np.diff(times, prepend=-np.inf) > 1e-6)
@@ -95,7 +115,7 @@ def _in_order(track: Track):
 
 
 def _mean_of_groups(rows: np.ndarray, starts: np.ndarray) -> np.ndarray:
-    """(G, k): mean of the finite values in each group of rows (N, k); NaN where a group has none."""
+    """Average the finite values in each group of rows (N, k): (G, k); NaN where a group has none."""
     finite = np.isfinite(rows)
     counts = np.add.reduceat(finite, starts, axis=0, dtype=float)
     sums = np.add.reduceat(np.where(finite, rows, 0.0), starts, axis=0)
@@ -103,16 +123,16 @@ def _mean_of_groups(rows: np.ndarray, starts: np.ndarray) -> np.ndarray:
 
 
 def _real_ball(ball: np.ndarray, notes: list[str]) -> tuple[np.ndarray, list[str]]:
-    """Ball rows (N, 3) with NaN in place of sentinels: z below the ground, far outside, or parked at the origin."""
+    """Replace sentinels in ball rows (N, 3) with NaN: z below the ground, far outside, or parked at the origin."""
     seen, wrong = np.isfinite(ball[:, :2]).all(axis=1), at_sentinel(ball)
     if wrong.any():
-        notes = [*notes, f"{np.count_nonzero(wrong)} samples with the ball at a sentinel taken as unknown"]
+        notes = [*notes, f"{np.count_nonzero(wrong)} samples with the ball at a sentinel set to unknown"]
     ball = np.where((seen & ~wrong)[:, None], ball, np.nan)
     return ball, notes
 
 
 def _with_missing_rows(times, positions, ball, name: str):
-    """Rows of NaN put in, evenly, wherever two rows are more than three sample intervals apart."""
+    """Insert rows of NaN, evenly, where two rows are more than three sample intervals apart."""
     steps = np.diff(times)
     interval = np.median(steps) if len(steps) else 1.0
     gaps = np.flatnonzero(steps > GAP_INTERVALS * interval + 1e-9)
@@ -129,7 +149,8 @@ def _with_missing_rows(times, positions, ball, name: str):
 
 
 def _outliers(times: np.ndarray, positions: np.ndarray) -> tuple[np.ndarray, tuple[float, ...]]:
-    """(N,) bool samples not to be believed, and times of steps too large to repair; all positions are numbers."""
+    """Detect the samples (N,) bool to replace, and the times of steps too large to repair; all positions are numbers.
+    """
     wrong = _spikes(times, positions)
     left = np.flatnonzero(~wrong)
     jumps, excess = _jumps(times[left], positions[left])
@@ -137,6 +158,9 @@ def _outliers(times: np.ndarray, positions: np.ndarray) -> tuple[np.ndarray, tup
     for place, jump in enumerate(jumps):
         if jump in used:
             continue
+        # a jump with a return is an excursion, one near an end a stray, a very long one is only reported, any other is
+        # a snap
+        # after coasting
         back = _return(times[left], jumps, excess, place)
         if back is not None:
             used.add(back)
@@ -151,11 +175,15 @@ def _outliers(times: np.ndarray, positions: np.ndarray) -> tuple[np.ndarray, tup
 
 
 def _spikes(times: np.ndarray, positions: np.ndarray) -> np.ndarray:
-    """(N,) bool: single samples far off the line between their neighbours, while the neighbours' own lines are better.
+    """Detect single samples (N,) bool far off the line between their neighbours, while the neighbours' lines fit
+    better.
 
     A spike of size d is d off its line and puts its neighbours d/2 off theirs; a step puts the two samples beside it
-    off theirs equally, so neither stands out and steps are left to `_jumps`. The first and last sample have one
-    neighbour only: they count as off the line of the third and fourth, or their own strays would blame the second."""
+    off
+    theirs equally, so neither stands out and steps are left to `_detect_jumps`. The first and last sample have one
+    neighbour only: they are measured against the line of the third and fourth, or their own errors would blame the
+    second.
+    """
     wrong = np.zeros(len(times), dtype=bool)
     if len(times) < 5:
         return wrong
@@ -176,14 +204,18 @@ _ENDS = ((0, 2, 3), (-1, -3, -4))
 
 
 def _off_line(time, place, time_a, place_a, time_b, place_b) -> np.ndarray:
-    """(...,) metres from `place` (..., 2) to where the straight, steady way from a to b is at `time` (...,)."""
+    """Measure the metres (...,) from `place` (..., 2) to the straight, steady path from a to b at `time` (...,)."""
     share = np.asarray((time - time_a) / (time_b - time_a))[..., None]
     return np.linalg.norm(place - place_a * (1 - share) - place_b * share, axis=-1)
 
 
 def _jumps(times: np.ndarray, positions: np.ndarray) -> tuple[list[int], np.ndarray]:
-    """Steps that no player takes: indices j (the step is from sample j to j+1), and each one's excess (len, 2) metres
-    over the median velocity of the 0.6 s (7 samples at least) around it."""
+    """Detect steps that no player takes.
+
+    Returns:
+        Indices j (the step is from sample j to j+1), and each one's excess (len, 2) metres over the median velocity of
+        the 0.6 s (7 samples at least) around it.
+    """
     steps = np.diff(times)
     if len(steps) < 3:
         return [], np.zeros((0, 2))
@@ -198,7 +230,7 @@ def _jumps(times: np.ndarray, positions: np.ndarray) -> tuple[list[int], np.ndar
 
 
 def _return(times: np.ndarray, jumps: list[int], excess: np.ndarray, place: int) -> int | None:
-    """The later jump within half a second that takes back the jump number `place`, if there is one."""
+    """Find the later jump within half a second that reverses jump number `place`; None if there is none."""
     for other in range(place + 1, len(jumps)):
         if times[jumps[other]] - times[jumps[place]] > _EXCURSION:
             break
@@ -208,8 +240,12 @@ def _return(times: np.ndarray, jumps: list[int], excess: np.ndarray, place: int)
 
 
 def _coasted(times: np.ndarray, positions: np.ndarray, jump: int, size: float) -> np.ndarray:
-    """Indices of the samples up to `jump` that are not believed: as many as making up for `size` metres takes, and on
-    back while they lie on an exact line. The first of such a line is where the player was last seen, and is kept."""
+    """Find the samples up to `jump` to replace.
+
+    As many as making up for `size` metres takes, and further back while they lie on an exact line. The first sample of
+    such
+    a line is where the player was last seen, and is left as it is.
+    """
     before = times[jump] - times[: jump + 1]
     first = int(np.searchsorted(-before, -max(_COAST[0], min(size / _CATCH_UP, _COAST[1]))))
     for start in range(min(first, jump - 3), -1, -1):
@@ -220,14 +256,14 @@ def _coasted(times: np.ndarray, positions: np.ndarray, jump: int, size: float) -
 
 
 def _on_a_line(times: np.ndarray, positions: np.ndarray) -> bool:
-    """Whether the samples keep one velocity up to the feed's rounding."""
+    """Whether the samples have one velocity up to the feed's rounding."""
     basis = np.column_stack([np.ones(len(times)), times - times[0]])
     line = basis @ np.linalg.lstsq(basis, positions, rcond=None)[0]
     return bool(np.abs(positions - line).max() <= _COAST_EXACT)
 
 
 def _bridge(times: np.ndarray, positions: np.ndarray, believed: np.ndarray) -> np.ndarray:
-    """(N, 2): the believed positions, and a cubic between them everywhere else."""
+    """Interpolate the positions (N, 2) by a cubic wherever they are not valid."""
     out = positions.copy()
     for start, stop in runs(~believed):
         before = _end_state(times, positions, believed, start - 1, -1)
@@ -237,7 +273,8 @@ def _bridge(times: np.ndarray, positions: np.ndarray, believed: np.ndarray) -> n
 
 
 def _end_state(times, positions, believed, index: int, direction: int):
-    """(time, position, velocity) of the believed sample `index`, velocity over the believed ones beside it; or None."""
+    """Estimate (time, position, velocity) of the valid sample `index`, velocity over the valid ones beside it; or None.
+    """
     if not 0 <= index < len(times):
         return None
     members = [index]
@@ -253,7 +290,8 @@ def _end_state(times, positions, believed, index: int, direction: int):
 
 
 def _cubic(at: np.ndarray, before, after) -> np.ndarray:
-    """(len(at), 2): Hermite cubic from one end state to the other; beyond the ends, a velocity that dies away."""
+    """Interpolate by a Hermite cubic from one end state to the other: (len(at), 2); beyond the ends the velocity fades.
+    """
     if before is None or after is None:
         time, place, velocity = before or after
         away = at - time
@@ -268,6 +306,7 @@ def _cubic(at: np.ndarray, before, after) -> np.ndarray:
 
 
 def _report(track: Track, notes: list[str], snaps: tuple[float, ...], dropped: int, merged: int) -> DataReport:
+    """Build the report of a cleaned track."""
     gaps = _gaps(track)
     warnings = _warnings(track, snaps, gaps)
     return DataReport(
@@ -278,7 +317,7 @@ def _report(track: Track, notes: list[str], snaps: tuple[float, ...], dropped: i
 
 
 def _gaps(track: Track) -> tuple[tuple[float, float], ...]:
-    """(start, end) seconds wherever measured samples are more than three intervals apart."""
+    """Find (start, end) seconds wherever measured samples are more than three intervals apart."""
     times = track.times[track.measured]
     wide = np.flatnonzero(np.diff(times) > GAP_INTERVALS * track.interval + 1e-9)
     return tuple((float(times[i]), float(times[i + 1])) for i in wide)
@@ -289,13 +328,13 @@ def _no_ball(track: Track) -> np.ndarray:
 
 
 def _warnings(track: Track, snaps: tuple[float, ...], gaps) -> list[TimedLine]:
-    """What was left as it is although nobody should believe it."""
+    """Collect warnings about implausible data that were left as they are."""
     speed = np.linalg.norm(np.diff(track.positions, axis=0), axis=1) / np.diff(track.times)
     fast = track.times[1:][speed > FASTEST]
     out = []
     if snaps:
         out.append(
-            TimedLine(f"steps of more than {_SNAP_LIMIT:g} m kept as they are: {_places(snaps)}", *zip(snaps, snaps))
+            TimedLine(f"steps of more than {_SNAP_LIMIT:g} m left as they are: {_places(snaps)}", *zip(snaps, snaps))
         )
     if len(fast):
         out.append(TimedLine(f"faster than {FASTEST:g} m/s in {len(fast)} samples: {_places(fast)}", *zip(fast, fast)))
@@ -303,7 +342,7 @@ def _warnings(track: Track, snaps: tuple[float, ...], gaps) -> list[TimedLine]:
 
 
 def _replacements(track: Track) -> list[str]:
-    """What was put in and replaced, and how much of the ball is missing."""
+    """Describe what was inserted and replaced, and how much of the ball is missing."""
     marked = (("samples filled", track.filled), ("outliers replaced", track.outlier))
     out = [f"{m.sum()} {what}: {_stretches(track.times[m], track.interval)}" for what, m in marked if m.any()]
     unknown = _no_ball(track)
@@ -313,13 +352,13 @@ def _replacements(track: Track) -> list[str]:
 
 
 def _places(times, most: int = 5) -> str:
-    """The first few of some times, in words."""
+    """Describe the first few of some times."""
     named = ", ".join(f"{time:.2f}" for time in list(times)[:most])
     return f"{named} s" + (f" and {len(times) - most} more" if len(times) > most else "")
 
 
 def _stretches(times: np.ndarray, interval: float) -> str:
-    """Times (N,) as stretches of neighbouring samples, in words."""
+    """Describe times (N,) as stretches of neighbouring samples."""
     starts = np.flatnonzero(np.diff(times, prepend=-np.inf) > 1.5 * interval)
     ends = [*(starts[1:] - 1), len(times) - 1]
     named = [f"{times[a]:.2f}" if a == b else f"{times[a]:.2f}-{times[b]:.2f}" for a, b in zip(starts, ends)]

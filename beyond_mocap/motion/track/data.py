@@ -1,5 +1,6 @@
-"""The samples of one tracked player and the ball, as a feed delivers them (`Track`) and at a rate of ours
-(`SampledTrack`)."""
+"""The samples of one tracked player and the ball, as a feed delivers them (`Track`) and at an even rate
+(`SampledTrack`).
+"""
 
 from __future__ import annotations
 
@@ -14,18 +15,22 @@ from ..skeleton import frozen_array
 BALL_RADIUS = 0.11
 """Metres; where a feed gives no height, the ball's centre lies this high."""
 
-_PITCH = 200.0  # metres from the centre beyond which no ball is
+_PITCH = 200.0  # metres from the pitch's centre beyond which a ball position is invalid
 
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """One player's samples, N of them.
+    """One player's samples, N of them. Arrays are read-only copies.
 
-    times: (N,) seconds. positions: (N, 2) metres on the pitch, origin its centre, x along its length, y to the left of
-    +x. ball: (N, 3) metres, the ball's centre, NaN where unknown (z alone may be unknown); None means no ball.
-    ball_height_known: (N,) bool, False where the feed has no height; None means wherever z is a number. filled: (N,)
-    bool, put in by `clean` because the feed had nothing. outlier: (N,) bool, replaced by `clean` because the feed was
-    wrong; None means none. name: who this is, for messages. Arrays are read-only copies."""
+    Attributes:
+        times: (N,) seconds.
+        positions: (N, 2) metres on the pitch, origin its centre, x along its length, y to the left of +x.
+        ball: (N, 3) metres, the ball's centre, NaN where unknown (z alone may be unknown); None means no ball.
+        ball_height_known: (N,) bool, False where the feed has no height; None means wherever z is a number.
+        filled: (N,) bool, inserted by `clean_track` because the feed had nothing; None means none.
+        outlier: (N,) bool, replaced by `clean_track` because the feed was wrong; None means none.
+        name: who this is, for messages.
+    """
 
     times: np.ndarray
     positions: np.ndarray
@@ -61,7 +66,7 @@ class Track:
 
     @property
     def measured(self) -> np.ndarray:
-        """(N,) bool: positions that the feed itself has and that are believed."""
+        """(N,) bool: valid positions that the feed itself has."""
         return ~(self.filled | self.outlier) & np.isfinite(self.positions).all(axis=1)
 
     @property
@@ -75,12 +80,19 @@ class Track:
 class SampledTrack:
     """A track at an even rate, T frames; frame 0 is the track's first time. Arrays are read-only.
 
-    times: (T,) seconds on the track's clock. positions: (T, 2) metres, smoothed. raw: (T, 2) metres, the measured
-    samples linearly interpolated (what errors are measured against). velocity: (T, 2) m/s of the smoothed positions.
-    speed: (T,) m/s. direction: (T,) radians from +x, of travel, unwrapped; holds while the player stands. valid: (T,)
-    bool, False within a long gap, where nobody knows what the player did (and which is not standing). ball: (T, 3)
-    metres, NaN where there is no ball at all. ball_measured: (T,) bool, False where it lies between samples too far
-    apart. fps: frames per second."""
+    Attributes:
+        times: (T,) seconds on the track's clock.
+        positions: (T, 2) metres, smoothed, pitch frame.
+        raw: (T, 2) metres, the measured samples linearly interpolated (the reference for errors).
+        velocity: (T, 2) m/s of the smoothed positions.
+        speed: (T,) m/s.
+        direction: (T,) radians from +x, of travel, unwrapped; constant while the player does not move.
+        valid: (T,) bool, False within a long gap, where it is unknown what the player did (which is not standing
+            still).
+        ball: (T, 3) metres, NaN where there is no ball at all.
+        ball_measured: (T,) bool, False between samples too far apart.
+        fps: frames per second.
+    """
 
     times: np.ndarray
     positions: np.ndarray
@@ -103,21 +115,26 @@ class SampledTrack:
         return len(self.times)
 
     def frames(self, start: int, stop: int) -> "SampledTrack":
-        """Frames start .. stop-1."""
+        """Return frames start .. stop-1."""
         arrays = {field.name: getattr(self, field.name) for field in fields(self) if field.name != "fps"}
         return SampledTrack(**{name: values[start:stop] for name, values in arrays.items()}, fps=self.fps)
 
 
 def at_sentinel(ball: np.ndarray) -> np.ndarray:
-    """(N,) bool: the samples of ball (N, 3) m that are known and no place of a ball: z below the ground, far outside,
-    or parked at the origin."""
+    """Mark known ball samples that are no position of a ball: z below the ground, far outside, or parked at the origin.
+
+    Args:
+        ball: (N, 3) metres, NaN where unknown.
+    Returns:
+        (N,) bool.
+    """
     seen = np.isfinite(ball[:, :2]).all(axis=1)
     with np.errstate(invalid="ignore"):
         return seen & ((np.abs(ball) > _PITCH).any(axis=1) | (ball[:, 2] < -1.0) | _parked_at_origin(ball))
 
 
 def _parked_at_origin(ball: np.ndarray) -> np.ndarray:
-    """(N,) bool: in a run of three or more samples exactly at (0, 0) that the ball did not roll into or out of."""
+    """Mark runs (N,) of three or more samples exactly at (0, 0) that the ball did not roll into or out of."""
     zero = (ball[:, :2] == 0.0).all(axis=1)
     out = np.zeros(len(ball), dtype=bool)
     for start, stop in runs(zero):

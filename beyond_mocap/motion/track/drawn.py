@@ -1,7 +1,7 @@
-"""Tracks that nobody has measured: a line on the ground with speeds at its points, run along in even samples.
+"""Tracks that were drawn instead of measured: a line on the ground with speeds at its points, followed in even samples.
 
-Between two points the speed changes evenly with time, as under a steady pull: its square changes evenly along the way,
-which lets a player start from a stand and come to one. A point with speed 0 is a stop.
+Between two points the acceleration is constant: the square of the speed changes evenly along the line, which lets a
+player start from rest and come to rest. A point with speed 0 is a stop.
 """
 
 from __future__ import annotations
@@ -16,25 +16,34 @@ from .data import Track
 
 HZ = 25.0  # samples a second of a track from a drawn line
 FASTEST = 12.0
-"""Metres per second beyond which nobody runs."""
+"""m/s; no player runs faster."""
 
 SHORTEST = 0.2
-"""Metres that a drawn line has at least."""
+"""Minimum length of a drawn line, metres."""
 
-LONGEST_SECONDS = 3600.0  # a slower track is a mistake, and would take the memory
+LONGEST_SECONDS = 3600.0  # a longer track is a mistake, and would fill the memory
 
 
 def along(
     line: np.ndarray, arc: Sequence[float], speeds: Sequence[float], waits: Sequence[float], start: float = 0.0,
     name: str = "track",
 ) -> Track:
-    """The track of who goes along a line.
+    """Build the track of a player who follows a line.
 
-    line: (N, 2) metres, close enough that its corners do not show. arc: (P,) metres along it at which the P points lie,
-    rising, the first 0 and the last the line's length. speeds: (P,) m/s at the points. waits: (P,) seconds that are
-    spent where the speed is 0. start: seconds of the first sample. name: for messages. Samples lie 1 / HZ s apart,
-    nearly: the first and the last are the line's ends. InputError for a line that is too short, two stops in a row,
-    speeds that are none or beyond FASTEST."""
+    Samples are 1 / SAMPLE_RATE s apart, nearly: the first and the last are the line's ends.
+
+    Args:
+        line: (N, 2) metres, dense enough that its corners do not show.
+        arc: (P,) metres along the line of the P points, rising, the first 0 and the last the line's length.
+        speeds: (P,) m/s at the points.
+        waits: (P,) seconds that are spent where the speed is 0.
+        start: seconds of the first sample.
+        name: for messages.
+    Returns:
+        The track.
+    Raises:
+        InputError: for a line that is too short, two stops in a row, or speeds that are invalid or beyond MAX_SPEED.
+    """
     line, arc, speeds, waits = (np.asarray(values, dtype=float) for values in (line, arc, speeds, waits))
     _check(line, arc, speeds, name)
     steps = np.linalg.norm(np.diff(line, axis=0), axis=1)
@@ -45,10 +54,11 @@ def along(
     arrive = np.concatenate([[0.0], np.cumsum(seconds + own[:-1])])
     leave = arrive + own
     if not leave[-1] <= LONGEST_SECONDS:
-        raise InputError(name, f"it takes {leave[-1]:.0f} s", "an hour at most", "raise the speeds at its points")
+        raise InputError(name, f"a duration of {leave[-1]:.0f} s", "an hour at most", "raise the speeds at its points")
     count = max(int(round(leave[-1] * HZ)), 5)
     times = np.linspace(0.0, leave[-1], count + 1)
     at = np.clip(np.searchsorted(arrive, times, side="right") - 1, 0, len(gaps) - 1)
+    # seconds since leaving the last point, 0 while waiting there; then s = s0 + v t + a t^2 / 2
     passed = np.clip(times - leave[at], 0.0, seconds[at])
     pull = (speeds[at + 1] - speeds[at]) / seconds[at]
     gone = np.clip(arc[at] + speeds[at] * passed + 0.5 * pull * passed**2, 0.0, way[-1])
@@ -57,26 +67,43 @@ def along(
 
 
 def moved(times: np.ndarray, places: np.ndarray, name: str = "track") -> Track:
-    """The track of something that is at places (N, 2) m at times (N,) s; at HZ samples a second where there are more.
-    InputError where it does not last, does not move or is faster than anybody."""
+    """Build the track of an animated object.
+
+    Args:
+        times: (N,) seconds.
+        places: (N, 2) metres on the ground.
+        name: for messages.
+    Returns:
+        The track, at SAMPLE_RATE samples a second.
+    Raises:
+        InputError: if it moves for less than 0.2 s or faster than MAX_SPEED.
+    """
     times, places = np.asarray(times, dtype=float), np.asarray(places, dtype=float)
     if len(times) < 2 or times[-1] - times[0] < 0.2:
-        raise InputError(name, "it moves for less than 0.2 s", "an animated object", "give it keys, or a longer range")
+        raise InputError(name, "moves for less than 0.2 s", "an animated object", "add keyframes or a longer range")
     count = max(int(round((times[-1] - times[0]) * HZ)), 5)
     even = np.linspace(times[0], times[-1], count + 1)
     places = interpolate(even, times, places)
     fastest = np.linalg.norm(np.diff(places, axis=0), axis=1).max() / (even[1] - even[0])
     if not fastest <= FASTEST:
-        raise InputError(name, f"it moves at {fastest:.1f} m/s", f"{FASTEST:g} m/s at most", "slow it down")
+        raise InputError(name, f"moves at {fastest:.1f} m/s", f"{FASTEST:g} m/s at most", "slow it down")
     return Track(even, places, name=name)
 
 
 def nurbs_line(
     points: np.ndarray, weights: np.ndarray, order: int, clamped: bool, fine: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The line (N, 3) of a NURBS with even knots, `fine` pieces for each control point but one, and (P,) where on it
-    each of the P control points counts most: at the mean of its knots. points (P, 3), weights (P,), order: degree plus
-    one. clamped: whether it begins and ends in its first and last point."""
+    """Sample a NURBS curve with even knots.
+
+    Args:
+        points: (P, 3) control points.
+        weights: (P,).
+        order: degree plus one.
+        clamped: whether it starts and ends in its first and last point.
+        pieces_per_point: pieces for each control point except one.
+    Returns:
+        The line (N, 3), and (P,) the sample where each control point has most influence: at the mean of its knots.
+    """
     from scipy.interpolate import BSpline
 
     count, degree = len(points), min(order, len(points)) - 1
@@ -85,7 +112,7 @@ def nurbs_line(
     else:
         knots = np.arange(count + degree + 1, dtype=float)
     means = np.array([knots[i + 1 : i + 1 + degree].mean() for i in range(count)])
-    means = (means - means[0]) / (means[-1] - means[0])  # unclamped, its first point still stands for the beginning
+    means = (means - means[0]) / (means[-1] - means[0])  # unclamped, its first point still marks the beginning
     pieces = fine * (count - 1)
     at = np.linspace(knots[degree], knots[count], pieces + 1)
     values = BSpline(knots, np.column_stack([points * weights[:, None], weights]), degree)(at)
@@ -93,16 +120,17 @@ def nurbs_line(
 
 
 def _check(line: np.ndarray, arc: np.ndarray, speeds: np.ndarray, name: str) -> None:
+    """Check that the line is long enough and its speeds and points are valid (InputError)."""
     length = float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum()) if len(line) > 1 else 0.0
     if not length >= SHORTEST or len(arc) < 2:
         raise InputError(name, f"{length:.2f} m long", f"{SHORTEST:g} m or more", "draw it longer")
     if not np.all(np.isfinite(speeds)) or np.any(speeds < 0.0):
-        raise InputError(name, "a speed that is none", "0 m/s or more", "set the speeds of its points")
+        raise InputError(name, "an invalid speed", "0 m/s or more", "set the speeds of its points")
     if speeds.max() > FASTEST:
         raise InputError(name, f"{speeds.max():.1f} m/s", f"{FASTEST:g} m/s at most", "lower the speed of that point")
     stops = np.flatnonzero((speeds[:-1] == 0.0) & (speeds[1:] == 0.0))
     if len(stops):
-        found = f"speed 0 at points {stops[0] + 1} and {stops[0] + 2}: nobody gets from one to the other"
+        found = f"speed 0 at both points {stops[0] + 1} and {stops[0] + 2}: no player gets from one to the other"
         raise InputError(name, found, "a speed at one of them", "set the speed of the points")
     if np.any(np.diff(arc) <= 0.0):
-        raise InputError(name, "two points at one place", "points apart from each other", "delete one of them")
+        raise InputError(name, "two points at the same position", "points apart from each other", "delete one of them")

@@ -1,4 +1,4 @@
-"""A tracked match as arrays: who is there and when, the ball, the pitch, and what was found wrong and put right."""
+"""A tracked match as arrays: who is present and when, the ball, the pitch, and the problems found and corrected."""
 
 from __future__ import annotations
 
@@ -11,15 +11,20 @@ from ...base.time_series import runs
 from . import Track
 
 LONGEST_GAP = 3.0
-"""Seconds; who is away for longer has left the pitch."""
+"""Seconds; a player who is missing for longer has left the pitch."""
 
 REFEREE = "referee"
 
 
 @dataclass(frozen=True)
 class Team:
-    """ground: "home", "away" or "referee". name: as the feed spells it, "" where it has none. colour: of the shirts,
-    "#RRGGBB", "" where the feed has none."""
+    """A team of a match.
+
+    Attributes:
+        ground: "home", "away" or "referee".
+        name: as the feed spells it, "" where it has none.
+        colour: of the shirts, "#RRGGBB", "" where the feed has none.
+    """
 
     ground: str
     name: str = ""
@@ -28,8 +33,15 @@ class Team:
 
 @dataclass(frozen=True)
 class MatchPlayer:
-    """A player: id as the feed spells it, team ("home", "away", "referee"), name, shirt number (-1 where the feed has
-    none), position as a word ("goalkeeper", "left back"; "" where unknown)."""
+    """A player of a match.
+
+    Attributes:
+        id: as the feed spells it.
+        team: "home", "away" or "referee".
+        name: the player's name.
+        number: shirt number, -1 where the feed has none.
+        position: in words ("goalkeeper", "left back"), "" where unknown.
+    """
 
     id: str
     team: str
@@ -40,8 +52,13 @@ class MatchPlayer:
 
 @dataclass(frozen=True)
 class Half:
-    """A period on its provider's clock. number: 1 for the first half, 3 and 4 in extra time. zero: the second of the
-    match at which this clock stands at 0, before `start` where the file begins later. start, end: its frames, s."""
+    """A period on its provider's clock.
+
+    Attributes:
+        number: 1 for the first half, 3 and 4 in extra time.
+        clock_zero: second of the match at which this clock is at 0, before `start` where the file begins later.
+        start, end: its frames, seconds.
+    """
 
     number: int
     zero: float
@@ -51,15 +68,24 @@ class Half:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Match:
-    """Everybody's samples, N times and P players, as the feed has them (not cleaned).
+    """The samples of all players, N times and P players, as the feed has them (not cleaned). Arrays are read-only.
 
-    times: (N,) seconds from the first frame of the first period; each later period starts ten seconds after the one
-    before. players: P of them. positions: (P, N, 2) metres, NaN where a player is not there. ball: (N, 3) metres, NaN
-    where unknown. length, width: of the pitch, metres. fps: the feed's rate. provider: whose form it was. periods:
-    (start, end) seconds. notes: what was guessed, for people. teams: home, away, and referees where there are any.
-    report: the data report, a line each: what was guessed, what was put right, who is there for how long. passed: for
-    each period its number and the seconds that had passed at its first frame, () where they are 1, 2, ... from their
-    begin. Arrays are read-only."""
+    Attributes:
+        times: (N,) seconds from the first frame of the first period; each later period starts ten seconds after the one
+            before.
+        players: P of them.
+        positions: (P, N, 2) metres, pitch frame, NaN where a player is not present.
+        ball: (N, 3) metres, NaN where unknown.
+        length, width: of the pitch, metres.
+        fps: the feed's rate.
+        provider: whose file form it was.
+        periods: (start, end) seconds.
+        notes: assumptions, for people.
+        teams: home, away, and referees where there are any.
+        report: the data report, a line each: assumptions, corrections, and how long each player is present.
+        elapsed: for each period its number and the seconds on its clock at its first frame; () where the numbers are
+            1, 2, ... and the clocks start at 0.
+    """
 
     times: np.ndarray
     players: tuple[MatchPlayer, ...]
@@ -84,9 +110,16 @@ class Match:
         )
 
     def track(self, player_id: str, start: float | None = None, end: float | None = None) -> Track:
-        """One player and the ball between two times (seconds, whole match by default), from when he is first there.
+        """Return one player and the ball between two times, from the player's first sample on.
 
-        InputError for an unknown player, or one with fewer than two samples in that time."""
+        Args:
+            player_id: as the feed spells it.
+            start, end: seconds; None for the whole match.
+        Returns:
+            The track, not cleaned.
+        Raises:
+            InputError: for an unknown player, or one with fewer than two samples in that time.
+        """
         path = self.positions[self._index(player_id)]
         low = -np.inf if start is None else start - 1e-9
         high = np.inf if end is None else end + 1e-9
@@ -98,10 +131,16 @@ class Match:
         return Track(self.times[part], path[part], self.ball[part], name=player_id)
 
     def stretches(self, player_id: str, gap: float = LONGEST_GAP) -> tuple[tuple[float, float], ...]:
-        """(start, end) seconds of the stretches in which a player is there, in order, all of more than one sample.
+        """List the stretches in which a player is present, in order, all of more than one sample.
 
-        Gaps of up to `gap` seconds do not end a stretch (`motion.track.clean` fills them), the end of a period does.
-        InputError for an unknown player."""
+        Args:
+            player_id: as the feed spells it.
+            gap: seconds; shorter gaps do not end a stretch (`clean_track` fills them), the end of a period does.
+        Returns:
+            (start, end) seconds of each.
+        Raises:
+            InputError: for an unknown player.
+        """
         there = np.isfinite(self.positions[self._index(player_id)]).all(axis=1)
         found = []
         for begins, ends in self.periods:
@@ -120,7 +159,9 @@ class Match:
 
 
 def presence_lines(match: Match) -> list[str]:
-    """A line for everybody who is not there all the time: for how long, and where he is missing."""
+    """Describe, one line each, for how long every player who is not always present is there, and where they are
+    missing.
+    """
     lines = []
     for player, path in zip(match.players, match.positions):
         gone = runs(~np.isfinite(path).all(axis=1))
@@ -132,5 +173,5 @@ def presence_lines(match: Match) -> list[str]:
             continue
         where = ", ".join(f"{start:.1f}-{end:.1f}" for start, end in spans[:4]) + ", ..." * (len(spans) > 4)
         gaps = f", {len(short)} short gaps" if short else ""
-        lines.append(f"{player.id}: there for {seconds:.0f} s ({where or 'never'} s){gaps}")
+        lines.append(f"{player.id}: present for {seconds:.0f} s ({where or 'never'} s){gaps}")
     return lines

@@ -10,27 +10,37 @@ from ...base.vectors import arctan2
 from .data import BALL_RADIUS, SampledTrack, Track
 
 SMOOTHING_SECONDS = 1.2
-"""Window of `smoothed`."""
+"""Length of the smoothing window of `smooth_positions`."""
 
 GAP_INTERVALS = 3.0
 """More than this many sample intervals without a measured sample is a gap."""
 
 LONG_GAP = 1.0
-"""Seconds; a longer gap says nothing about what the player did in between."""
+"""Seconds; in a longer gap it is unknown what the player did."""
 
 MOVING_SPEED = 0.5
 """m/s; below it a direction of travel is mostly noise."""
 
-_TURN_SECONDS = 0.5  # in which one who stood turns before setting off
+_TURN_SECONDS = 0.5  # in which a player at rest turns before setting off
 _LONGEST = 6 * 3600.0  # s
 
 
 def sample(track: Track, fps: float, window: float = SMOOTHING_SECONDS) -> SampledTrack:
-    """`track` (cleaned) at `fps` frames per second: floor(duration * fps) + 1 frames from its first time on.
+    """Sample a cleaned track at an even rate: floor(duration * fps) + 1 frames from its first time on.
 
-    window: seconds of `smoothed`.
-    The ball is interpolated linearly, held before its first and after its last sample, and lies no lower than its
-    radius, which is also its height where the feed has none. InputError below two measured samples."""
+    The ball is interpolated linearly, constant before its first and after its last sample, and no lower than its
+    radius,
+    which is also its height where the feed has none.
+
+    Args:
+        track: a cleaned track.
+        fps: frames per second, 1 to 480.
+        window: seconds of the smoothing window.
+    Returns:
+        The sampled track.
+    Raises:
+        InputError: with fewer than two measured samples, or for a track longer than six hours.
+    """
     times, fine, step = _grids(track, fps)
     positions = smoothed(interpolate(fine, track.times, track.positions), fps * step, window)[::step]
     measured = track.measured
@@ -48,14 +58,26 @@ def sample(track: Track, fps: float, window: float = SMOOTHING_SECONDS) -> Sampl
 
 
 def smoothed(positions: np.ndarray, fps: float, window: float = SMOOTHING_SECONDS) -> np.ndarray:
-    """Positions (T, k) at `fps` without the feed's jitter: a Hann window of 1.2 s, its bias put back twice.
+    """Smooth positions without the feed's jitter: a Hann window whose bias is corrected twice.
 
     One pass of a window pulls curves inward by half its variance times the acceleration (0.037 s^2 for 1.5 s: 15 cm at
-    4 m/s^2). Smoothing what is left over and adding it back takes that out up to the fourth derivative; twice, up to
-    the sixth. Measured on five real tracks of 20-25 Hz, difference of the 1.5 s Hann windows of result and samples,
-    mean / 95 %: Hann 0.7 s alone 1.6 / 3.9 cm; 0.7 s corrected once 0.08 / 0.22 cm, but rms jerk 16 m/s^3; this one
-    0.18 / 0.5 cm and jerk 10 m/s^3; a smoothing spline of the same jerk 0.2 / 0.5 cm, but 2-3 cm at the ends. The
-    window also has an end: an edit changes nothing beyond 1.8 s, bit for bit, which a spline cannot promise."""
+    4 m/s^2). Smoothing the residual and adding it back removes that up to the fourth derivative; twice, up to the
+    sixth.
+    Measured on five real tracks of 20-25 Hz, difference of the 1.5 s Hann windows of result and samples, mean / 95 %:
+    Hann
+    0.7 s alone 1.6 / 3.9 cm; 0.7 s corrected once 0.08 / 0.22 cm, but rms jerk 16 m/s^3; this one 0.18 / 0.5 cm and
+    jerk
+    10 m/s^3; a smoothing spline of the same jerk 0.2 / 0.5 cm, but 2-3 cm at the ends. The window also has an end: an
+    edit
+    changes nothing beyond 1.8 s, bit for bit, which a spline cannot promise.
+
+    Args:
+        positions: (T, k).
+        fps: frames per second.
+        window: seconds.
+    Returns:
+        (T, k).
+    """
     out = zero_phase_hann(positions, fps, window)
     for _ in range(2):
         out = out + zero_phase_hann(positions - out, fps, window)
@@ -63,9 +85,17 @@ def smoothed(positions: np.ndarray, fps: float, window: float = SMOOTHING_SECOND
 
 
 def zero_phase_hann(values: np.ndarray, fps: float, seconds: float) -> np.ndarray:
-    """`values` (T, k) at `fps` under a symmetric Hann window `seconds` long; the ends are point-reflected.
+    """Smooth values with a symmetric Hann window; the ends are point-reflected.
 
-    Point reflection continues x beyond its last value e as 2 e - x backwards, so ends stay and keep their slope."""
+    Point reflection continues x beyond its last value e as 2 e - x backwards, so ends stay and keep their slope.
+
+    Args:
+        values: (T, k).
+        fps: frames per second.
+        seconds: length of the window.
+    Returns:
+        (T, k).
+    """
     values = np.asarray(values, dtype=float)
     half = max(int(np.ceil(seconds * fps / 2.0 - 1e-9)) - 1, 0)
     if half == 0 or len(values) < 2:
@@ -76,17 +106,27 @@ def zero_phase_hann(values: np.ndarray, fps: float, seconds: float) -> np.ndarra
 
 
 def travel_direction(velocity: np.ndarray, fps: float) -> np.ndarray:
-    """(T,) radians from +x, unwrapped: where `velocity` (T, 2) m/s points while it is at least MOVING_SPEED.
+    """Compute the direction of travel, held while the player is slower than MOVING_SPEED.
 
-    Slower frames keep the direction they came with, and turn to the next one in the last half second before it: a
-    player who stands does not spin with the noise, and does not snap round when setting off. All slow: the direction of
-    the frame that is fastest, 0 if none moves."""
+    Slower frames keep the direction before them, and turn to the next one in the last half second before it: a player
+    at
+    rest does not spin with the noise and does not snap round when setting off. If all are slow, it is the direction of
+    the
+    fastest frame, 0 if none moves.
+
+    Args:
+        velocity: (T, 2) m/s.
+        fps: frames per second.
+    Returns:
+        (T,) radians from +x, unwrapped.
+    """
     speed = np.linalg.norm(velocity, axis=1)
     moving = np.flatnonzero(speed >= min(MOVING_SPEED, speed.max(initial=0.0)))
     if not len(moving) or not speed.any():
         return np.zeros(len(velocity))
     angles = np.unwrap(arctan2(velocity[moving, 1], velocity[moving, 0]))
     frames = np.arange(len(velocity))
+    # indices into `moving` of the last moving frame before each frame and of the next one after it
     before = np.clip(np.searchsorted(moving, frames, side="right") - 1, 0, None)
     after = np.clip(np.searchsorted(moving, frames), None, len(moving) - 1)
     pause = np.maximum(moving[after] - moving[before], 1)
@@ -95,7 +135,9 @@ def travel_direction(velocity: np.ndarray, fps: float) -> np.ndarray:
 
 
 def _grids(track: Track, fps: float) -> tuple[np.ndarray, np.ndarray, int]:
-    """Frame times, the times of a finer grid of at least 50 Hz (the window wants many), and its steps per frame."""
+    """Build the frame times, the times of a finer grid of at least 50 Hz (the window needs many), and its steps per
+    frame.
+    """
     if not 1.0 <= fps <= 480.0:
         raise InputError("fps", f"{fps}", "1 to 480 frames per second")
     if np.count_nonzero(track.measured) < 2 or not np.all(np.diff(track.times) > 0):
@@ -110,7 +152,8 @@ def _grids(track: Track, fps: float) -> tuple[np.ndarray, np.ndarray, int]:
 
 
 def _bridged(at: np.ndarray, times: np.ndarray, longest: float) -> np.ndarray:
-    """(len(at),) bool: lies on a time of `times` (N,) or between two of them no more than `longest` seconds apart."""
+    """Whether `at` (len(at),) is at a time of `times` (N,) or between two of them no more than `longest` seconds apart.
+    """
     after = np.clip(np.searchsorted(times, at - 1e-9), 0, len(times) - 1)
     before = np.clip(np.searchsorted(times, at + 1e-9, side="right") - 1, 0, len(times) - 1)
     covered = (at >= times[before] - 1e-6) & (at <= times[after] + 1e-6)
@@ -118,7 +161,7 @@ def _bridged(at: np.ndarray, times: np.ndarray, longest: float) -> np.ndarray:
 
 
 def _ball(track: Track, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Ball positions (T, 3) m and whether each is measured (T,), at the times `at` (T,)."""
+    """Sample the ball at the times `at` (T,): positions (T, 3) m and whether each is measured (T,)."""
     seen = np.isfinite(track.ball[:, :2]).all(axis=1)
     if not seen.any():
         return np.full((len(at), 3), np.nan), np.zeros(len(at), dtype=bool)

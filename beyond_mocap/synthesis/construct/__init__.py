@@ -1,1 +1,1 @@
-"""From what a search chose to a body: source frames laid on a track, feet planted, the ball met."""
+"""Construction of the final motion: place source frames on a track, plant the feet, solve the ball contact."""

@@ -1,12 +1,9 @@
-"""A part of the body carried elsewhere: a foot or hand by its limb, head or chest by the spine, the rest as it was.
-The ground is at height 0.
+"""Move a part of the body: a foot or hand with its limb, the head or chest with the spine. The ground is at height 0.
 
-A limb is swung about its upper joint and bends or straightens by a share of the way to the least or largest angle of
-its knee or elbow. A shift of the foot in space, the same at every frame, would ask for more than the leg's length where
-the recording stretches it, and the knee would snap straight.
-
-What is applied is the difference between reaching for the new place and reaching for the old one, so that a shift of
-zero changes nothing at all, however straight the limb is.
+A limb swings about its upper joint and bends or straightens by a share of the range to the smallest or largest angle
+of its knee or elbow. A constant shift of the foot in space would need more than the length of the leg where the
+recording stretches it, and the knee would snap straight. What is applied is the difference between reaching for the
+new place and reaching for the old one, so a shift of zero changes nothing, however straight the limb is.
 """
 
 from __future__ import annotations
@@ -23,22 +20,29 @@ from ...motion.limb import inner_angle, two_bone
 from ...motion.motion import pose_kinematics
 from ...motion.skeleton import Skeleton
 
-MOST_BEND = {"head": 0.6, "chest": 0.35}  # rad that the whole spine bends at most
+MOST_BEND = {"head": 0.6, "chest": 0.35}  # rad, largest bend of the whole spine, by the part that is moved
 LEAST_ANGLE, MOST_ANGLE = np.radians(35.0), np.radians(170.0)
-"""Radians inside a knee or elbow that a carried limb has at least and at most, unless the recording has less or
-more."""
+"""Radians, smallest and largest inner angle of the knee or elbow of a moved limb, unless the recording has a smaller
+or larger one."""
 
-MOST_SWING = {"foot": np.radians(35.0), "hand": np.radians(60.0)}  # rad that a whole limb turns about its upper joint
-SOFT = 0.003  # m below full length from where a limb eases
-_DAMPING = 1e-3  # keeps the bend of a spine small where it moves the part little
+MOST_SWING = {"foot": np.radians(35.0), "hand": np.radians(60.0)}  # rad, largest turn of a limb about its upper joint
+SOFT = 0.003  # m below full length from which on a limb extends softly
+_DAMPING = 1e-3  # of the least squares step: keeps the bend small where bending hardly moves the part
 
-_SOLE, _ROUNDING = 0.02, 0.03  # metres of the lowest foot joint above the ground, and over which it nears that
+_SOLE, _ROUNDING = 0.02, 0.03  # m: lowest foot joint above the ground, and the range over which it nears that softly
 
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """A body over W frames: root (W, 3) m, rotations (W, J, 4) local; places (W, J, 3) m and world (W, J, 4) of its
-    joints."""
+    """A body over W frames, with the world placement of its joints.
+
+    Attributes:
+        skeleton: the skeleton of all frames.
+        root: (W, 3) m, world.
+        rotations: (W, J, 4) local quaternions.
+        places: (W, J, 3) m, joint positions, world.
+        world: (W, J, 4) joint rotations, world.
+    """
 
     skeleton: Skeleton
     root: np.ndarray
@@ -48,34 +52,61 @@ class Body:
 
     @classmethod
     def posed(cls, skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray) -> "Body":
-        """With its joints' places worked out."""
+        """Build a body and compute the world placement of its joints.
+
+        Args:
+            skeleton: the skeleton.
+            root: (W, 3) m, world.
+            rotations: (W, J, 4) local quaternions.
+        Returns:
+            The body with `places` and `world`.
+        """
         return cls(skeleton, root, rotations, *pose_kinematics(skeleton, root, rotations))
 
     def line(self, surface: Surface, at) -> tuple[np.ndarray, np.ndarray]:
-        """Both ends (..., 3) m of a striking surface's line at frame or frames `at`."""
+        """Return both ends of a striking surface's line.
+
+        Args:
+            surface: the striking surface.
+            at: frame or frames.
+        Returns:
+            Two arrays (..., 3) m, world.
+        """
         return surface.line(self.places[at], self.world[at])
 
 
 def leg(limb: Limb) -> tuple[int, int, int]:
-    """Hip, knee and ankle."""
+    """Return the joints of a leg: hip, knee, ankle."""
     return limb.upper_leg, limb.lower_leg, limb.foot
 
 
 def arm(limb: Limb) -> tuple[int, int, int]:
-    """Shoulder, elbow and wrist."""
+    """Return the joints of an arm: shoulder, elbow, wrist."""
     return limb.upper_arm, limb.lower_arm, limb.hand
 
 
 def limb_chain(skeleton: Skeleton, part: Surface) -> tuple[int, int, int]:
-    """The joints of the limb that a foot, a hand or a tool in a hand hangs on."""
+    """Return the three joints of the limb that carries a foot, a hand or a tool in a hand.
+
+    Args:
+        skeleton: the skeleton.
+        part: a striking surface on a limb.
+    """
     limb = getattr(identify(skeleton), part.side)
     return leg(limb) if part.part == "foot" else arm(limb)
 
 
 @dataclass(frozen=True, eq=False)
 class Resting:
-    """A limb that reaches for where its end is anyway, which a nearly straight limb misses a little: `chain` and `soft`
-    as for `limb.two_bone`; world: (W, 4) rotations of the limb's joints, by joint."""
+    """A limb solved for the place where its end already is, the reference from which shifts are measured.
+
+    A nearly straight limb misses its own place a little, because it extends softly; the difference cancels out.
+
+    Attributes:
+        chain: upper, middle and end joint, as for `limb.solve_two_bone`.
+        soft: m of soft extension, as for `limb.solve_two_bone`.
+        world: joint -> (W, 4) world rotation.
+    """
 
     chain: tuple[int, int, int]
     soft: float
@@ -83,7 +114,13 @@ class Resting:
 
     @classmethod
     def of(cls, body: Body, chain: tuple[int, int, int], soft: float = SOFT) -> "Resting":
-        """The limb of a body."""
+        """Solve the limb of a body for its own place.
+
+        Args:
+            body: the body, W frames.
+            chain: upper, middle and end joint.
+            soft: m below full length from which on the limb extends softly.
+        """
         end = body.places[:, chain[2]]
         still = two_bone(body.skeleton, body.root, body.rotations, chain, end, soft=soft).rotations
         return cls(chain, soft, _limb_world(body, still, chain))
@@ -91,8 +128,13 @@ class Resting:
 
 @dataclass(frozen=True, eq=False)
 class Swing:
-    """How a limb goes elsewhere. turn (3,) rad: rotation vector about the upper joint. bend: share of the way to the
-    middle joint's largest angle, or, negative, to its least. lowered: m by which the upper joint sinks."""
+    """How a limb moves to another place.
+
+    Attributes:
+        turn: (3,) rad, rotation vector about the upper joint, world.
+        bend: share of the range to the largest angle of the middle joint; negative: to its smallest angle.
+        lowered: m by which the upper joint sinks.
+    """
 
     turn: np.ndarray
     bend: float
@@ -100,8 +142,18 @@ class Swing:
 
 
 def swing_to(body: Body, chain: tuple[int, int, int], at: int, place: np.ndarray, most: float, lowered=0.0) -> Swing:
-    """The swing that brings the limb's end to `place` (3,) m at frame `at`, or as near as MOST_ANGLE, LEAST_ANGLE and a
-    turn of `most` rad let it."""
+    """Solve the swing that brings the end of a limb to a place, or as near as the limits let it.
+
+    Args:
+        body: the body, W frames.
+        chain: upper, middle and end joint.
+        at: frame of the body.
+        place: (3,) m, world, target of the end joint.
+        max_turn: rad, largest turn about the upper joint.
+        lowered: m by which the upper joint sinks.
+    Returns:
+        The swing, its angles within MIN_ANGLE and MAX_ANGLE.
+    """
     top, middle, end = body.places[at, list(chain)]
     old, new = end - top, place - top + [0.0, 0.0, lowered]
     turn = quaternion.to_rotation_vector(quaternion.between(old[None], new[None]))[0]
@@ -115,15 +167,28 @@ def swing_to(body: Body, chain: tuple[int, int, int], at: int, place: np.ndarray
 
 
 def swung(body: Body, chain: tuple[int, int, int], swing: Swing, share: np.ndarray) -> np.ndarray:
-    """(W, 3) m by which the limb's end moves, with a share (W,) of a swing at each frame. What bends less than the
-    limit at one frame bends less at all, so that the knee's speed stays that of the recording."""
+    """Compute how far the end of a limb moves with a share of a swing at each frame.
+
+    A limb that bends less than the limit at one frame bends less at all frames, so the knee keeps the speed of the
+    recording.
+
+    Args:
+        body: the body, W frames.
+        chain: upper, middle and end joint.
+        swing: the whole swing.
+        share: (W,) 0 to 1.
+    Returns:
+        (W, 3) m, world; exactly zero where the share is 0.
+    """
     top, middle, end = (body.places[:, joint] for joint in chain)
     line = end - top
     length = np.linalg.norm(line, axis=1)
     bones = np.linalg.norm(middle - top, axis=1), np.linalg.norm(end - middle, axis=1)
     own = inner_angle(*bones, length)
+    # the range left to the limit at every frame, and the same share of it everywhere
     left = np.maximum(MOST_ANGLE - own, 0.0) if swing.bend > 0.0 else np.minimum(LEAST_ANGLE - own, 0.0)
     angle = own + share * abs(swing.bend) * left
+    # law of cosines: distance from the upper joint to the end for this inner angle
     reach = np.sqrt(bones[0] ** 2 + bones[1] ** 2 - 2.0 * bones[0] * bones[1] * np.cos(angle))
     turned = quaternion.rotate(quaternion.from_rotation_vector(share[:, None] * swing.turn), line)
     moves = turned * (reach / length)[:, None] - line - share[:, None] * [0.0, 0.0, swing.lowered]
@@ -133,10 +198,18 @@ def swung(body: Body, chain: tuple[int, int, int], swing: Swing, share: np.ndarr
 def limb_carried(
     body: Body, limb: Resting, shift: np.ndarray, root: np.ndarray | None = None, rotations: np.ndarray | None = None
 ) -> np.ndarray:
-    """Local rotations (W, J, 4) with the limb's joints turned so that its end lies `shift` (W, 3) m from where `body`
-    has it; the end joint keeps its world rotation.
+    """Rotate the joints of a limb so that its end lies at a shift from where `body` has it.
 
-    root (W, 3) m: where the body's root is now, if elsewhere. rotations (W, J, 4): what the other joints have, if else.
+    The end joint keeps its world rotation.
+
+    Args:
+        body: the body before the shift, W frames.
+        limb: its reference solution.
+        shift: (W, 3) m, world.
+        root: (W, 3) m, where the root is now, if it has moved.
+        rotations: (W, J, 4) local, what the other joints have now, if they have changed.
+    Returns:
+        (W, J, 4) local rotations.
     """
     skeleton, chain = body.skeleton, limb.chain
     target = body.places[:, chain[2]] + shift
@@ -145,6 +218,7 @@ def limb_carried(
     out = (body.rotations if rotations is None else rotations).copy()
     above = body.world[:, skeleton.parents[chain[0]]]
     for joint, turned in after.items():
+        # change against the reference solution, applied to the recorded rotation
         change = quaternion.multiply(turned, quaternion.inverse(limb.world[joint]))
         world = quaternion.multiply(change, body.world[:, joint])
         local = quaternion.multiply(quaternion.inverse(above), world)
@@ -154,16 +228,34 @@ def limb_carried(
 
 
 def foot_kept(body: Body, limb: Limb, root: np.ndarray, rotations: np.ndarray) -> np.ndarray:
-    """Local rotations (W, J, 4) with a foot where `body` has it, though its root is now at root (W, 3) m."""
+    """Hold a foot where `body` has it although the root has moved.
+
+    Args:
+        body: the body before the move, W frames.
+        limb: the leg.
+        root: (W, 3) m, where the root is now.
+        rotations: (W, J, 4) local, what the other joints have now.
+    Returns:
+        (W, J, 4) local rotations.
+    """
     return limb_carried(body, Resting.of(body, leg(limb), soft=1e-3), np.zeros_like(body.root), root, rotations)
 
 
 def spine_bent(body: Body, surface: Surface, at: int, shift: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """Local rotations (W, J, 4) with the spine bent so that the surface's middle lies `shift` (3,) m away at frame
-    `at`.
+    """Bend the spine so that the middle of a surface moves by a shift at one frame.
 
-    weight (W,): share of the bend at each frame. Every joint of the spine (and neck, for the head) turns alike, by one
-    damped step of the inverse of how the middle moves; the bend goes along with the hips, and is at most MOST_BEND."""
+    Every joint of the spine (and the neck, for the head) turns by the same rotation: one damped step of the inverse of
+    how the middle moves. The bend is fixed in the frame of the hips, and is at most MAX_BEND.
+
+    Args:
+        body: the body, W frames.
+        surface: a surface of the head or chest.
+        at: frame of the body.
+        shift: (3,) m, world.
+        weight: (W,) share of the bend at each frame.
+    Returns:
+        (W, J, 4) local rotations.
+    """
     skeleton, joint = body.skeleton, surface.start[0]
     hips = identify(skeleton).hips
     bending = [j for j in joints_down(skeleton, hips, joint)[1:] if j != joint or surface.part == "head"]
@@ -171,7 +263,9 @@ def spine_bent(body: Body, surface: Surface, at: int, shift: np.ndarray, weight:
         return body.rotations.copy()
     middle = np.mean(body.line(surface, at), axis=0)
     arms = middle - body.places[at, bending]
+    # moves @ bend is the mean shift of the middle if each joint turned by `bend`
     moves = np.mean([skew_matrix(a).T for a in arms], axis=0)
+    # damped least squares: (M'M + damping I) bend = M' shift
     bend = np.linalg.solve(moves.T @ moves + _DAMPING * np.eye(3), moves.T @ shift)
     bend *= min(1.0, MOST_BEND[surface.part] / max(np.linalg.norm(bend), 1e-9))
     carried = quaternion.rotate(quaternion.inverse(body.world[at, hips]), bend / len(bending))
@@ -185,27 +279,45 @@ def spine_bent(body: Body, surface: Surface, at: int, shift: np.ndarray, weight:
 
 
 def above_ground(body: Body, foot: Surface, at, shift: np.ndarray) -> np.ndarray:
-    """Shifts (..., 3) m of a foot at frames `at` that does not go through the ground, but where it is there already."""
+    """Limit the shift of a foot so that it does not go through the ground, except where it is below it already.
+
+    Args:
+        body: the body, W frames.
+        foot: the foot's surface.
+        at: frame or frames.
+        shift: (..., 3) m, world.
+    Returns:
+        (..., 3) m, world.
+    """
     tip = foot_tip(body.skeleton, getattr(identify(body.skeleton), foot.side), body.places[at], body.world[at])[1]
     lowest = np.minimum(np.min(body.line(foot, at), axis=0)[..., 2], tip[..., 2])
     out = shift.copy()
     least, wish = np.minimum(_SOLE - lowest, 0.0), shift[..., 2]
-    # a maximum without a corner: at its sharpest _ROUNDING is between the two, and nothing where nothing is moved
+    # smooth maximum of wish and least, rounded by up to _ROUNDING; not rounded where the foot does not move
     corner = _ROUNDING * np.minimum(1.0, np.linalg.norm(shift, axis=-1) / (2.0 * _ROUNDING))
     out[..., 2] = 0.5 * (wish + least + np.hypot(wish - least, corner))
     return out
 
 
 def foot_tip(skeleton: Skeleton, limb: Limb, places: np.ndarray, world: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Both ends (..., 3) m of what is beyond a foot's foremost joint, twice the joint where nothing is; places (..., J,
-    3) m and world (..., J, 4) of the joints."""
+    """Return both ends of what lies beyond the foremost joint of a foot; twice the joint where the skeleton has no end
+    site.
+
+    Args:
+        skeleton: the skeleton.
+        limb: the leg.
+        places: (..., J, 3) m, joint positions, world.
+        world: (..., J, 4) joint rotations, world.
+    Returns:
+        Two arrays (..., 3) m, world.
+    """
     toe = limb.toe_or_foot
     offset = next((o for p, o in zip(skeleton.end_parents, skeleton.end_offsets) if p == toe), np.zeros(3))
     return places[..., toe, :], places[..., toe, :] + quaternion.rotate(world[..., toe, :], offset)
 
 
 def joints_down(skeleton: Skeleton, high: int, low: int) -> list[int]:
-    """Joints from `high` down to `low`, both included."""
+    """List the joints from `high` down to `low`, both included."""
     chain = [low]
     while chain[-1] != high:
         chain.append(skeleton.parents[chain[-1]])
@@ -213,7 +325,7 @@ def joints_down(skeleton: Skeleton, high: int, low: int) -> list[int]:
 
 
 def _limb_world(body: Body, rotations: np.ndarray, chain: tuple[int, int, int]) -> dict[int, np.ndarray]:
-    """World rotations (W, 4) of a limb's joints with other local ones, what is above the limb being as in `body`."""
+    """Compute world rotations (W, 4) of a limb's joints for other local ones; above the limb all is as in `body`."""
     world, above = {}, body.world[:, body.skeleton.parents[chain[0]]]
     for joint in joints_down(body.skeleton, chain[0], chain[2]):
         above = world[joint] = quaternion.multiply(above, rotations[:, joint])

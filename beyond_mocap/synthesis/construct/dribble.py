@@ -1,9 +1,9 @@
-"""Dribbling: the ball is touched step by step in front of the striding feet, and rolls ahead and slows in between.
+"""Dribbling: the ball is touched step by step in front of the striding feet, and rolls and slows in between.
 
-What a feed has of a dribble is the ball somewhere near the player, often within them. Here the feet are left as they
-are and the ball is fitted to them: at which strides a foot touches it, from which side, and for how long it pushes it,
-is chosen by dynamic programming so that the ball is in no foot on its way, lies near its samples, and goes where the
-foot sends it. Between two touches it rolls (`roll`); at key moments it is where it was met.
+A feed has the ball of a dribble near the player, often inside the body. The feet stay as they are and the ball is
+fitted to them: which strides touch it, on which side, and for how long they push it is chosen by dynamic programming,
+so that the ball stays out of the body, lies near its samples, and moves where the foot sends it. Between two touches
+it rolls (`roll`); at key moments it stays where it was met.
 """
 
 from __future__ import annotations
@@ -17,13 +17,18 @@ from ...motion.skeleton import Skeleton
 from .dribble_search import SOONEST, Between, Legs, Push, Search
 from .meeting import lead
 
-KEY_SECONDS = 0.5  # from either end of a stretch within which a key moment begins or ends the dribble
-_BEYOND = 0.3  # s
+KEY_SECONDS = 0.5  # s from either end of a stretch within which a key moment begins or ends the dribble
+_BEYOND = 0.3  # s beyond an open end of a part in which the ball is still kept out of the body
 
 
 @dataclass(frozen=True, eq=False)
 class Dribbled:
-    """ball (T, 3) m: its centre; pushes: in the order of time."""
+    """A dribbled ball.
+
+    Attributes:
+        ball: (T, 3) m, its centre, world.
+        pushes: the touches, in order of time.
+    """
 
     ball: np.ndarray
     pushes: tuple[Push, ...]
@@ -34,14 +39,24 @@ def dribble(
     stretches: Sequence[tuple[float, float]], held: Sequence[tuple[int, int]], fps: float, *,
     measured: np.ndarray | None = None, turns: Sequence[float] = (),
 ) -> Dribbled:
-    """The ball's path with every stretch of dribbling touched step by step.
+    """Replace the ball's trajectory in every dribble by one that is touched step by step.
 
-    root (T, 3) m and rotations (T, J, 4) local: the motion on the pitch, which stays as it is. standing (T, 2) bool:
-    left and right foot on the ground. ball (T, 3) m: its centre, NaN where there is none. stretches: first and last
-    frame of each, fractional. held: the frames, first and last, in which the ball is met at key moments. measured (T,)
-    bool: False where a sample counts for nothing. turns: frames at which the ball is known to change its course outside
-    of the stretches. Frames before and behind the stretches change only where the ball has to come to its first touch
-    or go from its last."""
+    Frames before and after the stretches change only where the ball has to come to its first touch or leave its last.
+
+    Args:
+        skeleton: the skeleton.
+        root: (T, 3) m, the motion on the pitch, which does not change.
+        rotations: (T, J, 4) local.
+        foot_contacts: (T, 2) bool, left and right foot in contact with the ground.
+        ball: (T, 3) m, its centre, world, NaN where it is unknown.
+        stretches: first and last frame of each dribble, fractional.
+        held: first and last frame of each touch at a key moment.
+        fps: frames per second.
+        measured: (T,) bool, False where a sample has no weight.
+        course_changes: frames outside the stretches at which the ball is known to change its course.
+    Returns:
+        The trajectory and the touches of all dribbles.
+    """
     path, pushes = np.array(ball, dtype=float), []
     measured = np.isfinite(path).all(axis=1) if measured is None else np.asarray(measured, bool)
     for low, high in stretches:
@@ -54,6 +69,7 @@ def dribble(
             if found is None:
                 continue
             before, after, made = found
+            # found: frames counted from the part's first one
             path[part.low + before : part.low + after + 1] = made
             pushes += [Push(p.first + part.low, p.last + part.low, p.side) for p in search.pushes]
             touched = [*held, *((push.first, push.last) for push in pushes)]
@@ -64,10 +80,11 @@ def dribble(
 
 
 def _parts(low: float, high: float, held, count: int, fps: float) -> list[Between]:
-    """The parts of a stretch, cut where the ball is met; key moments close to its ends are its ends."""
+    """Split a stretch where the ball is met; key moments close to its ends become its ends."""
     reach = KEY_SECONDS * fps
     inside = sorted(pair for pair in held if low - reach <= pair[1] and pair[0] <= high + reach)
     low, high = max(int(np.ceil(low)), 0), min(int(np.floor(high)), count - 1)
+    # each edge is (frames of a touch, None) or (None, open frame)
     edges = [(None, low), *((pair, None) for pair in inside), (None, high)]
     out = []
     for (before, open_low), (after, open_high) in zip(edges, edges[1:]):
@@ -79,8 +96,10 @@ def _parts(low: float, high: float, held, count: int, fps: float) -> list[Betwee
 
 
 def _joined(path, feed, part: Between, first: int, last: int, others: Sequence[float], fps: float) -> np.ndarray:
-    """The path led to the first touch and away from the last where nothing is met at the part's ends; first and last
-    are counted from its beginning."""
+    """Lead the trajectory to the first touch and away from the last where a part has open ends.
+
+    first, last: frames counted from the part's beginning.
+    """
     first, last = part.low + first, part.low + last
     if not part.starts:
         anchor = max((frame for frame in others if frame < first), default=first - int(fps))
@@ -94,8 +113,10 @@ def _joined(path, feed, part: Between, first: int, last: int, others: Sequence[f
 def _kept_out(
     skeleton: Skeleton, root, rotations, path: np.ndarray, part: Between, held: Sequence[tuple[int, int]], fps: float
 ) -> np.ndarray:
-    """The path led around the body on its way; where the ball is `held` it stays. A little further than the part at
-    open ends, so that it does not jump there."""
+    """Lead the trajectory around the body; where the ball is `held` it stays.
+
+    At open ends this reaches a little further than the part, so that the ball does not jump there.
+    """
     beyond = int(_BEYOND * fps)
     low = part.low if part.starts else max(part.low - beyond, 0)
     high = part.high if part.ends else min(part.high + beyond, len(path) - 1)
@@ -109,7 +130,7 @@ def _kept_out(
 
 
 def _led_to(path: np.ndarray, frame: int, anchor: int, feed: np.ndarray) -> np.ndarray:
-    """The path as it is led from or to a touch at `frame`; the touch stays where it is."""
+    """Lead the trajectory from or to a touch at `frame`; the touch itself does not move."""
     out = lead(path, frame, anchor, path[frame] - feed[frame])
     out[frame] = path[frame]
     return out

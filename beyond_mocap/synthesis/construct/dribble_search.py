@@ -1,5 +1,7 @@
-"""Which strides touch a dribbled ball, and how: the cheapest way from touch to touch, by dynamic programming, and the
-legs as a ball meets them."""
+"""Search for the touches of a dribbled ball: which strides touch it, and how, by dynamic programming.
+
+`Legs` holds the parts of the body that the ball stays out of.
+"""
 
 from __future__ import annotations
 
@@ -17,39 +19,46 @@ from ...motion.track import BALL_RADIUS, zero_phase_hann
 from .carry import foot_tip
 from .meeting import touching_places
 
-SOONEST, _LATEST = 0.2, 1.3  # s from one touch to the next
-_ANGLES = np.radians([0.0, 35.0, -35.0, 65.0, -65.0])
-_ALONG = 0.7  # share of the way from ankle to toes from which the ball is touched
-_RETURNING, _BEHIND = -0.5, 0.0  # m/s against the body, and metres ahead of it, that a foot needs at least to touch it
-_LEVEL = 0.08  # metres that the foot may be above or below the middle of the ball
-_PUSH_SECONDS = 0.11  # longest time that a foot is at the ball
-_FROM_END = 0.9  # seconds at an open end within which the first or last touch lies
-_RATE = 30.0
-_AT_ONCE = 8
-_STANDING_STEP = 0.3  # seconds between two touches by a standing foot
+SOONEST, _LATEST = 0.2, 1.3  # s, shortest and longest roll from one touch to the next
+_ANGLES = np.radians([0.0, 35.0, -35.0, 65.0, -65.0])  # sides of the ball that are tried, from straight ahead
+_ALONG = 0.7  # share of the line from ankle to toes at which the ball is touched
+_RETURNING, _BEHIND = -0.5, 0.0  # least m/s of a touching foot relative to the body, and least m ahead of the pelvis
+_LEVEL = 0.08  # m that the foot may be above or below the middle of the ball
+_PUSH_SECONDS = 0.11  # s, longest push
+_FROM_END = 0.9  # s from an open end within which the first or last touch lies
+_RATE = 30.0  # frames per second that the cost of a ball inside the body refers to
+_AT_ONCE = 8  # rolls evaluated together for each end, cheapest bound first
+_STANDING_STEP = 0.3  # s between two touches by a planted foot
 
-_INSIDE_COST = 60.0  # a metre of ball within the body for a 30th of a second,
-_NEAR, _FIT_COST = 0.25, 3.0  # a metre further than this from its sample for a second,
-_BESIDE, _AHEAD_COST = 0.3, 4.0  # a metre less than this ahead of the pelvis for a second,
-_TOUCH_COST, _LONG, _LONG_COST = 0.04, 0.7, 4.0  # a touch, and a second more than this to the next,
-_ACROSS_COST, _BACK_COST, _SPEED_COST, _BRAKE_COST = 0.05, 0.3, 0.05, 0.6  # m/s that no foot so moved gives the ball,
-_ANGLE_COST = 0.3  # a radian off straight ahead,
-_STOOD_COST = 0.3  # and a touch by a foot that stands
-_HEIGHT_COST = 20.0  # a metre of ball above the foot,
-_WAIT_COST = 2.5  # and a second at an open end without a touch
-_MOST_EXTRA = 2.0  # m/s that a ball leaves faster than its foot
-_LEAST_EXTRA = 0.5  # m/s that it may leave slower, since a foot slows within a frame
-_KEPT = 6  # pushes of a swing from which the ball may roll on
-_START = -1
+# costs, in one common unit
+_INSIDE_COST = 60.0  # per metre of ball inside the body, for 1/30 s
+_NEAR, _FIT_COST = 0.25, 3.0  # per metre beyond this distance from its sample, for 1 s
+_BESIDE, _AHEAD_COST = 0.3, 4.0  # per metre less than this ahead of the pelvis, for 1 s
+_TOUCH_COST, _LONG, _LONG_COST = 0.04, 0.7, 4.0  # per touch, and per second beyond this to the next touch
+_ACROSS_COST, _BACK_COST, _SPEED_COST, _BRAKE_COST = 0.05, 0.3, 0.05, 0.6  # per m/s that such a foot cannot give
+_ANGLE_COST = 0.3  # per radian off straight ahead
+_STOOD_COST = 0.3  # per touch by a planted foot
+_HEIGHT_COST = 20.0  # per metre of ball above the foot
+_WAIT_COST = 2.5  # per second at an open end without a touch
+_MOST_EXTRA = 2.0  # m/s by which a ball may leave faster than its foot, free of cost
+_LEAST_EXTRA = 0.5  # m/s by which it may leave slower, free of cost: a foot slows within a frame
+_KEPT = 6  # pushes of one swing from which the ball may roll on
+_START = -1  # node number of the part's beginning
 
-SHIN_RADIUS, TIP_RADIUS = 0.05, 0.0  # m about the lines of a shin and of the toes' tip, which the ball keeps out of
-SLOW = 0.6  # m/s below which a body hardly goes anywhere
-_ROUNDS, _CLOSE = 6, 5e-4
+SHIN_RADIUS, TIP_RADIUS = 0.05, 0.0  # m around the lines of a shin and of the toes' tip that the ball stays out of
+SLOW = 0.6  # m/s below which the facing counts as the body's direction, not the velocity
+_ROUNDS, _CLOSE = 6, 5e-4  # most rounds of pushing a trajectory out of the body, and m at which they end
 
 
 @dataclass(frozen=True)
 class Push:
-    """One touch: output frames first .. last in which the ball is at the foot of that side."""
+    """One touch of a dribble.
+
+    Attributes:
+        first: first output frame in which the ball is at the foot.
+        last: last one.
+        side: "left" or "right".
+    """
 
     first: int
     last: int
@@ -58,8 +67,14 @@ class Push:
 
 @dataclass(frozen=True)
 class Between:
-    """A part of a stretch without a key moment inside: frames low .. high; starts, ends: whether the ball is met at
-    that end."""
+    """A part of a dribble without a key moment inside.
+
+    Attributes:
+        low: first frame.
+        high: last frame.
+        is_met_at_start: whether the ball is met at the first frame.
+        is_met_at_end: whether the ball is met at the last frame.
+    """
 
     low: int
     high: int
@@ -68,13 +83,29 @@ class Between:
 
 
 class Legs:
-    """A body over W frames, from its root (W, 3) m and local rotations (W, J, 4).
+    """The legs of a body over W frames, as obstacles and as feet that touch a ball.
 
-    feet: their striking surfaces, left and right; lines: both ends (W, 3) m of each. pelvis (W, 2) m; velocity (W, 2)
-    m/s and speed (W,) of it without the sway of steps; ahead (W, 2): unit, where it goes, or faces where it hardly
-    goes."""
+    Attributes:
+        pelvis: (W, 2) m, world.
+        feet: striking surfaces of the left and right foot.
+        lines: per foot both ends (W, 3) m of its surface's line.
+        start, along: (W, 6, 3) m, begin and extent of the lines of feet, shins and toes' tips.
+        squared: (W, 6) m^2, squared lengths of these lines.
+        least: (6,) m, radius of each part plus the ball's.
+        velocity: (W, 2) m/s of the pelvis without the sway of steps.
+        speed: (W,) m/s of it.
+        ahead: (W, 2) unit, direction of travel; the facing where the body is slower than SLOW.
+    """
 
     def __init__(self, skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray, fps: float):
+        """Compute everything from a motion.
+
+        Args:
+            skeleton: the skeleton.
+            root: (W, 3) m, world.
+            rotations: (W, J, 4) local.
+            fps: frames per second.
+        """
         places, world = pose_kinematics(skeleton, root, rotations)
         body, self.fps = identify(skeleton), fps
         self.pelvis = places[:, body.hips, :2]
@@ -96,30 +127,51 @@ class Legs:
         self.ahead = np.where((self.speed > SLOW)[:, None], going, facing)
 
     def foot_velocity(self, side: int) -> np.ndarray:
-        """(W, 2) m/s of the foot's middle."""
+        """Compute the velocity (W, 2) m/s of the middle of a foot; side: 0 left, 1 right."""
         middle = np.mean(self.lines[side], axis=0)[:, :2]
         return np.gradient(middle, axis=0) * self.fps
 
     def gaps(self, balls: np.ndarray, frames: np.ndarray) -> np.ndarray:
-        """(N,) m between balls (N, 3) m at frames (N,) and the nearest part of the body, negative within it."""
+        """Measure the gaps between balls and the nearest part of the body.
+
+        Args:
+            balls: (N, 3) m, centres, world.
+            frames: (N,) frame of each.
+        Returns:
+            (N,) m, negative inside the body.
+        """
         return np.min(self._away(balls, frames)[1], axis=1)
 
     def kept_out(self, path: np.ndarray, free: np.ndarray) -> np.ndarray:
-        """A ball's path (W, 3) m led around the body where it is `free` (W,) bool to go elsewhere."""
+        """Lead a ball's trajectory around the body.
+
+        Args:
+            path: (W, 3) m, world.
+            free: (W,) bool, where the ball may move.
+        Returns:
+            (W, 3) m; only x and y change.
+        """
         every, aside, free = np.arange(len(path)), np.zeros((len(path), 2)), free[:, None]
         for left in reversed(range(_ROUNDS)):
             out = self.way_out(path + np.pad(aside, ((0, 0), (0, 1))), every) * free
             if np.abs(out).max(initial=0.0) < _CLOSE:
                 break
             aside += out
+            # smooth with (1, 2, 1) / 4 between rounds, except after the last
             if left:
                 padded = np.pad(aside, ((1, 1), (0, 0)), mode="edge")
                 aside = free * (0.25 * padded[:-2] + 0.5 * aside + 0.25 * padded[2:])
         return path + np.pad(aside, ((0, 0), (0, 1)))
 
     def way_out(self, balls: np.ndarray, frames: np.ndarray) -> np.ndarray:
-        """(N, 2) m along the ground by which balls (N, 3) m come out of the part of the body that they are deepest
-        in."""
+        """Compute the shortest level move out of the part of the body that each ball is deepest in.
+
+        Args:
+            balls: (N, 3) m, centres, world.
+            frames: (N,) frame of each.
+        Returns:
+            (N, 2) m; zero outside the body.
+        """
         away, gaps = self._away(balls, frames)
         rows, part = np.arange(len(balls)), np.argmin(gaps, axis=1)
         way, level = away[rows, part], np.linalg.norm(away[rows, part, :2], axis=1)
@@ -127,24 +179,40 @@ class Legs:
         return way[:, :2] * (np.maximum(wanted - level, 0.0) / np.maximum(level, 1e-6))[:, None]
 
     def _away(self, balls: np.ndarray, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """From the nearest points of all parts to the balls (N, 6, 3) m, and the gaps (N, 6) m."""
+        """Compute the vectors (N, 6, 3) m from the nearest points of all parts to the balls, and the gaps (N, 6) m."""
         start, along = self.start[frames], self.along[frames]
         to = balls[:, None] - start
+        # nearest point of a line segment: projection, limited to its ends
         share = np.clip(np.einsum("npk,npk->np", to, along) / self.squared[frames], 0.0, 1.0)
         to -= share[..., None] * along
         return to, np.sqrt(np.einsum("npk,npk->np", to, to)) - self.least
 
 
 def _smooth_velocity(places: np.ndarray, fps: float) -> np.ndarray:
-    """(W, 2) m/s without the sway of steps."""
+    """Compute the velocity (W, 2) m/s without the sway of steps (0.6 s Hann window)."""
     return np.gradient(zero_phase_hann(places, fps, 0.6), axis=0) * fps if len(places) > 2 else np.zeros_like(places)
 
 
 class Search:
-    """The touches of one part: nodes are a foot, a frame and a side of the ball on which it may touch it; a push goes
-    from node to node of one swing, a roll from the end of a push to the beginning of another."""
+    """Search for the touches of one part by dynamic programming.
+
+    A node is a foot, a frame and a side of the ball on which the foot may touch it. A push leads from node to node
+    within one swing, a roll from the end of a push to the beginning of another.
+    """
 
     def __init__(self, skeleton, root, rotations, standing, path, measured, part: Between, fps: float):
+        """Take the frames of the part and build the nodes.
+
+        Args:
+            skeleton: the skeleton.
+            root: (T, 3) m, world.
+            rotations: (T, J, 4) local.
+            foot_contacts: (T, 2) bool, left and right foot in contact.
+            path: (T, 3) m, the ball's centre.
+            measured: (T,) bool, False where a sample has no weight.
+            part: the frames to search.
+            fps: frames per second.
+        """
         span = slice(part.low, part.high + 1)
         self.part, self.fps, self.count = part, fps, part.high - part.low + 1
         self.body = Legs(skeleton, root[span], rotations[span], fps)
@@ -153,7 +221,12 @@ class Search:
         self._nodes()
 
     def _nodes(self) -> None:
-        """frame, side, angle, swing (N,), place (N, 3) m of the ball, normal (N, 2) from foot to ball, cost (N,)."""
+        """Build the N nodes, in order of time.
+
+        frame, side, angle, swing, stood: (N,); place (N, 3) m of the ball; normal (N, 2) from foot to ball; velocity
+        (N, 2) m/s of the foot; held, touch (N,): cost of the ball there for a frame, and of beginning a touch.
+        """
+        # one row per frame of each swing and each angle: (frame, side, angle, swing, stood)
         rows = []
         for side, swing in ((side, swing) for side in (0, 1) for swing in self._swings(side)):
             rows += [(frame, side, angle, *swing[2:]) for frame in range(*swing[:2]) for angle in range(len(_ANGLES))]
@@ -164,6 +237,8 @@ class Search:
         self.normal = np.column_stack([c * ahead[:, 0] - s * ahead[:, 1], s * ahead[:, 0] + c * ahead[:, 1]])
         is_left, ends = self.side[:, None] == 0, zip(*self.body.lines)
         line = [np.where(is_left, left[self.frame], right[self.frame]) for left, right in ends]
+        # the ball touches the foot on the ray from `start` along the node's normal, at the height of a ball on the
+        # ground
         start = line[0] + _ALONG * (line[1] - line[0])
         start[:, 2] = BALL_RADIUS
         radius = self.body.feet[0].radius
@@ -174,27 +249,40 @@ class Search:
         self.velocity = velocity[self.side, self.frame]
         forward = np.sum((self.velocity - self.body.velocity[self.frame]) * ahead, axis=1)
         before = np.sum((np.mean(line, axis=0)[:, :2] - self.body.pelvis[self.frame]) * ahead, axis=1)
+        # a foot in the air has to swing forward and be ahead of the pelvis; a planted foot always counts
         usable &= (forward > _RETURNING) & (before > _BEHIND) | (self.stood > 0)
         self._keep(usable)
         self.held = self._at(self.place, self.frame)
         self.touch = _TOUCH_COST + _ANGLE_COST * np.abs(_ANGLES[self.angle]) + _STOOD_COST * self.stood
 
     def _keep(self, usable: np.ndarray) -> None:
+        """Keep the usable nodes, sorted by frame (ties in the order they were built)."""
         order = np.flatnonzero(usable)
         order = order[np.argsort(self.frame[order], kind="stable")]
         for name in ("frame", "side", "angle", "swing", "stood", "normal", "place", "velocity"):
             setattr(self, name, getattr(self, name)[order])
 
     def _swings(self, side: int) -> list[tuple[int, int, int, int]]:
-        """(first, end, number, 0) of every swing of a foot, and (frame, frame + 1, number, 1) of the moments in which a
-        foot of a player who hardly moves may touch the ball as it stands."""
+        """List the swings of a foot as (first, end, number, 0).
+
+        Where the player hardly moves, frames in contact are added as (frame, frame + 1, number, 1): there the foot may
+        touch the ball without a swing. Numbers are unique over both feet.
+        """
         air = [(first, end, 2 * number + side, 0) for number, (first, end) in enumerate(runs(~self.standing[:, side]))]
         step = max(int(_STANDING_STEP * self.fps), 1)
         still = [f for f in range(0, self.count, step) if self.standing[f, side] and self.body.speed[f] < SLOW]
         return [*air, *((frame, frame + 1, 2 * (self.count + frame) + side, 1) for frame in still)]
 
     def _at(self, balls: np.ndarray, frames: np.ndarray) -> np.ndarray:
-        """(N,) what it costs that balls (N, 3) m are there at frames (N,)."""
+        """Compute what it costs that balls are at places.
+
+        Args:
+            balls: (N, 3) m, centres.
+            frames: (N,) frame of each.
+        Returns:
+            (N,) cost for one frame each: distance from the sample, too little lead on the pelvis, depth inside the
+            body.
+        """
         off = balls[:, :2] - self.feed[frames, :2]
         fit = _FIT_COST * np.maximum(np.hypot(off[:, 0], off[:, 1]) - _NEAR, 0.0) * self.measured[frames]
         ahead = np.einsum("nk,nk->n", balls[:, :2] - self.body.pelvis[frames], self.body.ahead[frames])
@@ -203,20 +291,28 @@ class Search:
         return (fit + beside + inside) / self.fps
 
     def run(self) -> tuple[int, int, np.ndarray] | None:
-        """First and last frame, counted from the part's, and the path (last - first + 1, 3) m in between; None where no
-        foot comes near the ball. Afterwards `pushes` has the touches."""
+        """Run the search; afterwards `pushes` holds the touches.
+
+        Returns:
+            First and last frame, counted from the part's, and the path (last - first + 1, 3) m between them; None where
+            no foot comes near the ball.
+        """
         count = len(self.frame)
-        self.into, self.came = np.full(count, np.inf), np.full(count, _START)  # a roll that ends here, and whence
-        self.out, self.pushed = np.full(count, np.inf), np.full(count, _START)  # a push that ends here, and whence
-        self.arrives = np.zeros((count, 2))
+        # per node: lowest cost of a roll that ends here, and the node where that roll began
+        self.into, self.came = np.full(count, np.inf), np.full(count, _START)
+        # per node: lowest cost of a push that ends here, and the node where that push began
+        self.out, self.pushed = np.full(count, np.inf), np.full(count, _START)
+        self.arrives = np.zeros((count, 2))  # m/s of the ball at the end of the cheapest roll
         self.best, self.last = np.inf, _START
         self.sources = [_START] if self.part.starts else []
-        if not count:  # no foot comes near: it rolls all the way, where it is met at both ends
+        if not count:  # no foot comes near: the ball rolls from end to end, if it is met at both
             return self._path() if self.part.starts and self.part.ends else None
         if not self.part.starts:
+            # an open beginning: any touch soon after it may be the first; before that the ball follows the samples
             soon = np.flatnonzero(self.frame <= _FROM_END * self.fps)
             self.into[soon] = _WAIT_COST * self.frame[soon] / self.fps + _FIT_COST * self._off(soon)
             self.into[soon] += np.append(0.0, np.cumsum(self._untouched()))[self.frame[soon]]
+        # nodes are sorted by frame, so all rolls and pushes into a node come from nodes that are complete
         for frame in sorted(set(self.frame.tolist())):
             here = np.flatnonzero(self.frame == frame)
             self._rolled_to(here, frame)
@@ -227,7 +323,7 @@ class Search:
         return self._path() if np.isfinite(self.best) else None
 
     def _keep_source(self, node: int) -> None:
-        """The ball may roll on from this push, if it is among the best of its swing so far."""
+        """Keep a node as a source of rolls if its push is among the best _KEPT of its swing so far."""
         swing = [other for other in self.sources if other != _START and self.swing[other] == self.swing[node]]
         if len(swing) == _KEPT:
             worst = max(swing, key=lambda other: self.out[other])
@@ -238,15 +334,15 @@ class Search:
             self.sources.append(node)
 
     def _off(self, nodes) -> np.ndarray:
-        """(N,) m from the ball's sample to where a foot has it."""
+        """Measure the distance (N,) m from the ball's sample to where a foot has the ball."""
         return np.linalg.norm(self.place[nodes, :2] - self.feed[self.frame[nodes], :2], axis=-1)
 
     def _untouched(self) -> np.ndarray:
-        """(W,) what it costs that the ball goes as its samples have it."""
+        """Compute the cost (W,) of a ball that follows its samples."""
         return self._at(self.feed, np.arange(self.count))
 
     def _end(self) -> None:
-        """The cheapest end: a roll to where the ball is met, or, where nothing is, any touch near it."""
+        """Find the cheapest end: a roll to where the ball is met, or, at an open end, any touch near it."""
         if self.part.ends:
             sources = self._sources(self.count - 1)
             if len(sources):
@@ -254,6 +350,7 @@ class Search:
                 self.best, self.last = costs[0], whence[0]
             return
         left = (self.count - 1 - self.frame) / self.fps
+        # after[n]: cost of following the samples from the frame behind node n to the end
         after = np.append(np.cumsum(self._untouched()[::-1])[::-1], 0.0)[self.frame + 1]
         whole = self.out + after + _WAIT_COST * left + _FIT_COST * self._off(slice(None))
         whole = np.where(left <= _FROM_END, whole, np.inf)
@@ -261,21 +358,22 @@ class Search:
             self.best, self.last = whole.min(), int(np.argmin(whole))
 
     def _push(self, node: int) -> None:
-        """The cheapest way for the ball to be at this foot: rolled here, or pushed here since a few frames."""
+        """Find the cheapest push that ends here: the ball has just rolled here, or has been pushed for a few frames."""
         longest = int(_PUSH_SECONDS * self.fps)
         ago = self.frame[node] - self.frame
         since = np.flatnonzero(self._alike(node) & (ago >= 0) & (ago <= longest))[::-1]
-        since = since[ago[since] == np.arange(len(since))]  # without a frame between
+        since = since[ago[since] == np.arange(len(since))]  # same foot, side and swing, no frame missing, newest first
+        # a push that began `k` frames ago costs the roll into it, k + 1 held frames, and one touch
         costs = self.into[since] + np.cumsum(self.held[since]) + self.touch[node]
         best = int(np.argmin(costs))
         self.out[node], self.pushed[node] = costs[best], since[best]
 
     def _alike(self, node: int) -> np.ndarray:
-        """(N,) bool: nodes with the foot, the swing and the side of the ball of this one."""
+        """Return (N,) bool: nodes with the same foot, swing and side of the ball as this one."""
         return (self.side == self.side[node]) & (self.angle == self.angle[node]) & (self.swing == self.swing[node])
 
     def _sources(self, frame: int) -> np.ndarray:
-        """The nodes from which the ball may roll so as to be somewhere at a frame: within _LATEST, or the last ones."""
+        """List the nodes from which the ball may roll to a frame: those within _LATEST, or else the latest ones."""
         found = np.array(self.sources, dtype=int)
         since = frame - np.where(found == _START, 0, self.frame[found])
         enough = since >= SOONEST * self.fps
@@ -283,7 +381,7 @@ class Search:
         return found[soon if soon.any() else enough & (since == since[enough].min(initial=frame + 1))]
 
     def _rolled_to(self, nodes: np.ndarray, frame: int) -> None:
-        """The cheapest rolls that end in nodes, all of one frame."""
+        """Find the cheapest rolls that end in `nodes`, all of one frame."""
         sources = self._sources(frame)
         if not len(sources):
             return
@@ -293,10 +391,19 @@ class Search:
         self.arrives[nodes[better]] = arrives[better]
 
     def _cheapest(self, sources: np.ndarray, ends: np.ndarray, frame: int, swing: np.ndarray | None = None):
-        """For each of `ends` (N, 3) m the cost of the cheapest roll there, its source, and its velocity (N, 2) m/s.
+        """Find the cheapest roll to each of several ends.
 
-        What a roll costs beside its way is worked out for all; the way, which only adds to it, for the cheapest, a few
-        at a time, until no other can be cheaper."""
+        The cost beside the trajectory is computed for all rolls; it is a lower bound. The trajectory only adds to it,
+        and is evaluated for the cheapest bounds, _AT_ONCE at a time, until no other roll can be cheaper.
+
+        Args:
+            sources: (S,) nodes where a roll may begin.
+            ends: (N, 3) m.
+            frame: the frame of all ends.
+            swing: (N,) swing of each end; a roll never ends in the swing it began in.
+        Returns:
+            (N,) cost, (N,) source and (N, 2) m/s of the ball at the end.
+        """
         starts = np.where((sources == _START)[:, None], self.feed[0], self.place[sources])
         frames = frame - np.where(sources == _START, 0, self.frame[sources])
         speeds = speeds_of(starts[:, None], ends, frames[:, None] / self.fps)
@@ -309,6 +416,7 @@ class Search:
         costs, whence = np.full(len(ends), np.inf), np.full(len(ends), _START)
         arrives = np.zeros((len(ends), 2))
         for first in range(0, len(sources), _AT_ONCE):
+            # tried (_AT_ONCE, N): row r holds for each end the source with its next lowest bound
             tried = order[first : first + _AT_ONCE]
             target, row = np.tile(every, len(tried)), tried.ravel()
             hopeful = least[row, target] < costs[target]
@@ -316,6 +424,7 @@ class Search:
             if not len(row):
                 break
             whole = least[row, target] + self._way(starts[row], ends[target], frame - frames[row], frames[row])
+            # from the most expensive to the cheapest, so that the cheapest is written last
             for one in np.argsort(whole, kind="stable")[::-1]:
                 if whole[one] < costs[target[one]]:
                     costs[target[one]], whence[target[one]] = whole[one], sources[row[one]]
@@ -323,17 +432,32 @@ class Search:
         return costs, whence, arrives
 
     def _way(self, starts: np.ndarray, ends: np.ndarray, since: np.ndarray, frames: np.ndarray) -> np.ndarray:
-        """(P,) what the ways from `starts` to `ends` (P, 3) m in `frames` (P,) from the frames `since` (P,) on cost."""
+        """Compute the cost (P,) of the trajectories of P rolls.
+
+        Args:
+            starts: (P, 3) m.
+            ends: (P, 3) m.
+            since: (P,) frame where each begins.
+            frames: (P,) number of frames that each takes.
+        """
         rolled = rolls(starts, ends, frames, self.fps)
+        # all frames strictly between the ends, as (roll, step) pairs; `bincount` adds their costs up per roll
         pair, step = np.nonzero(np.arange(1, frames.max() + 1) < frames[:, None])
         passed = self._at(rolled.balls[pair, step], since[pair] + 1 + step)
         return np.bincount(pair, passed, len(frames)) + _HEIGHT_COST * rolled.missed
 
     def _sent(self, sources: np.ndarray, leaves: np.ndarray) -> np.ndarray:
-        """(S, N) what it costs that feet, as they move, send the ball off with `leaves` (S, N, 2) m/s; nothing where
-        the ball was met."""
+        """Compute what it costs that feet, as they move, send the ball off with the velocities `leaves`.
+
+        Args:
+            sources: (S,) nodes; no cost where the ball was met (_START).
+            leaves: (S, N, 2) m/s.
+        Returns:
+            (S, N) cost.
+        """
         normal = self.normal[sources][:, None]
         change = leaves - self.arrives[self.pushed[sources]][:, None]
+        # split the change of velocity into the part along the foot's normal and the part across it
         pushed = np.sum(change * normal, axis=-1)
         across = np.linalg.norm(change - pushed[..., None] * normal, axis=-1)
         extra = np.sum(leaves * normal, axis=-1) - self._pushing(sources)[:, None]
@@ -344,7 +468,7 @@ class Search:
         return np.where((sources == _START)[:, None], 0.0, costs)
 
     def _pushing(self, nodes: np.ndarray) -> np.ndarray:
-        """(S,) m/s at which feet push the ball when it leaves them: the foot's speed, or the ball's own so far."""
+        """Compute the speed (S,) m/s at which feet push the ball away: the foot's, or the ball's over the push."""
         speed = np.sum(self.velocity[nodes] * self.normal[nodes], axis=-1)
         begun = self.pushed[nodes]
         frames = np.maximum(self.frame[nodes] - self.frame[begun], 1)
@@ -352,18 +476,20 @@ class Search:
         return np.where(begun == nodes, speed, np.maximum(speed, way * self.fps / frames))
 
     def _path(self) -> tuple[int, int, np.ndarray]:
-        """The cheapest way, back from its end."""
+        """Trace the cheapest path back from its end and collect the pushes."""
         path = np.array(self.feed)
         last = self.count - 1 if self.part.ends else int(self.frame[self.last])
         node, (to, there) = self.last, (last, self.feed[-1]) if self.part.ends else (None, None)
         while True:
             frame = 0 if node == _START else int(self.frame[node])
             place = self.feed[0] if node == _START else self.place[node]
+            # the roll from this push to the one behind it fills the frames between
             if to is not None:
                 rolled = rolls(place[None], there[None], np.array([to - frame]), self.fps).balls[0]
                 path[frame + 1 : to] = rolled[: to - frame - 1]
             if node == _START:
                 return 0, last, path[: last + 1]
+            # go back to the start of this push, then to the node from which the ball rolled here
             entered = int(self.pushed[node])
             first = int(self.frame[entered])
             held = np.flatnonzero(self._alike(node) & (self.frame >= first) & (self.frame <= frame))

@@ -1,9 +1,9 @@
-"""Heads that follow the ball: the gaze turned to a place that moves, smoothly and as far as a neck turns.
+"""Heads that follow the ball: the gaze turns smoothly to a moving place, within the range of a neck.
 
-Where the head should turn is a continuous function of the direction in which the ball lies as the body sees it. Ahead
-it is that direction, within what a neck can do; to the side it stays at its limit; behind the body it goes back to
-looking ahead, and so changes sides without a jump; overhead, where there is no side, it looks up. The way there is then
-smoothed over time. Neck and chest take a share of each turn.
+The turn of the head is a continuous function of the direction in which the ball lies as the body sees it. Ahead it is
+that direction, within the limits of a neck; to the side it stays at its limit; behind the body it returns to looking
+ahead, and so changes sides without a jump; overhead, where there is no side, it looks up. The result is smoothed over
+time. Neck and chest take a share of each turn.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ from ...motion.track import zero_phase_hann
 
 MOST_YAW, MOST_UP, MOST_DOWN = np.radians(75.0), np.radians(50.0), np.radians(55.0)  # from straight ahead of the body
 CHEST, NECK = 0.12, 0.35  # shares of a turn that chest and neck take; the head takes the rest
-SECONDS = 0.4  # window over which the head's turning is smoothed
-_OVERHEAD = 0.5  # length on the ground of a unit direction below which its side counts less and less
+SECONDS = 0.4  # s, window over which the head's turning is smoothed
+_OVERHEAD = 0.5  # level length of a unit direction below which its side counts less and less
 _BEHIND = 0.5  # cosine from straight behind beyond which the head begins to turn back
 
 
@@ -30,11 +30,17 @@ def following(
     motion: Motion, places: np.ndarray, look: np.ndarray, share: np.ndarray | float = 1.0,
     chest: np.ndarray | float = CHEST,
 ) -> Motion:
-    """The motion with its head turned to follow `places` (T, 3) m, NaN where there is nothing to look at.
+    """Turn the head of a motion so that it follows a moving place.
 
-    look (3,): which way the head joint looks, in its own frame (`pins.look_axis`). share (T,): how much of the turn is
-    made at each frame; chest (T,): how much of it the chest takes. The motion itself where nothing is to be seen
-    throughout."""
+    Args:
+        motion: T frames.
+        places: (T, 3) m, world, NaN where there is nothing to look at.
+        look: (3,) unit, direction in which the head joint looks, in its own frame (`pins.look_axis`).
+        share: (T,) share of the turn that is applied at each frame.
+        chest: (T,) share of the turn that the chest takes.
+    Returns:
+        The motion with its head turned; the motion itself where no place is known at all.
+    """
     known = np.isfinite(places).all(axis=1)
     if not known.any():
         return motion
@@ -42,6 +48,7 @@ def following(
     joints, world = forward_kinematics(motion)
     head = body.head_or_neck
     facing = heading_from_positions(motion.skeleton, joints)
+    # the place as seen from the head, in the body's facing frame
     seen = quaternion.rotate(quaternion.about_up(-facing), _held(places, known) - joints[:, head])
     yaw, pitch = zero_phase_hann(head_angles(seen), motion.fps, SECONDS).T
     wanted = np.column_stack([np.cos(pitch) * np.cos(yaw), np.cos(pitch) * np.sin(yaw), np.sin(pitch)])
@@ -53,8 +60,13 @@ def following(
 
 
 def head_angles(seen: np.ndarray) -> np.ndarray:
-    """(N, 2) radians of yaw (to the left) and pitch (up) by which a head turns to look where `seen` (N, 3) lies from
-    it, x ahead of the body and y to its left; continuous but straight up and down."""
+    """Compute the angles by which a head turns to look in a direction; continuous except straight up and down.
+
+    Args:
+        seen: (N, 3), direction from the head, x ahead of the body, y to its left.
+    Returns:
+        (N, 2) rad, yaw (to the left) and pitch (up).
+    """
     unit = unit_vectors(seen)
     level = np.hypot(unit[:, 0], unit[:, 1])
     back = np.maximum(-unit[:, 0] - _BEHIND * level, 0.0) / (1.0 - _BEHIND)
@@ -65,31 +77,33 @@ def head_angles(seen: np.ndarray) -> np.ndarray:
 
 
 def _limited(angle: np.ndarray, most: float) -> np.ndarray:
-    """Angles (N,) that near `most` softly: up to three quarters of it they are as they were."""
+    """Limit angles (N,) softly to `limit`: up to three quarters of it they do not change."""
     free = 0.75 * most
     over = np.maximum(np.abs(angle) - free, 0.0)
     return np.sign(angle) * (np.minimum(np.abs(angle), free) + (most - free) * np.tanh(over / (most - free)))
 
 
 def _held(places: np.ndarray, known: np.ndarray) -> np.ndarray:
-    """(T, 3) with the nearest known place before (or behind the first) where none is known."""
+    """Fill unknown places (T, 3) with the last known one, or with the first known one before it."""
     at = np.flatnonzero(known)
     return places[at[np.clip(np.searchsorted(at, np.arange(len(known)), side="right") - 1, 0, None)]]
 
 
 def _eased_in(known: np.ndarray, fps: float) -> np.ndarray:
-    """(T,) 1 where there is something to see, fading within SECONDS beside what is not known."""
+    """Compute the weight (T,) of the gaze: 1 where a place is known, fading within SMOOTHING_SECONDS beside gaps."""
     if known.all():
         return np.ones(len(known))
     frames, without = np.arange(len(known)), np.flatnonzero(~known)
+    # distance to the nearest frame without a place, before and behind
     after = np.searchsorted(without, frames)
     beside = (without[np.clip(after - back, 0, len(without) - 1)] for back in (0, 1))
     return smoothstep(np.minimum(*(np.abs(frames - other) for other in beside)) / (SECONDS * fps))
 
 
 def _turned(motion: Motion, world: np.ndarray, head: int, turn: np.ndarray, chest: np.ndarray) -> Motion:
-    """The head turned by rotation vectors (T, 3) in the world, neck and chest (T,) by their shares of them."""
+    """Turn the head by rotation vectors (T, 3) in the world; neck and chest (T,) take their shares of them."""
     body, parents = identify(motion.skeleton), motion.skeleton.parents
+    # shares add up along the spine: each joint carries what the joints below it have taken
     shares, taken = {}, np.zeros(len(turn))
     for joint, own in ((body.chest, chest), (body.neck, NECK)):
         if joint is not None and joint not in (head, body.hips):

@@ -1,10 +1,10 @@
-"""A stretch that is constructed again joined to the motion around it, which stays: no jump, and no foot that slides.
+"""Blend a constructed stretch with the motion around it, which stays: without a jump, and without a foot that slides.
 
 Around the stretch both motions show the same source frames, but what was solved over all frames (how far a foot is
-shifted, how low the pelvis goes) may differ there by some centimetres. Root and joints go over from the one to the
-other within the hand-over; feet go over at once, where they are in the air. A foot that stands at the border stands
-where the old motion has it until it lifts: its shift is `foot_plant.shift` of a foot that does not move at all. Where
-both motions stand still elsewhere, feet step over (`stepped_over`).
+shifted, how low the pelvis is) may differ there by some centimetres. Root and joints are blended at its ends;
+feet change over at once where they are in the air. A foot in contact at the border stays where the old motion has it
+until it lifts: its shift is `foot_plant.solve_shift` of a foot that does not move at all. Where both motions
+stay in place at different places, the feet step over (`step_over`).
 """
 
 from __future__ import annotations
@@ -27,21 +27,23 @@ from .steps import steps
 
 Pose = tuple[np.ndarray, np.ndarray]
 
-_MOST_TURN = 1.5 * np.pi  # rad that a body may turn on the spot so as to turn the way it did before
-_OFFSET_SECONDS = 1.0  # in a stretch over which the root forgets how far off the old one was at its end
-_AROUND = 0.5  # s on either side of the stretch that are looked at
-_JOINS = 0.12  # s at either end of it in which what is planted goes over into what stays
+_MOST_TURN = 1.5 * np.pi  # rad, largest turn on the spot to keep the old direction of turning
+_OFFSET_SECONDS = 1.0  # s from an end of the stretch over which the root's offset to the old one fades
+_AROUND = 0.5  # s on either side of the stretch that are solved with it
+_JOINS = 0.12  # s at either end of the stretch in which the planted motion is blended into the old one
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class OldMotion:
-    """What was shown before in the W frames of a window.
+    """The motion that was shown before in the W frames of a window.
 
-    root: (W, 3) m.
-    rotation: (W, 4) of the root joint.
-    stepped: (W, 2) bool, extra steps of either foot.
-    share: (W,) of the old motion in what comes out, 0 where it is replaced.
-    stretch: first and end frame of the window between which it is free."""
+    Attributes:
+        root: (W, 3) m, world.
+        rotation: (W, 4) of the root joint, world.
+        stepped: (W, 2) bool, extra steps of the left and right foot.
+        share: (W,) of the old motion in the result, 0 where it is replaced.
+        stretch: first and end frame of the window between which the new motion is free.
+    """
 
     root: np.ndarray
     rotation: np.ndarray
@@ -51,19 +53,31 @@ class OldMotion:
 
     @property
     def stays(self) -> np.ndarray:
-        """(W,) bool: frames in which some of it stays."""
+        """(W,) bool: frames in which some of the old motion stays."""
         return self.share > 0.0
 
     def heading_of(self, pose: np.ndarray) -> np.ndarray:
-        """(W,) rad with which poses (W, J, 4) out of the facing frame face as the old motion; NaN where free."""
+        """Compute the heading with which poses face as the old motion does.
+
+        Args:
+            pose: (W, J, 4) local rotations, the root's in the facing frame.
+        Returns:
+            (W,) rad, NaN where the new motion is free.
+        """
         heading = quaternion.yaw(quaternion.multiply(self.rotation, quaternion.inverse(pose[:, 0])))
         heading[~self.stays] = np.nan
         return heading
 
     def turned_alike(self, track: SampledTrack, heading: np.ndarray) -> SampledTrack | None:
-        """The track (W frames) with the direction in which a body turns the same way round as the old one, whose new
-        heading on it is (W,) rad, unwrapped; None where both turn alike, or where the body is nowhere so slow that both
-        ways will do."""
+        """Change the track's direction so that a body turns in the same sense as the old one.
+
+        Args:
+            track: W frames.
+            heading: (W,) rad, unwrapped, the new heading on that track.
+        Returns:
+            The track with another direction; None where both turn alike, or where the body is nowhere slow enough for
+            both directions of turning to be possible.
+        """
         old = np.unwrap(quaternion.yaw(self.rotation))
         first, end = max(self.stretch[0] - 1, 0), min(self.stretch[1], len(heading) - 1)
         turns = np.round((heading[end] - heading[first] - old[end] + old[first]) / (2.0 * np.pi))
@@ -71,6 +85,7 @@ class OldMotion:
         middle = first + int(np.argmin(track.speed[first : end + 1]))
         if turns == 0 or not slow[middle]:
             return None
+        # the slow stretch around the slowest frame: only there full turns may be added or removed
         fast = np.flatnonzero(~slow[first : end + 1]) + first
         low, high = max(fast[fast < middle], default=first), min(fast[fast > middle], default=end)
         if abs(heading[high] - heading[low] - 2.0 * np.pi * turns) > _MOST_TURN:
@@ -79,12 +94,22 @@ class OldMotion:
         return replace(track, direction=track.direction - 2.0 * np.pi * turns * ramp)
 
     def pulled(self, ground: np.ndarray, track: SampledTrack, window: float) -> np.ndarray:
-        """Pull the constructed root, ground (W, 2) m, onto the track (W frames) between what stays; near that it sets
-        out from where the old one is. window: seconds, as `pulled_to_track` has it."""
+        """Pull the constructed root onto the track between the frames that stay.
+
+        Near these it starts from the old root.
+
+        Args:
+            ground: (W, 2) m, constructed root, world.
+            track: W frames.
+            window: s, as for `pull_to_track`.
+        Returns:
+            (W, 2) m, world.
+        """
         old, stays = self.root[:, :2], self.stays
         first, end = self.stretch
         at, fade = np.arange(len(ground)), max(1.0, min(_OFFSET_SECONDS * track.fps, end - first))
         root = ground.copy()
+        # the last old frame before and the first one behind the stretch; the offset there fades over `fade` frames
         for edge in (edge for edge in (first - 1, end) if 0 <= edge < len(ground)):
             near = quintic_step_by_powers(1.0 - np.abs(at - edge) / fade)[:, None]
             root += np.where(stays[:, None], 0.0, near * (old - ground)[edge])
@@ -93,27 +118,42 @@ class OldMotion:
         return pulled + self.share[:, None] * (old - pulled)
 
     def kept_steps(self) -> np.ndarray:
-        """(W, 2) bool: the steps that are taken, in whole or in part, where the old motion stays."""
+        """Return (W, 2) bool: the steps that are taken, in whole or in part, where the old motion stays."""
         kept = np.zeros_like(self.stepped)
         for side in range(kept.shape[1]):
             stepped = self.stepped[:, side]
+            # number each step of the foot, then keep those numbers that occur where the motion stays
             number = np.cumsum(np.diff(stepped, prepend=False)) * stepped
             kept[:, side] = stepped & np.isin(number, number[self.stays & stepped])
         return kept
 
 
 def old_share(count: int, stretch: tuple[int, int], frames: int) -> np.ndarray:
-    """(count,) share of the old motion: 0 within the `stretch` (first, end), 1 from `frames` around it on."""
+    """Compute the share (count,) of the old motion: 0 within the stretch, 1 from `frames` around it on.
+
+    Args:
+        count: number of frames.
+        stretch: first and end frame that are free.
+        frames: length of the blend on either side.
+    """
     at = np.arange(count)
     away = np.maximum(stretch[0] - at, at - stretch[1] + 1) / (frames + 1.0)
     return quintic_step_by_powers(away)
 
 
 def handed_over(skeleton: Skeleton, new: Pose, old: Pose, share: np.ndarray, standing: np.ndarray, fps: float) -> Pose:
-    """Root (T, 3) m and local rotations (T, J, 4) that are `new` where share (T,) is 0 and `old` where it is 1.
+    """Blend a new motion into an old one without sliding feet.
 
-    new, old: root and rotations of T frames; what `old` has where share is 0 counts for nothing. standing (T, 2, 2)
-    bool: heels and toes, left and right, that stand."""
+    Args:
+        skeleton: the skeleton.
+        new: root (T, 3) m and local rotations (T, J, 4) where the share is 0.
+        old: the same where the share is 1; not used where it is 0.
+        share: (T,) of the old motion.
+        heel_toe_contacts: (T, 2, 2) bool, heel and toe of the left and right foot in contact.
+        fps: frames per second.
+    Returns:
+        Root (T, 3) m and local rotations (T, J, 4).
+    """
     root = new[0] + share[:, None] * (old[0] - new[0])
     rotations = quaternion.slerp(_signed_like(new[1], old[1], share), old[1], share[:, None])
     body = Body.posed(skeleton, root, rotations)
@@ -133,9 +173,17 @@ def handed_over(skeleton: Skeleton, new: Pose, old: Pose, share: np.ndarray, sta
 
 
 def stepped_over(skeleton: Skeleton, pose: Pose, standing: np.ndarray, stretch: tuple[int, int], fps: float) -> Pose:
-    """Root (T, 3) m and local rotations (T, J, 4) with feet that stand and step within the frames first .. end of
-    `stretch`, and are as they were elsewhere, bit for bit. standing (T, 2, 2) bool: heels and toes, left and right,
-    that stand in whichever motion is shown most."""
+    """Plant the feet and let them step within a stretch; all other frames stay bit for bit.
+
+    Args:
+        skeleton: the skeleton.
+        pose: root (T, 3) m and local rotations (T, J, 4).
+        heel_toe_contacts: (T, 2, 2) bool, heel and toe contacts of the motion that is shown most.
+        stretch: first and end frame.
+        fps: frames per second.
+    Returns:
+        Root (T, 3) m and local rotations (T, J, 4).
+    """
     first, end = stretch
     around, joins = int(_AROUND * fps), max(int(round(_JOINS * fps)), 1)
     if end - first < 2 * joins + 3:
@@ -157,10 +205,11 @@ def stepped_over(skeleton: Skeleton, pose: Pose, standing: np.ndarray, stretch: 
 
 
 def _sunk(skeleton: Skeleton, limb: Limb, place, foot, motions: list[np.ndarray], share) -> np.ndarray:
-    """(T,) m by which a foot's joints would be below the ground, which is at height 0, and below where either motion
-    has them: what a standing foot is shifted and turned by fades as it lifts, and may take its toes down.
+    """Compute how far (T,) m a foot's joints lie below the ground (height 0) and below where either motion has them.
 
-    place (T, 3) m and foot (T, 4): of the ankle, world; motions: joints' places (T, J, 3) m of the new and the old one.
+    The shift and turn of a foot in contact fade as it lifts, and may take its toes down.
+    place (T, 3) m and foot (T, 4): of the ankle, world; motions: joint positions (T, J, 3) m of the new and the old
+    one.
     """
     toes = [limb.toe] if limb.toe is not None and skeleton.parents[limb.toe] == limb.foot else []
     new, old = (places[:, [limb.foot, *toes], 2].min(axis=1) for places in motions)
@@ -170,19 +219,22 @@ def _sunk(skeleton: Skeleton, limb: Limb, place, foot, motions: list[np.ndarray]
 
 
 def _offsets(feet: list[np.ndarray], share: np.ndarray, carries: np.ndarray, fps: float) -> Pose:
-    """Shift (T, 3) m and turn (T, 4) that bring a new foot to where the old one is, wherever that is known; feet: place
-    and rotation of the new one and of the old one."""
+    """Compute the shift (T, 3) m and turn (T, 4) that bring a new foot to where the old one is, wherever that is known.
+
+    feet: place and rotation of the new foot and of the old one.
+    """
     place, turn, old_place, old_turn = feet
     known = share > 0.0
     away = quaternion.to_rotation_vector(quaternion.multiply(old_turn, quaternion.inverse(turn)))
     kept = np.where(known[:, None], np.column_stack([old_place - place, away]), np.nan)
+    # six columns, metres and radians, solved together: they stay constant while the foot is in contact
     found = shift(np.zeros((len(place) - 1, 6)), carries, 30.0 / fps, kept)
     found[known] = kept[known]
     return found[:, :3], quaternion.from_rotation_vector(found[:, 3:])
 
 
 def _signed_like(rotations: np.ndarray, old: np.ndarray, share: np.ndarray) -> np.ndarray:
-    """Sign-continuous rotations (T, J, 4) whose signs are the old ones' where these begin to count."""
+    """Make rotations (T, J, 4) continuous in sign, with the sign of the old ones where these begin to count."""
     rotations = quaternion.continuous(rotations)
     known = np.flatnonzero(share > 0.0)
     if not len(known):

@@ -1,4 +1,4 @@
-"""Where ball and body meet: where the ball goes within its noise, how far the body is from it, and the ball's path."""
+"""Geometry of ball contact: where the ball may be within its noise, how far the body is from it, its trajectory."""
 
 from __future__ import annotations
 
@@ -13,23 +13,29 @@ from ...base.vectors import unit_vectors
 from ...motion.quaternion import turned_about_up
 from ...motion.track import BALL_RADIUS
 
-BALL_SECONDS = 0.3  # before and after a key moment over which the ball's shift grows and fades
-_SLACK = 0.06  # metres that the ball may be above or below where the part would strike it squarely
-_ANGLES = np.radians([0.0, 20.0, -20.0, 40.0, -40.0, 60.0, -60.0])  # about the vertical, tried
-_ALONG = (0.5, 0.2, 0.8)
-_ANGLE_COST = 0.08  # metres of moved foot that a radian off the part's own direction is worth,
-_ALONG_COST = 0.1  # that the other end of the foot is,
-_INSIDE_COST = 15.0  # a metre of ball within the other leg,
-_MISS_COST = 3.0  # and a metre that the part cannot be moved
+BALL_SECONDS = 0.3  # s before and after a key moment over which the ball's shift grows and fades
+_SLACK = 0.06  # m that the ball may be above or below where the part would strike it squarely
+_ANGLES = np.radians([0.0, 20.0, -20.0, 40.0, -40.0, 60.0, -60.0])  # about the vertical, that are tried
+_ALONG = (0.5, 0.2, 0.8)  # shares of the part's line that are tried
+# costs in metres by which the foot is moved
+_ANGLE_COST = 0.08  # per radian off the part's own direction
+_ALONG_COST = 0.1  # per share of the line off its middle
+_INSIDE_COST = 15.0  # per metre of ball inside the other leg
+_MISS_COST = 3.0  # per metre that the part cannot be moved
 _GRAVITY = 9.81  # m/s^2
-_ON_GROUND = 0.02  # metres above its radius
+_ON_GROUND = 0.02  # m above its radius up to which a ball counts as on the ground
 
 Line = tuple[np.ndarray, np.ndarray]
 
 
 @dataclass(frozen=True)
 class Room:
-    """How far the ball may be moved: in all, and of that up or down, m."""
+    """How far the ball may be moved.
+
+    Attributes:
+        total: m, in all.
+        vertical: m of that, up or down.
+    """
 
     whole: float
     upright: float
@@ -37,8 +43,12 @@ class Room:
 
 @dataclass(frozen=True, eq=False)
 class Aim:
-    """Where a part strikes. direction (3,) level, unit: from part to ball. along: share of the way from the start of
-    the part's line (the ankle) to its end (the toes)."""
+    """Where a part strikes the ball.
+
+    Attributes:
+        direction: (3,) level, unit, from part to ball.
+        along: share of the part's line, from its start (the ankle) to its end (the toes).
+    """
 
     direction: np.ndarray
     along: float = 0.5
@@ -46,7 +56,12 @@ class Aim:
 
 @dataclass(frozen=True, eq=False)
 class Meeting:
-    """ball (N, 3) m: its centre, moved. need (N, 3) m: what the part has to move to touch it."""
+    """A ball and a part brought together by each of N aims.
+
+    Attributes:
+        ball: (N, 3) m, its centre after it was moved.
+        need: (N, 3) m, what the part still has to move to touch it.
+    """
 
     ball: np.ndarray
     need: np.ndarray
@@ -56,11 +71,18 @@ def best_aim(
     line: Line, radius: float, direction: np.ndarray, rise: float, ball: np.ndarray, room: Room,
     avoid: Sequence[tuple[Line, float]], possible: Callable[[np.ndarray], np.ndarray],
 ) -> Aim:
-    """The aim that asks least of the body, of those within 60 degrees of `direction`: inside, instep, outside.
+    """Choose the aim that needs the least of the body, within 60 degrees of a direction: inside, instep or outside.
 
-    line: ends (3,) m of the part's line, radius its own, m; direction (3,) level, unit: where the part strikes; rise:
-    sine of the ball's elevation as seen from the part; ball (3,) m as measured; avoid: (line, radius) that it may not
-    lie in; possible: of a move (3,) m of the part, what the body can make of it."""
+    Args:
+        line: ends (3,) m of the part's line.
+        radius: m, the part's own.
+        direction: (3,) level, unit, where the part strikes.
+        rise: sine of the ball's elevation as seen from the part.
+        ball: (3,) m as measured.
+        ball_range: how far the ball may be moved.
+        avoid: (line, radius) of parts that the ball must not lie in.
+        possible: returns, for a move (3,) m of the part, the move that the body can make.
+    """
     shares = _ALONG[: 1 if rise else None]
     aims = [Aim(turned_about_up(direction, angle), along) for angle in _ANGLES for along in shares]
     found = meetings(line, radius, aims, rise=rise, ball=ball, room=room, avoid=avoid)
@@ -70,6 +92,7 @@ def best_aim(
     for other, own in avoid:
         least += _INSIDE_COST * np.maximum(-ball_gap(other, own, found.ball), 0.0)
     best, cost = aims[0], np.inf
+    # from the lowest bound on: `possible` is expensive and only adds cost, so stop where no bound is lower
     for number in np.argsort(least, kind="stable"):
         if least[number] >= cost:
             break
@@ -83,18 +106,32 @@ def meetings(
     line: Line, radius: float, aims: Sequence[Aim], rise: float, ball: np.ndarray, room: Room,
     avoid: Sequence[tuple[Line, float]] = (),
 ) -> Meeting:
-    """Ball and part meet as aimed, by each of N aims: the ball moves as far as it may and out of what it is to avoid,
-    the part the rest."""
+    """Bring ball and part together by each of N aims.
+
+    The ball moves as far as it may, and out of what it must avoid; the part moves the rest.
+
+    Args:
+        line: ends (3,) m of the part's line.
+        radius: m, the part's own.
+        aims: N aims.
+        rise: sine of the ball's elevation as seen from the part.
+        ball: (3,) m as measured.
+        ball_range: how far the ball may be moved.
+        avoid: (line, radius) of parts that the ball must not lie in.
+    """
     along = np.array([aim.along for aim in aims])[:, None]
     start = line[0] + along * (line[1] - line[0])
     above = rise * (radius + BALL_RADIUS)
     height = np.clip(start[:, 2] + above, ball[2] - room.upright, ball[2] + room.upright)
     height = np.maximum(height, BALL_RADIUS)
+    # what the height lacks after the ball has moved up or down: within _SLACK it is ignored, beyond it the part
+    # rises
     lift = height - start[:, 2] - above
     lift = np.stack([0.0 * lift, 0.0 * lift, lift - np.clip(lift, -_SLACK, _SLACK)], axis=1)
     raised = tuple((end + lift)[:, None] for end in line)
     start[:, 2] = height
     touching = touching_places(raised, radius, start, np.array([aim.direction for aim in aims]))
+    # the part of `ball_range.total` that is left for level moves
     level = np.sqrt(np.maximum(room.whole**2 - (height - ball[2]) ** 2, 0.0))
     away = touching[:, :2] - ball[:2]
     places = np.concatenate([ball[:2] + _within(away, level), height[:, None]], axis=1)
@@ -106,13 +143,23 @@ def meetings(
 
 
 def _within(way: np.ndarray, most: np.ndarray) -> np.ndarray:
-    """Ways (N, 2) m no longer than `most` (N,) m."""
+    """Limit level moves (N, 2) m to lengths `limit` (N,) m."""
     return way * np.minimum(1.0, most / np.maximum(np.linalg.norm(way, axis=1), 1e-12))[:, None]
 
 
 def touching_places(line: Line, radius: float, start: np.ndarray, direction: np.ndarray) -> np.ndarray:
-    """The centres (N, 3) of balls that touch surfaces with lines (N, 1, 3), on the rays from `start` (N, 3), which is
-    inside, along `direction` (N, 3); searched on ever finer grids, to some micrometres within a metre."""
+    """Find the centres of balls that touch surfaces, on rays that begin inside them.
+
+    Searched on three grids, each 64 times finer, to some micrometres within a metre.
+
+    Args:
+        line: ends (N, 1, 3) m of the surfaces' lines.
+        radius: m of the surfaces.
+        start: (N, 3) m, inside.
+        direction: (N, 3) unit.
+    Returns:
+        (N, 3) m.
+    """
     near, step = np.zeros(len(start)), 1.0
     for _ in range(3):
         ways = near[:, None] + step * np.linspace(0.0, 1.0, 65)
@@ -123,7 +170,16 @@ def touching_places(line: Line, radius: float, start: np.ndarray, direction: np.
 
 
 def held_meeting(hands: np.ndarray, radius: float, ball: np.ndarray, room: Room) -> tuple[np.ndarray, np.ndarray]:
-    """A ball between both hands: its place (3,) m, and what each hand has to move (2, 3) m to touch it."""
+    """Place a ball between both hands.
+
+    Args:
+        hands: (2, 2, 3) m, ends of the line of each hand.
+        radius: m of a hand.
+        ball: (3,) m as measured.
+        ball_range: how far the ball may be moved.
+    Returns:
+        Its place (3,) m, and what each hand has to move (2, 3) m to touch it.
+    """
     places = np.array([0.5 * (start + end) for start, end in hands])
     middle = places.mean(axis=0)
     height = max(np.clip(middle[2], ball[2] - room.upright, ball[2] + room.upright), BALL_RADIUS)
@@ -135,8 +191,17 @@ def held_meeting(hands: np.ndarray, radius: float, ball: np.ndarray, room: Room)
 
 
 def lofted(ball: np.ndarray, frame: float, height: float, free: np.ndarray, fps: float) -> np.ndarray:
-    """The ball's path (T, 3) m with an arc of free flight through `height` m at `frame` where `free` (T,) says that its
-    height is not known."""
+    """Give the ball's trajectory an arc of free flight through a height where its height is not known.
+
+    Args:
+        ball: (T, 3) m.
+        frame: where the arc has its top.
+        height: m at the top.
+        free: (T,) bool, where the height is not known.
+        fps: frames per second.
+    Returns:
+        (T, 3) m; never lower than before.
+    """
     seconds = (np.arange(len(ball)) - frame) / fps
     arc = height - 0.5 * _GRAVITY * seconds**2
     out = ball.copy()
@@ -147,9 +212,17 @@ def lofted(ball: np.ndarray, frame: float, height: float, free: np.ndarray, fps:
 def shifted(
     ball: np.ndarray, held: tuple[int, int], places: np.ndarray, bounds: tuple[int, int], fps: float
 ) -> np.ndarray:
-    """The ball's path (T, 3) m led through `places` (2, 3) m at the two frames `held`, and eased back to where it was.
+    """Lead the ball's trajectory through two places, and ease it back to where it was.
 
-    bounds: frames at which it has to be back, beside BALL_SECONDS. Never below its radius."""
+    Args:
+        ball: (T, 3) m.
+        held: the two frames of the touch.
+        places: (2, 3) m at these frames.
+        bounds: frames at which it has to be back, if that is within BALL_SECONDS.
+        fps: frames per second.
+    Returns:
+        (T, 3) m; never below the ball's radius.
+    """
     reach = BALL_SECONDS * fps
     low, high = max(held[0] - reach, bounds[0]), min(held[1] + reach, bounds[1])
     frames = np.arange(max(int(np.ceil(low)), 0), min(int(high), len(ball) - 1) + 1)
@@ -162,9 +235,17 @@ def shifted(
 
 
 def led(ball: np.ndarray, held: tuple[int, int], places: np.ndarray, bounds: tuple[int, int]) -> np.ndarray:
-    """The ball's path (T, 3) m led through `places` (2, 3) m at the two frames `held`, from and to the frames `bounds`
-    at which it changes its course anyway: in between its velocity changes by the same at every frame, so that what
-    flies or rolls goes on doing so."""
+    """Lead the ball's trajectory through two places, from and to frames at which it changes its course anyway.
+
+    Between them its velocity changes by the same at every frame, so that a flying ball keeps flying and a rolling one
+    rolling.
+
+    Args:
+        ball: (T, 3) m.
+        held: the two frames of the touch.
+        places: (2, 3) m at these frames.
+        bounds: frames before and after at which the course changes.
+    """
     shifts = places - ball[list(held)]
     out = lead(lead(ball, held[0], bounds[0], shifts[0]), held[1], bounds[1], shifts[1])
     out[list(held)] = places
@@ -172,14 +253,23 @@ def led(ball: np.ndarray, held: tuple[int, int], places: np.ndarray, bounds: tup
 
 
 def lead(ball: np.ndarray, frame: int, anchor: int, shift: np.ndarray) -> np.ndarray:
-    """The ball's path (T, 3) m moved by `shift` (3,) m at `frame`, by nothing at `anchor` and beyond, and evenly less
-    in between. Its height is what it was as soon as it comes to the ground."""
+    """Move the ball's trajectory at a frame, fading evenly to nothing at an anchor frame.
+
+    Args:
+        ball: (T, 3) m.
+        frame: where it moves by the whole shift.
+        anchor: from where on it does not move; before or after `frame`.
+        shift: (3,) m.
+    Returns:
+        (T, 3) m; its height is the old one from the first frame on the ground.
+    """
     between, out = np.arange(frame, anchor, 1 if anchor > frame else -1), ball.copy()
     between = between[(between >= 0) & (between < len(ball))]
     if not len(between):
         return out
     away = np.abs(between - frame)
     out[between, :2] += (1.0 - away / abs(anchor - frame))[:, None] * shift[:2]
+    # the height fades until the ball lands or the anchor, whichever comes first
     low = np.flatnonzero(ball[between, 2] <= BALL_RADIUS + _ON_GROUND)
     lands = min(float(away[low[0]]) if len(low) else np.inf, float(abs(anchor - frame)))
     fades = np.maximum(1.0 - away / lands, 0.0) if lands else (away == 0).astype(float)
@@ -188,11 +278,15 @@ def lead(ball: np.ndarray, frame: int, anchor: int, shift: np.ndarray) -> np.nda
 
 
 def eased(rising: np.ndarray, falling: np.ndarray) -> np.ndarray:
-    """0 .. 1 .. 0, twice continuously differentiable: rising and falling (N,) are the straight ramps, 1 and more
-    inside."""
+    """Ease 0 .. 1 .. 0, twice continuously differentiable.
+
+    Args:
+        rising: (N,) straight ramp from 0 on, 1 and more inside.
+        falling: (N,) straight ramp down to 0, 1 and more inside.
+    """
     return quintic_step_by_powers(np.minimum(rising, falling))
 
 
 def eased_around(frames: np.ndarray, low: float, first: float, last: float, high: float) -> np.ndarray:
-    """0 .. 1 .. 0, twice continuously differentiable: 1 in frames first .. last, 0 up to `low` and from `high` on."""
+    """Ease 0 .. 1 .. 0, twice differentiable: 1 in frames first .. last, 0 up to `low` and from `high` on."""
     return eased((frames - low) / max(first - low, 1e-9), (high - frames) / max(high - last, 1e-9))

@@ -1,9 +1,9 @@
-"""A motion laid on a track: which way the body faces, where its root goes and how it leans, at every frame.
+"""Place a motion on a track: its heading, root and lean, at every frame.
 
-The body's own sway about its path is kept: the root is the track plus the sway, turned with the body. Facing is not the
-direction of travel; what is kept is the angle between the two that the recording had. At a touch the body turns so that
-what strikes points at the ball (players turn into their kicks), it leans into curves as far as the recording does not,
-and it yields a little where its feet would slide.
+The body's own sway about its path is kept: the root is the track plus the sway, turned with the body. Heading is not
+the direction of travel; the angle between the two that the recording had is kept. At a touch the body turns so that
+the striking part points at the ball, it leans into curves as far as the recording does not, and it yields a little
+where its feet would slide.
 """
 
 from __future__ import annotations
@@ -25,35 +25,36 @@ from ...motion.skeleton import Skeleton
 from ...motion.track import zero_phase_hann
 from .strike import Touch
 
-TURN_WEIGHT = 12.0  # of the recording's own turning per frame, against the direction of travel
-OFF_THE_FEET = 40.0  # times firmer, where the body flies, lies or kneels and so cannot turn at will
-_FLIGHT_SECONDS = 0.3  # without a foot on the ground; the flights of running are shorter
-_LOW = 0.6  # of the usual height of the hips
-STANDS = 0.3  # m/s; below it a direction of travel says nothing about facing
+TURN_WEIGHT = 12.0  # weight of the recording's own turning per frame, against the direction of travel
+OFF_THE_FEET = 40.0  # factor on it where the body flies, lies or kneels and so cannot turn at will
+_FLIGHT_SECONDS = 0.3  # s without a foot on the ground that count as flight; the flights of running are shorter
+_LOW = 0.6  # share of the usual height of the hips below which a body lies or kneels
+STANDS = 0.3  # m/s below which a direction of travel says nothing about the heading
 
 FAINT, AIM = 1e-4, 0.004
-"""Weights of the pull to where a standing body would turn: at any speed, and at rest (half way within 1.3 s)."""
+"""Weights of the pull to where a body in place would turn: at any speed, and at rest (half of the turn in 1.3 s)."""
 
-HOLD = 1e6  # weight of a facing that is given: so much more than all else that it stays
-ROOT_WINDOW = 1.5  # s, the window within which the root keeps to the track
+HOLD = 1e6  # weight of a given heading, so large that it stays
+ROOT_WINDOW = 1.5  # s, the window through which the root lies on the track
 
 MOST_TURN_TO_BALL = np.radians(60.0)
 _REACHED = 0.25  # m between ball and part that the ball's noise and the limb make up for (`strike`)
-_BALL_TURN_SECONDS = 0.5  # before and after the key frame over which the turn grows and fades
-_NEAR, _CLEAR = 0.1, 0.35  # m from the hips: below the first a direction says nothing, above the second all
+_BALL_TURN_SECONDS = 0.5  # s before and after the key frame over which the turn grows and fades
+_NEAR, _CLEAR = 0.1, 0.35  # m from the hips: below the first a direction has no weight, above the second all
 
 GRAVITY = 9.81
 LEGS_LEAN, TRUNK_LEAN = 0.5, 0.2
 """Share of a / g by which legs and trunk lean; recorded legs lean by 0.7 to 0.8 of it and the trunk by a quarter."""
 
-MOST_LEAN = 0.2  # rad that are added at most
-UPRIGHT_SPEED = (1.5, 3.0)  # m/s below which a body does not lean, and from which on all of it counts
-_LEAN_SECONDS = 0.6
+MOST_LEAN = 0.2  # rad, largest lean that is added to the legs
+UPRIGHT_SPEED = (1.5, 3.0)  # m/s: no lean below the first, all of it from the second on
+_LEAN_SECONDS = 0.6  # s, window that smooths the lean
 
-_FOOT_WEIGHT = 0.1  # weight of a standing foot's movement: with more, the pelvis surges and stops with every step
+_FOOT_WEIGHT = 0.1  # weight of a planted foot's movement; with more, the pelvis surges and stops with every step
 _STIFF, _STAY = (2.0, 0.2), (0.02, 5e-4)
-"""Weights of the third difference and of the whole, for metres of the root and for radians of facing."""
+"""Weights of the third difference and of the value, for metres of the root and for radians of heading."""
 
+# columns of the unknowns of one frame
 _ROOT_X, _ROOT_Y, _TURN, _UNKNOWNS = 0, 1, 2, 3
 
 
@@ -61,15 +62,24 @@ def facing(
     direction: np.ndarray, speed: np.ndarray, velocity: np.ndarray, turn: np.ndarray, kept: np.ndarray | None = None,
     firm: np.ndarray | float = 1.0, aim: np.ndarray | None = None,
 ) -> np.ndarray:
-    """(T,) facing in radians, unwrapped: the least squares compromise between travel and the recording's own turning.
+    """Solve the heading: the least squares compromise between travel and the recording's own turning.
 
-    direction (T,) of travel on the track and speed (T,) m/s there; velocity (T, 2) m/s of the recording in its facing
-    frame; turn (T,) radians the recording turned since the frame before. At speed the body keeps the recording's angle
-    to the direction of travel; where either stands still there is no such angle and the recording's turning decides,
-    with a little of `aim`. Every term is quadratic, so the whole is one tridiagonal system. kept: (T,) radians that the
-    facing has to be, NaN where it is free: what lies around a stretch that is constructed again. firm (T,): how many
-    times firmer than usual the recording's own turning is followed (`turning_firmness`). aim: (T,) radians that a body
-    which stands slowly turns to."""
+    At speed the body keeps the recording's angle to the direction of travel; where either is in place there is no such
+    angle and the recording's turning decides, with a little of `aim`. Every term is quadratic, so the whole is one
+    tridiagonal system.
+
+    Args:
+        direction: (T,) rad, of travel on the track.
+        speed: (T,) m/s on the track.
+        velocity: (T, 2) m/s of the recording in its facing frame.
+        turn: (T,) rad that the recording turned since the frame before.
+        given: (T,) rad that the heading has to be, NaN where it is free.
+        firm: (T,) how many times firmer than usual the recording's turning is followed (`compute_turning_firmness`).
+        aim: (T,) rad that a body in place turns to slowly.
+    Returns:
+        (T,) rad, unwrapped.
+    """
+    # the heading that keeps the recorded angle between travel and facing
     goal = direction - arctan2(velocity[:, 1], velocity[:, 0])
     trust = _moving(speed) ** 2 * _moving(np.linalg.norm(velocity, axis=1)) ** 2
     goal, trust = _with_aim(goal, trust, speed, aim, turn)
@@ -100,8 +110,15 @@ def follow_turning(
 
 
 def turning_firmness(standing: np.ndarray, height: np.ndarray, fps: float) -> np.ndarray:
-    """(T,) `firm` of `facing`: OFF_THE_FEET where no foot stands for a while or the hips are low, else 1; standing
-    (T, 2, 2) bool of heels and toes, height (T,) m of the root."""
+    """Compute how firmly the recording's turning is followed: AIRBORNE_FIRMNESS in flight or with low hips, else 1.
+
+    Args:
+        heel_toe_contacts: (T, 2, 2) bool, heel and toe contacts.
+        height: (T,) m of the root.
+        fps: frames per second.
+    Returns:
+        (T,) factor.
+    """
     off = ~standing.any(axis=(1, 2))
     out = np.where(height < _LOW * np.median(height), OFF_THE_FEET, 1.0)
     for first, last in runs(off):
@@ -111,12 +128,12 @@ def turning_firmness(standing: np.ndarray, height: np.ndarray, fps: float) -> np
 
 
 def _moving(speed: np.ndarray) -> np.ndarray:
-    """(T,) 0 for bodies that stand, 1 from 1 m/s on: how much a velocity says about where its body goes."""
+    """Compute how much a velocity says about where a body moves: (T,) 0 in place, 1 from 1 m/s on."""
     return np.clip((speed - STANDS) / (1.0 - STANDS), 0.0, 1.0)
 
 
 def _with_aim(goal: np.ndarray, trust: np.ndarray, speed: np.ndarray, aim: np.ndarray | None, turn: np.ndarray):
-    """Goals (T,) and their weights with the pull towards `aim`, felt only where little else is known."""
+    """Add the pull towards `aim` to goals (T,) and their weights; it has an effect only where little else is known."""
     if aim is None:
         return goal, trust + FAINT
     pull = FAINT + AIM * np.clip(1.0 - speed, 0.0, 1.0) ** 2
@@ -126,22 +143,41 @@ def _with_aim(goal: np.ndarray, trust: np.ndarray, speed: np.ndarray, aim: np.nd
 
 
 def _unwrapped(goal: np.ndarray, turn: np.ndarray) -> np.ndarray:
-    """Angles without jumps of a full turn relative to what the recording's own turning leads one to expect."""
+    """Unwrap angles: remove full turns against what the recording's own turning lets one expect."""
     expected = np.cumsum(turn)
     return np.unwrap(goal - expected) + expected
 
 
 def root_with_sway(place: np.ndarray, sway: np.ndarray, angle: np.ndarray) -> np.ndarray:
-    """(T, 2) root on the ground: `place` (T, 2) plus sway (T, 2, in the facing frame) turned by facing `angle` (T,)."""
+    """Add the sway to a path.
+
+    Args:
+        place: (T, 2) m, path on the ground, world.
+        sway: (T, 2) m in the facing frame.
+        angle: (T,) rad, heading.
+    Returns:
+        (T, 2) m, root on the ground, world.
+    """
     return place + quaternion.turned_level(sway, angle)
 
 
 def pulled_to_track(
     root: np.ndarray, track: np.ndarray, fps: float, window: float = ROOT_WINDOW, rounds: int = 4
 ) -> np.ndarray:
-    """(T, 2) root without what drifts slowly from the track (T, 2): the difference of the two, both seen through a
-    Hann window of `window` seconds (../shared/metrics.md, root error), is removed `rounds` times; once would leave a
-    third of it, since the window is not sharp."""
+    """Remove the slow drift of a root from its track.
+
+    The difference of the two, both seen through a Hann window (../shared/metrics.md, root error), is removed `rounds`
+    times; once would leave a third of it, since the window has no sharp edge.
+
+    Args:
+        root: (T, 2) m, world.
+        track: (T, 2) m, world.
+        fps: frames per second.
+        window: s.
+        rounds: how many times.
+    Returns:
+        (T, 2) m, world.
+    """
     smooth = zero_phase_hann(track, fps, window)
     for _ in range(rounds):
         root = root - (zero_phase_hann(root, fps, window) - smooth)
@@ -151,20 +187,32 @@ def pulled_to_track(
 def turn_to_ball(
     skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray, ball: np.ndarray, touches: Sequence[Touch], fps: float
 ) -> np.ndarray:
-    """(T,) radians to turn the body by, about its root, at most MOST_TURN_TO_BALL at any touch.
+    """Compute the turn of the body about its root that points the striking foot at the ball.
 
-    root (T, 3) m and rotations (T, J, 4) local: the motion laid out; ball (T, 3) m, NaN where there is none. Of two
-    parts that may strike, the faster one's place counts."""
+    Of two feet that may strike, the place of the faster one counts.
+
+    Args:
+        skeleton: the skeleton.
+        root: (T, 3) m, world.
+        rotations: (T, J, 4) local, the constructed motion.
+        ball: (T, 3) m, world, NaN where it is unknown.
+        touches: where the body may meet the ball.
+        fps: frames per second.
+    Returns:
+        (T,) rad, at most MAX_TURN_TO_BALL at any touch.
+    """
     turn, at = np.zeros(len(root)), np.arange(len(root))
     for touch in touches:
         offset = _turn_at_touch(skeleton, root, rotations, ball, touch)
         bump = np.clip(1.0 - np.abs(at - touch.frame) / (_BALL_TURN_SECONDS * fps), 0.0, 1.0)
+        # quintic ease; where two touches overlap the larger turn wins
         grown = offset * bump**3 * (10.0 - 15.0 * bump + 6.0 * bump**2)
         turn = np.where(np.abs(grown) > np.abs(turn), grown, turn)
     return turn
 
 
 def _turn_at_touch(skeleton: Skeleton, root, rotations, ball, touch: Touch) -> float:
+    """Compute the turn, rad, at one touch; 0 without a foot that strikes or a known ball."""
     frame = int(np.clip(round(touch.frame), 1, len(root) - 2)) if len(root) > 2 else 0
     found = [surface for surface in surfaces(skeleton, touch.words) if surface.part == "foot"]
     if len(root) < 3 or not found or not np.isfinite(ball[frame]).all():
@@ -177,8 +225,9 @@ def _turn_at_touch(skeleton: Skeleton, root, rotations, ball, touch: Touch) -> f
 
 
 def _least_turn(part: np.ndarray, goal: np.ndarray, apart: float) -> float:
-    """As much of the angle `apart` as brings a part (2,) within _REACHED of its goal (2,), all where none does."""
+    """Compute the smallest part of `apart` that brings a part (2,) within _REACH of its goal (2,), or all of it."""
     p, g = float(np.linalg.norm(part)), float(np.linalg.norm(goal))
+    # law of cosines: the angle at which part and goal are _REACH apart
     free = np.arccos(np.clip((p * p + g * g - _REACHED**2) / max(2.0 * p * g, 1e-9), 0.0, 1.0))
     return float(np.sign(apart) * max(0.0, abs(apart) - free))
 
@@ -187,17 +236,26 @@ def missing_lean(
     speed: np.ndarray, direction: np.ndarray, velocity: np.ndarray, turn: np.ndarray, seams: np.ndarray, fps: float,
     slow: tuple[float, float] = UPRIGHT_SPEED,
 ) -> np.ndarray:
-    """(T,) a / g, to the left, that the track asks for beyond what the recording had; softly limited so that legs get
-    at most MOST_LEAN, and nothing below UPRIGHT_SPEED.
+    """Compute the lean that the track needs beyond what the recording has, limited softly.
 
-    speed (T,) m/s and direction (T,) in radians of travel on the track; velocity (T, 2) m/s of the recording in its
-    facing frame and turn (T,) radians since the frame before; seams (S,): frames across which a recording's direction
-    says nothing; slow: as UPRIGHT_SPEED."""
+    Args:
+        speed: (T,) m/s on the track.
+        direction: (T,) rad, of travel on the track.
+        velocity: (T, 2) m/s of the recording in its facing frame.
+        turn: (T,) rad that the recording turned since the frame before.
+        transitions: (S,) frames of transitions, across which a recording's direction says nothing.
+        fps: frames per second.
+        upright_speed: m/s, as UPRIGHT_SPEED.
+    Returns:
+        (T,) lateral acceleration over g, to the left; legs get at most MAX_LEAN, nothing below UPRIGHT_SPEED.
+    """
     own_speed = np.linalg.norm(velocity, axis=1)
+    # turning of the recording's direction of travel, per frame: of the facing plus of the angle between the two
     own_turn = turn + np.diff(arctan2(velocity[:, 1], velocity[:, 0]), prepend=arctan2(*velocity[:1, ::-1].T))
     own_turn[seams] = own_turn[np.minimum(seams + 1, len(turn) - 1)]
     asked = speed * quaternion.wrapped(np.diff(direction, prepend=direction[:1]))
     fast = np.clip((np.minimum(speed, own_speed) - slow[0]) / (slow[1] - slow[0]), 0.0, 1.0)
+    # speed times turning per frame is lateral acceleration; what the recording has is taken off
     turns = asked - own_speed * quaternion.wrapped(own_turn)
     lean = zero_phase_hann((fast * np.clip(turns * fps / GRAVITY, -1.0, 1.0))[:, None], fps, _LEAN_SECONDS)[:, 0]
     most = MOST_LEAN / LEGS_LEAN
@@ -205,16 +263,34 @@ def missing_lean(
 
 
 def bend_forward(skeleton: Skeleton, rotations: np.ndarray, direction: np.ndarray, angle: np.ndarray) -> np.ndarray:
-    """Local rotations (T, J, 4) of a body whose trunk leans forward, in its direction of travel (T,), by angle (T,)."""
+    """Bend the trunk forward in the direction of travel.
+
+    Args:
+        skeleton: the skeleton.
+        rotations: (T, J, 4) local.
+        direction: (T,) rad, of travel.
+        angle: (T,) rad.
+    Returns:
+        (T, J, 4) local.
+    """
     out, left = rotations.copy(), np.column_stack([-np.sin(direction), np.cos(direction), np.zeros(len(direction))])
     _turn_trunk(skeleton, rotations, left, angle, out)
     return out
 
 
 def lean_into_curves(skeleton: Skeleton, rotations: np.ndarray, direction: np.ndarray, lean: np.ndarray) -> np.ndarray:
-    """Local rotations (T, J, 4) of a body that leans to the left of its direction of travel (T,) by lean (T,) as a / g.
+    """Lean a body to the left of its direction of travel.
 
-    The body turns about its root, legs and all, and the trunk turns back a part of the way above the hips."""
+    The body turns about its root, legs included, and the trunk turns back by a part of that above the hips.
+
+    Args:
+        skeleton: the skeleton.
+        rotations: (T, J, 4) local.
+        direction: (T,) rad, of travel.
+        lean: (T,) lateral acceleration over g.
+    Returns:
+        (T, J, 4) local.
+    """
     out, axis = rotations.copy(), np.column_stack([np.cos(direction), np.sin(direction), np.zeros(len(direction))])
     out[:, 0] = quaternion.multiply(quaternion.about_axis(axis, -LEGS_LEAN * lean), rotations[:, 0])
     _turn_trunk(skeleton, rotations, axis, (LEGS_LEAN - TRUNK_LEAN) * lean, out)
@@ -222,7 +298,7 @@ def lean_into_curves(skeleton: Skeleton, rotations: np.ndarray, direction: np.nd
 
 
 def _turn_trunk(skeleton: Skeleton, rotations: np.ndarray, axis: np.ndarray, angle: np.ndarray, out: np.ndarray):
-    """Into `out`: the first joint of the spine turned about axes (T, 3) in the world by angle (T,)."""
+    """Turn the first joint of the spine about world axes (T, 3) by angle (T,), written into `out`."""
     spine = identify(skeleton).spine
     if spine:
         above = world_rotation(skeleton, rotations, skeleton.parents[spine[0]])
@@ -234,12 +310,22 @@ def _turn_trunk(skeleton: Skeleton, rotations: np.ndarray, axis: np.ndarray, ang
 def absorb_foot_slide(
     skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray, standing: np.ndarray, fps: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Metres (T, 2) by which the root moves on the ground, and radians (T,) by which the body turns about it.
+    """Move the root and turn the body a little so that planted feet slide less.
 
-    root (T, 3) m and rotations (T, J, 4) local: the motion laid out; standing (T, 2, 2) bool: heels and toes. With f a
-    point that stands, a its arm from the root and J a quarter turn, minimizes sum _FOOT_WEIGHT w |r' + t' J a + f'|^2
-    + _STIFF |r''', t'''|^2 + _STAY |r, t|^2, differences per frame at 30 frames per second: one banded system. The legs
-    make up for the rest (`foot_plant`); what drifts away from the track is taken back by `pulled_to_track`."""
+    With f a point in contact, a its arm from the root and J a quarter turn, it minimizes
+    sum _FOOT_WEIGHT w |r' + t' J a + f'|^2 + _STIFF |r''', t'''|^2 + _STAY |r, t|^2, with differences per frame at 30
+    frames per second: one banded system. The legs make up for the rest (`foot_plant`); `pull_to_track` removes what
+    drifts away from the track.
+
+    Args:
+        skeleton: the skeleton.
+        root: (T, 3) m, world.
+        rotations: (T, J, 4) local, the constructed motion.
+        heel_toe_contacts: (T, 2, 2) bool, heel and toe contacts.
+        fps: frames per second.
+    Returns:
+        (T, 2) m by which the root moves, and (T,) rad by which the body turns about it.
+    """
     body = identify(skeleton)
     places, _ = pose_kinematics(skeleton, root, rotations)
     count, scale = len(root), 30.0 / fps
@@ -252,6 +338,7 @@ def absorb_foot_slide(
             weight = _FOOT_WEIGHT * np.minimum(firm[1:, point], firm[:-1, point])
             one = np.ones(len(weight))
             for axis, swing in ((_ROOT_X, -arm[:, 1]), (_ROOT_Y, arm[:, 0])):
+                # unknown r (axis) and t (_TURN) of frame k with -1, of frame k + 1 (offset _UNKNOWNS) with +1
                 stencil = {axis: -one, _TURN: -swing, axis + _UNKNOWNS: one, _TURN + _UNKNOWNS: swing}
                 squares.add(stencil, weight, -moves[:, axis])
     for axis, kind in ((_ROOT_X, 0), (_ROOT_Y, 0), (_TURN, 1)):

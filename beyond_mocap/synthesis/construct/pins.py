@@ -1,10 +1,10 @@
 """Pins: a hand or foot that has to be at a place for a while, and a gaze that is turned to one.
 
-A limb comes to its pin and leaves it within FADE seconds: there it is off its own way by what it is off at the pin,
-fading away. At a pin that holds it comes to rest, at a momentary one it passes. It gets there by two-bone inverse
-kinematics (`limb`). Where the limb is too short, first the spine bends towards the pin and then the pelvis comes
-nearer, the feet held where they are; what still lacks is reported. The gaze turns the head, with it the neck and a
-little the chest, as far as a neck can. Frames without a pin keep their bits.
+A limb comes to its pin and leaves it within FADE seconds: there its offset from its own path is that at the pin, fading
+away. At a pin that holds it comes to rest, at a momentary one it passes. Two-bone inverse kinematics take it there
+(`limb`). Where the limb is too short, first the spine bends towards the pin and then the pelvis comes nearer, the feet
+held in place; what still lacks is reported. The gaze turns the head, with it the neck and a little the chest, within
+the range of a neck. Frames without a pin stay bit for bit.
 """
 
 from __future__ import annotations
@@ -24,20 +24,26 @@ from ...motion.motion import Motion, pose_kinematics
 from ...motion.skeleton import Skeleton
 from .carry import arm, joints_down, leg
 
-FADE = 0.3  # s before and behind a pin in which the body comes to it and leaves it
-MOST_BEND, MOST_SHIFT = 0.6, 0.25  # rad that the spine bends and m that the pelvis moves for a pin out of reach
-MOST_YAW, MOST_PITCH = np.radians(100.0), np.radians(55.0)  # from straight ahead of the body that a gaze turns
-STRETCH = 0.985  # of a limb's length up to which it reaches by itself
-_SOFT, _SOFT_LACK = 0.004, 0.02  # m over which limbs ease at full length, and over which the body begins to go along
-_CHEST_SHARE, _NECK_SHARE = 0.15, 0.35  # of a look's turn; the head has the rest
+FADE = 0.3  # s before and after a pin in which the body comes to it and leaves it
+MOST_BEND, MOST_SHIFT = 0.6, 0.25  # largest rad of the spine and m of the pelvis for a pin out of reach
+MOST_YAW, MOST_PITCH = np.radians(100.0), np.radians(55.0)  # largest turns of a gaze from straight ahead of the body
+STRETCH = 0.985  # share of a limb's length up to which it reaches alone
+_SOFT, _SOFT_LACK = 0.004, 0.02  # m over which limbs extend softly, and over which the body begins to follow
+_CHEST_SHARE, _NECK_SHARE = 0.15, 0.35  # of the turn of a gaze; the head has the rest
 _GLIDE = 2.0  # frames in which a limb that leaves a pin takes up the body's speed
-_MOVED = 0.02  # m that the pelvis is moved where its feet are wholly held by reaching
-_NEAR = 0.01  # m by which a foot may be moved and still counts as standing
+_MOVED = 0.02  # m of the pelvis from which on the feet are held entirely by inverse kinematics
+_NEAR = 0.01  # m by which a foot may be moved and still counts as in contact
 
 
 @dataclass(frozen=True, eq=False)
 class Stay:
-    """One pin in frames (fractional), from first to last, at a place (3,) m."""
+    """One pin in frames.
+
+    Attributes:
+        first: first frame, fractional.
+        last: last frame, fractional.
+        place: (3,) m, world.
+    """
 
     first: float
     last: float
@@ -45,22 +51,27 @@ class Stay:
 
     @property
     def frames(self) -> tuple[int, int]:
-        """The whole frames that its time touches."""
+        """First and last whole frame that the pin's time touches."""
         low = int(np.floor(self.first + 1e-6))
         return low, max(int(np.ceil(self.last - 1e-6)), low)
 
 
 @dataclass(frozen=True, eq=False)
 class Target:
-    """Where one part has to be: share (T,) of the pin at each frame, 1 where it holds and 0 where there is none; place
-    (T, 3) m of the pin, the next one's or the last one's where the share is below 1; stays: in the order of time."""
+    """Where one part of the body has to be over T frames.
+
+    Attributes:
+        share: (T,) of the pin at each frame, 1 where it holds and 0 where there is none.
+        place: (T, 3) m of the pin, of the next or last one where the share is below 1.
+        pins: the pins, in order of time.
+    """
 
     share: np.ndarray
     place: np.ndarray
     stays: tuple[Stay, ...]
 
     def cut(self, low: int, high: int) -> "Target":
-        """The frames low .. high."""
+        """Cut out the frames low .. high."""
         inside = [stay for stay in self.stays if low <= stay.frames[0] and stay.frames[1] < high]
         moved = tuple(Stay(stay.first - low, stay.last - low, stay.place) for stay in inside)
         return Target(self.share[low:high], self.place[low:high], moved)
@@ -68,8 +79,14 @@ class Target:
 
 @dataclass(frozen=True, eq=False)
 class Pinned:
-    """rotations (T, J, 4), root (T, 3) m, contacts (T, 2) bool without those of feet on their way to a pin; miss: m, or
-    radians for a gaze, by which each pin is missed, in the order given."""
+    """A motion with its pins.
+
+    Attributes:
+        root: (T, 3) m, world.
+        rotations: (T, J, 4) local.
+        contacts: (T, 2) bool, without those of feet on their way to a pin.
+        miss: m, or radians for a gaze, by which each pin is missed, in the order given.
+    """
 
     root: np.ndarray
     rotations: np.ndarray
@@ -78,10 +95,15 @@ class Pinned:
 
 
 def pinned(motion: Motion, contacts: np.ndarray, pins: Sequence, start: float, look: np.ndarray) -> Pinned:
-    """A motion whose frame 0 is at second `start`, with its hands, feet and gaze at their pins.
+    """Bring the hands, feet and gaze of a motion to their pins.
 
-    pins: anything with time and hold s, part and position m (`plan.Pin`), no two of a part at one time. contacts (T, 2)
-    bool. look (3,): which way the head joint looks, in its own frame (`look_axis`)."""
+    Args:
+        motion: T frames.
+        contacts: (T, 2) bool, left and right foot in contact.
+        pins: objects with `time` and `hold` s, `part` and `position` m (`plan.Pin`), no two of one part at one time.
+        start: s, time of frame 0 on the pins' clock.
+        look: (3,) unit, direction in which the head joint looks, in its own frame (`estimate_look_axis`).
+    """
     out, targets = _Work(motion, np.array(contacts), look), {}
     for part in dict.fromkeys(pin.part for pin in pins):
         targets[part] = target([pin for pin in pins if pin.part == part], start, motion.fps, len(motion))
@@ -97,9 +119,17 @@ def pinned(motion: Motion, contacts: np.ndarray, pins: Sequence, start: float, l
 
 
 def target(pins: Sequence, start: float, fps: float, count: int) -> Target:
-    """What the pins of one part, in the order of time, ask for over `count` frames. A pin holds on all frames that
-    touch its time; between two that are less than twice FADE apart the part is not let go. Pins outside count for
-    nothing."""
+    """Convert the pins of one part to frames.
+
+    A pin holds on all frames that its time touches; between two that are less than twice FADE apart the part stays
+    bound. Pins outside the frames have no effect.
+
+    Args:
+        pins: of one part, in order of time.
+        start: s, time of frame 0.
+        fps: frames per second.
+        count: number of frames.
+    """
     share, place, stays = np.zeros(count), np.zeros((count, 3)), []
     at, fade = np.arange(count), max(FADE * fps, 1.0)
     for pin in pins:
@@ -125,8 +155,14 @@ def target(pins: Sequence, start: float, fps: float, count: int) -> Target:
 
 
 def look_axis(skeleton: Skeleton, rotations: np.ndarray) -> np.ndarray:
-    """(3,) unit: the direction in the head joint's own frame in which bodies with the local rotations (T, J, 4) look
-    ahead, on the average of T poses of people who go their way."""
+    """Estimate the direction in which the head joint looks, as the mean over poses of people in locomotion.
+
+    Args:
+        skeleton: the skeleton.
+        rotations: (T, J, 4) local.
+    Returns:
+        (3,) unit, in the head joint's own frame.
+    """
     places, world = pose_kinematics(skeleton, np.zeros((len(rotations), 3)), rotations)
     facing = heading_from_positions(skeleton, places)
     ahead = np.column_stack([np.cos(facing), np.sin(facing), np.zeros(len(facing))])
@@ -135,7 +171,7 @@ def look_axis(skeleton: Skeleton, rotations: np.ndarray) -> np.ndarray:
 
 
 class _Work:
-    """A motion on its way to its pins."""
+    """A motion whose parts are brought to their pins, stretch by stretch."""
 
     def __init__(self, motion: Motion, contacts: np.ndarray, look: np.ndarray):
         self.skeleton, self.look, self.contacts, self.before = motion.skeleton, look, contacts, motion
@@ -143,8 +179,11 @@ class _Work:
         self.body = identify(motion.skeleton)
 
     def work(self, low: int, high: int, targets: dict[str, Target]) -> None:
-        """Frames low .. high, all that pins touch there: feet, gaze, hands, and the gaze again, which the hands may
-        have turned away."""
+        """Solve the frames low .. high, all that pins touch there.
+
+        Order: feet, gaze, hands, and the gaze again, since the hands may have turned it away.
+        """
+        # goals of limbs, places of soles and rotations of feet before anything moves
         part = _Part(self.skeleton, self.body, self.root[low:high], self.rotations[low:high])
         chains = {part: chain for part, chain in _chains(self.body).items() if part in targets and None not in chain}
         goals = {name: part.goal(chain[-1], targets[name]) for name, chain in chains.items()}
@@ -160,8 +199,10 @@ class _Work:
         for name in goals:
             if "hand" in name:
                 part.come_nearer(chains[name], goals[name], share[name], bend=True)
+        # a moved pelvis must not pull planted feet out of reach
         part.settle(self.root[low:high], _chains(self.body), soles, self.contacts[low:high], self.before.fps)
         moved = np.linalg.norm(part.root - self.root[low:high], axis=1) / _MOVED
+        # feet without a pin are held in place by as much as the pelvis has moved
         for name, place in soles.items():
             weight = np.maximum(targets[name].share if name in targets else 0.0, np.minimum(moved, 1.0))
             part.reach(_chains(self.body)[name], place, weight, turns[name])
@@ -175,7 +216,7 @@ class _Work:
         self.rotations[low:high] = quaternion.normalized(signed)
 
     def lift(self, part: str, found: Target) -> None:
-        """A foot on its way to or from a pin does not stand."""
+        """Clear the contacts of a foot on its way to or from a pin."""
         joint, side = _chains(self.body)[part][-1], part == "right_foot"
         held = np.zeros(len(self.root), bool)
         for stay in found.stays:
@@ -186,8 +227,7 @@ class _Work:
         self.contacts[way, int(side)] &= np.linalg.norm(new[:, joint] - old[:, joint], axis=1) < _NEAR
 
     def miss(self, pin, start: float) -> float:
-        """The largest miss while a pin holds; that of a pin outside the motion, or of a part that the body has not,
-        is infinite."""
+        """Measure the largest miss while a pin holds; infinite for a pin outside the motion or a missing part."""
         stays = target([pin], start, self.before.fps, len(self.root)).stays
         chain = _chains(self.body).get(pin.part, (self.body.head_or_neck,))
         if not stays or None in chain:
@@ -197,6 +237,7 @@ class _Work:
         places, world = pose_kinematics(self.skeleton, self.root[at], self.rotations[at])
         away = stay.place - places[:, chain[-1]]
         if pin.part != "gaze":
+            # the fractional ends of the pin count as well as its whole frames
             inside = np.unique(np.clip([stay.first, *at, stay.last], stay.first, stay.last))
             lines = [np.interp(inside, at, column) for column in away.T]
             return float(np.linalg.norm(lines, axis=0).max())
@@ -205,13 +246,19 @@ class _Work:
 
 
 def _chains(body: Humanoid) -> dict[str, tuple]:
+    """Return the joints of the limb of each part."""
     return {"left_foot": leg(body.left), "right_foot": leg(body.right),
             "left_hand": arm(body.left), "right_hand": arm(body.right)}
 
 
 class _Part:
-    """The frames W of a motion that pins touch without a break: root (W, 3) m, rotations (W, J, 4), and places and
-    world rotations of the joints, kept up to date."""
+    """The W frames of a motion that pins touch without a break.
+
+    Attributes:
+        root: (W, 3) m, world.
+        rotations: (W, J, 4) local.
+        places, world: (W, J, 3) m and (W, J, 4) of the joints, world, kept up to date.
+    """
 
     def __init__(self, skeleton: Skeleton, body: Humanoid, root: np.ndarray, rotations: np.ndarray):
         self.skeleton, self.body = skeleton, body
@@ -222,7 +269,14 @@ class _Part:
         self.places, self.world = pose_kinematics(self.skeleton, self.root, self.rotations)
 
     def goal(self, joint: int, found: Target) -> np.ndarray:
-        """(W, 3) m where a limb's end goes: its own way, and off it what it is off at its pins."""
+        """Compute where the end of a limb goes: its own path plus its offset at the pins.
+
+        Args:
+            joint: the limb's end joint.
+            found: its target.
+        Returns:
+            (W, 3) m, world.
+        """
         own, at = self.places[:, joint], np.arange(len(self.root))
         off, known = np.zeros_like(own), []
         for stay in found.stays:
@@ -231,10 +285,12 @@ class _Part:
             passed = own[inside] if stay.last > stay.first else [np.interp(stay.first, at, column) for column in own.T]
             off[inside] = stay.place - passed
             known.append((low, high, stay.last > stay.first))
+        # the gaps between pins; (0, -1) and (len, 0) stand for the frames before the first and behind the last one
         for (_, high, held), (low, _, holds) in zip([(0, -1, False), *known], [*known, (len(own), 0, False)]):
             gap = np.arange(high + 1, low)
             after = self._off_from(off, own, high, gap, held) if high >= 0 else np.zeros((len(gap), 3))
             before = self._off_from(off, own, low, gap, holds) if low < len(own) else np.zeros((len(gap), 3))
+            # between two pins go over from the offset of the one to that of the next
             if high >= 0 and low < len(own):
                 way = smoothstep((gap - high) / (low - high))[:, None]
                 off[gap] = (after + way * (before - after)) * found.share[gap, None]
@@ -243,8 +299,11 @@ class _Part:
         return own + off
 
     def _off_from(self, off: np.ndarray, own: np.ndarray, edge: int, gap: np.ndarray, held: bool) -> np.ndarray:
-        """(G, 3) m that the limb is off in the frames `gap` next to a pin's frame `edge`: as much as there, and where
-        the pin holds it goes on a while as it was going there, so that the limb comes to rest and leaves softly."""
+        """Compute the offset (G, 3) m of a limb in the frames `gap` next to a pin's frame `edge`.
+
+        It is that at the pin; next to a pin that holds it glides a little further, so that the limb comes to rest and
+        leaves softly.
+        """
         if not held or not len(gap):
             return np.broadcast_to(off[edge], (len(gap), 3))
         beside = edge - 1 if gap[0] > edge else edge + 1
@@ -253,8 +312,14 @@ class _Part:
         return off[edge] + (np.sign(away) * _GLIDE * (1.0 - np.exp(-np.abs(away) / _GLIDE)))[:, None] * speed
 
     def come_nearer(self, chain, goal: np.ndarray, share: np.ndarray, bend: bool) -> None:
-        """Bends the spine (for a hand) and moves the pelvis so far that the limb, which is `share` (W,) on its way,
-        reaches its goal (W, 3)."""
+        """Bend the spine (for a hand) and move the pelvis so far that the limb reaches its goal.
+
+        Args:
+            chain: joints of the limb.
+            goal: (W, 3) m, world.
+            share: (W,) of the pin.
+            bend: whether the spine bends first.
+        """
         reach, spine = STRETCH * self._length(chain), self.body.spine if bend else ()
         for _ in range(3 if spine else 0):
             self._bend(spine, chain[0], goal, reach, share / 3.0)
@@ -264,18 +329,27 @@ class _Part:
         self._pose()
 
     def settle(self, root: np.ndarray, chains: dict, soles: dict, contacts: np.ndarray, fps: float) -> None:
-        """Lowers a pelvis that has been moved away from `root` (W, 3) so far that a foot which stands, contacts (W, 2),
-        is in reach of where it stands, soles (W, 3) by name."""
+        """Lower a moved pelvis so far that each foot in contact stays in reach of its place.
+
+        Args:
+            root: (W, 3) m, before the pelvis was moved.
+            chains: joints of the limbs by part.
+            soles: (W, 3) m by part, where the feet have to be.
+            contacts: (W, 2) bool.
+            fps: frames per second.
+        """
         if np.array_equal(root, self.root):
             return
         window = np.hanning(max(3, int(0.3 * fps)) + 2)
         drop = np.zeros(len(root))
         for side, name in enumerate(("left_foot", "right_foot")):
+            # contacts smoothed over 0.3 s, so that the pelvis sinks and rises gradually
             stands = np.convolve(np.pad(contacts[:, side].astype(float), len(window) // 2, mode="edge"), window, "same")
             stands = stands[len(window) // 2 : len(window) // 2 + len(root)] / window.sum()
             hip, bones = self.places[:, chains[name][0]], self._length(chains[name])
             own = np.linalg.norm(hip + root - self.root - soles[name], axis=1)
             longest = np.maximum(STRETCH * bones, np.minimum(own, bones))
+            # Pythagoras: the highest hip from which a leg of that length reaches the sole
             aside = np.linalg.norm((hip - soles[name])[:, :2], axis=1)
             highest = soles[name][:, 2] + np.sqrt(np.maximum(longest**2 - aside**2, 0.0))
             drop = np.maximum(drop, np.clip(hip[:, 2] - highest, 0.0, MOST_SHIFT) * stands)
@@ -283,18 +357,18 @@ class _Part:
         self._pose()
 
     def _length(self, chain) -> float:
-        """Metres of a limb, stretched."""
+        """Compute the length of a stretched limb, m."""
         bones = joints_down(self.skeleton, chain[0], chain[-1])[:0:-1]
         return float(sum(np.linalg.norm(self.skeleton.offsets[joint]) for joint in bones))
 
     def _lack(self, joint: int, goal: np.ndarray, reach) -> tuple[np.ndarray, np.ndarray]:
-        """(W,) m that `joint` is too far from the goal, setting in softly, and (W, 3) the way there."""
+        """Compute how far (W,) m `joint` is too far from the goal, softly, and the direction (W, 3) to it."""
         away = goal - self.places[:, joint]
         distance = np.maximum(np.linalg.norm(away, axis=1), 1e-9)
         return _SOFT_LACK * np.logaddexp(0.0, (distance - reach) / _SOFT_LACK), away / distance[:, None]
 
     def _bend(self, spine: tuple[int, ...], top: int, goal: np.ndarray, reach, share: np.ndarray) -> None:
-        """Turns the joints of the spine evenly so that `top` comes nearer to the goal by what it lacks."""
+        """Turn the joints of the spine evenly so that `top` comes nearer to the goal by what it lacks."""
         lack, way = self._lack(top, goal, reach)
         low = self.places[:, spine[0]]
         old = self.places[:, top] - low
@@ -305,7 +379,7 @@ class _Part:
             self._turn(joint, turn)
 
     def _turn(self, joint: int, turn: np.ndarray) -> None:
-        """Turns a joint, and all that hangs on it, by rotation vectors (W, 3) in the world."""
+        """Turn a joint, and all below it, by rotation vectors (W, 3) in the world."""
         world = quaternion.multiply(quaternion.from_rotation_vector(turn), self.world[:, joint])
         parent = self.skeleton.parents[joint]
         above = self.world[:, parent] if parent >= 0 else quaternion.identity(len(world))
@@ -313,8 +387,14 @@ class _Part:
         self._pose()
 
     def reach(self, chain, goal: np.ndarray, share: np.ndarray, turn: np.ndarray | None = None) -> None:
-        """Brings a limb's end to its goal (W, 3), and to the rotation `turn` (W, 4) in the world where that is given;
-        where the share (W,) is small, its joints go over from their own rotations."""
+        """Bring the end of a limb to its goal.
+
+        Args:
+            chain: joints of the limb.
+            goal: (W, 3) m, world.
+            share: (W,) of the pin; where it is small the joints blend from their own rotations.
+            turn: (W, 4) world rotation of the end joint, if it is given.
+        """
         if not np.any(share > 0.0):
             return
         found = two_bone(self.skeleton, self.root, self.rotations, chain, goal, end_rotation=turn,
@@ -327,7 +407,7 @@ class _Part:
         self._pose()
 
     def gaze(self, found: Target, look: np.ndarray, whole: bool) -> None:
-        """Turns the head so that it looks at the place, with the neck and the chest where the whole body is meant."""
+        """Turn the head so that it looks at the place, with neck and chest if `whole`."""
         head, neck, chest = self.body.head_or_neck, self.body.neck, self.body.chest
         turn = self._gaze_turn(head, found, look)
         if whole:
@@ -339,7 +419,7 @@ class _Part:
             self._turn(head, smoothstep((found.share - 0.7) / 0.3)[:, None] * turn)
 
     def _gaze_turn(self, head: int, found: Target, look: np.ndarray) -> np.ndarray:
-        """(W, 3) rotation vectors, in the world, from where the head looks to the place, as far as a neck can."""
+        """Compute world rotation vectors (W, 3) from where the head looks to the place, within a neck's range."""
         sight = quaternion.rotate(self.world[:, head], np.broadcast_to(look, (len(self.root), 3)))
         away = found.place - self.places[:, head]
         facing = heading_from_positions(self.skeleton, self.places)

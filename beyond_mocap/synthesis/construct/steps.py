@@ -1,11 +1,11 @@
-"""Small extra steps: a foot that would be dragged along while it stands is lifted and set down elsewhere instead.
+"""Small extra steps: a foot that would be dragged along in contact is lifted and set down elsewhere instead.
 
-No player stands as still as a recording of standing: tracked ones creep at 0.1 to 0.5 m/s and turn after the ball. Laid
-on such a track, feet that stand would slide or turn on the spot, or the legs would lean further and further after a
-body on rails. Where that is more than STRIDE or TURN allow, the stance is broken: the foot is lifted for some tenths of
-a second while the other one stands, and `foot_plant` sets it down where the body will be in the middle of the stance
-that follows. Left and right take turns, since each step resets what its foot lags behind. Where the other foot is in
-the air for too long to step, and only gently so, its own lift is left out: it stays down, and steps when it is due.
+No player stays as still as a recording of standing: tracked players creep at 0.1 to 0.5 m/s and turn after the ball. On
+such a track, feet in contact would slide or turn on the spot, or the legs would lean further and further after the
+body. Where that is more than STRIDE or TURN allow, the stance is broken: the foot is lifted for some tenths of a second
+while the other one is in contact, and `foot_plant` sets it down where the body is in the middle of the stance that
+follows. Left and right take turns, since each step resets the lag of its foot. Where the other foot is in the air for
+too long to step, and only gently so, its own lift is left out: it stays down, and steps when it is due.
 """
 
 from __future__ import annotations
@@ -30,33 +30,40 @@ SPEED = np.array([0.05, 0.3, 0.8, 1.5])
 STRIDE = np.array([0.12, 0.25, 0.40, 0.45])
 TURN = np.array([0.28, 0.35, 0.45, 0.60])
 SWING = np.array([0.45, 0.38, 0.32, 0.30])
-"""By the body's speed in m/s: metres that a foot is dragged, and radians that it is turned, from the beginning of a
-stance to its end before a step is taken, and the step's seconds. At 0.3 m/s that makes 1.5 steps a second."""
+"""By the body's speed (SPEED, m/s): metres that a foot is dragged (STRIDE) and radians that it is turned (TURN) from
+the beginning of a stance to its end before a step is taken, and the step's seconds (SWING). At 0.3 m/s this gives 1.5
+steps a second."""
 
 SPARED = 1.15  # times STRIDE and TURN that a stance may drag before it is broken
 LATE = 1.3  # times them that a foot may lag before a lift of the other one is left out so that it can step sooner
-CLEARLY = 0.3  # by how much one of two feet has to lag more to go first
-LEAST_SWING = 0.26  # s of the quickest step, where there is no time for more
-HEEL_OFF, TOE_ON = 0.06, 0.03  # s of a step in which the heel is off before the toe, and the toe is down again
-SETTLED = 0.04  # s that a foot stands at least before the other one is lifted, and after it is down again
-SHORTEST = 0.2  # s that are left of a stance at least on either side of a step
-APART = 0.11  # m between the ankles that feet on their way past each other keep
+CLEARLY = 0.3  # difference of lag from which on the foot that lags more goes first
+LEAST_SWING = 0.26  # s of the quickest step
+HEEL_OFF, TOE_ON = 0.06, 0.03  # s that the heel is up before the toe, and that the toe is down before the step ends
+SETTLED = 0.04  # s of contact that a foot needs before the other one is lifted, and after it is down again
+SHORTEST = 0.2  # s of a stance that are left on either side of a step
+APART = 0.11  # m between the ankles of feet that pass each other
 LIFT = 0.045  # m that a foot is lifted
 HEEL_UP, TOE_UP = 0.22, 0.06  # rad: heel over toe after lifting, toe over heel before landing
-SWAY = 0.012  # m that the pelvis goes over to the foot that stands
+SWAY = 0.012  # m that the pelvis moves over the planted foot
 GENTLE_SPEED, GENTLE_HEIGHT, GENTLE_SECONDS = 0.6, 0.20, 1.5
-"""m/s of the body up to which a lift may be left out, metres that the ankle rises in it, and its seconds."""
+"""Limits of a lift that may be left out: m/s of the body, metres that the ankle rises, and seconds."""
 
-UPRIGHT = 0.75  # of the usual height of the root: a lower body crouches, kneels or lies, and takes no steps
+UPRIGHT = 0.75  # share of the usual root height below which a body crouches, kneels or lies, and takes no steps
 _LEFT, _RIGHT, _ROUNDS = 0, 1, 6
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Steps:
-    """What plants and labels feet. rotations (T, J, 4) local, with lifts left out; standing (T, 2, 2) bool: heels
-    and toes that stand now; contacts (T, 2) bool: feet that stand flat, as they did in the source; stepped (T, 2)
-    bool: feet in an extra step, from heel to heel; moves (T, 2, 4): metres by which each foot is moved, and radians
-    that its heel is up about its toe; sway (T, 2) m of the pelvis."""
+    """Extra steps, and what plants and labels the feet.
+
+    Attributes:
+        rotations: (T, J, 4) local, with lifts left out.
+        heel_toe_contacts: (T, 2, 2) bool, heel and toe of each foot that are in contact now.
+        contacts: (T, 2) bool, feet flat on the ground, as in the source.
+        stepped: (T, 2) bool, feet in an extra step, from heel off to heel down.
+        moves: (T, 2, 4), m by which each foot is moved, and rad of heel over toe.
+        sway: (T, 2) m by which the pelvis moves on the ground.
+    """
 
     rotations: np.ndarray
     standing: np.ndarray
@@ -67,7 +74,12 @@ class Steps:
 
     @staticmethod
     def none(rotations: np.ndarray, standing: np.ndarray) -> Steps:
-        """No steps at all; rotations (T, J, 4), standing (T, 2, 2) bool."""
+        """Return a motion without extra steps.
+
+        Args:
+            rotations: (T, J, 4) local.
+            heel_toe_contacts: (T, 2, 2) bool, heel and toe contacts.
+        """
         nothing = np.zeros((len(standing), 2))
         return Steps(rotations=rotations, standing=standing, contacts=standing.all(axis=2), sway=nothing,
                      stepped=nothing.astype(bool), moves=np.zeros((len(standing), 2, 4)))
@@ -77,10 +89,17 @@ def steps(
     skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray, standing: np.ndarray, fps: float,
     given: np.ndarray | None = None, free: np.ndarray | None = None,
 ) -> Steps:
-    """The extra steps of a motion laid out on the ground.
+    """Add the extra steps that a motion on the ground needs.
 
-    root (T, 3) m and rotations (T, J, 4) local; standing (T, 2, 2) bool of heels and toes, left and right. given (T,
-    2) bool: steps that are taken already, `free` (T,) bool: where others may be added (everywhere)."""
+    Args:
+        skeleton: the skeleton.
+        root: (T, 3) m, world.
+        rotations: (T, J, 4) local.
+        heel_toe_contacts: (T, 2, 2) bool, heel and toe contacts, left and right.
+        fps: frames per second.
+        steps_taken: (T, 2) bool, steps that are taken already.
+        free: (T,) bool, where others may be added; None: everywhere.
+    """
     none = Steps.none(rotations, standing)
     if len(root) < 2:
         return none
@@ -109,11 +128,18 @@ def steps(
 
 
 class _Foot:
-    """One foot where the motion has it, on the ground as complex numbers x + iy.
+    """One foot where the motion has it; places on the ground are complex numbers x + iy.
 
-    points (T, 2) m of ankle and toe, middle (T,) m between them, yaw (T,) its direction, radians, unwrapped; stands
-    and flat (T,) bool: on the ground, with heel and toe; before, behind (T,) frames and through (T,): where `held`
-    (T,) bool, between which of its places the foot is, and how far."""
+    Attributes:
+        points: (T, 2) m, ankle and toe.
+        middle: (T,) m between them.
+        yaw: (T,) rad, direction of the foot, unwrapped.
+        is_in_contact: (T,) bool, in contact.
+        is_flat: (T,) bool, in contact with heel and toe.
+        held: (T,) bool, kept down although the source lifts it.
+        before, behind: (T,) frames between whose places a held foot is.
+        through: (T,) how far it is from the one to the other, 0 to 1.
+    """
 
     def __init__(self, limb: Limb, places, world, root, heading, standing: np.ndarray):
         self.limb, self.places, self.world = limb, places[:, limb.foot], world[:, limb.foot]
@@ -128,9 +154,17 @@ class _Foot:
         self.middle = self.points.mean(axis=1)
 
     def with_lift_left_out(self, first: int, end: int, reach: int) -> _Foot:
-        """The foot kept on the ground in frames first .. end too, carried along by the body from where it stood to
-        where it will stand, if it does; `reach`: frames by which that may begin sooner and end later, so that it stands
-        flat there."""
+        """Keep the foot on the ground in frames first .. end too.
+
+        The body carries it along from where it was in contact to where it will be next, if it will.
+
+        Args:
+            first: first frame of the lift.
+            end: frame after its last one.
+            reach: frames by which the hold may begin sooner and end later, so that the foot is flat there.
+        Returns:
+            A changed copy.
+        """
         new = copy.copy(self)
         for name in ("held", "before", "behind", "through", "points", "middle", "yaw"):
             setattr(new, name, getattr(self, name).copy())
@@ -141,6 +175,7 @@ class _Foot:
         new.held[at], new.before[at], new.behind[at], new.through[at] = True, before, behind, through
         new.points[at] = new._between(self.points, at)
         new.middle[at] = new.points[at].mean(axis=1)
+        # yaw relative to the body before and behind, so that the foot turns with the body in between
         own = self.yaw[[before, behind]] - self.heading[[before, behind]]
         change = quaternion.wrapped(own[1] - own[0])
         new.yaw[end:] += own[0] + change - own[1]
@@ -148,13 +183,14 @@ class _Foot:
         return new
 
     def _between(self, points: np.ndarray, at) -> np.ndarray:
-        """Held places (N, K) at frames `at`: straight from the one to the other as the body sees it."""
+        """Interpolate held places (N, K) at frames `at`, on a straight line as the body sees it."""
         own = [(points[edge[at]] - self.root[edge[at], None]) * np.exp(-1j * self.heading[edge[at], None])
                for edge in (self.before, self.behind)]
         way = own[0] + self.through[at, None] * (own[1] - own[0])
         return way * np.exp(1j * self.heading[at, None]) + self.root[at, None]
 
     def _flat_before(self, first: int, reach: int) -> int:
+        """Return the frame after the last flat one of the stance before `first`, at most `reach` frames earlier."""
         low = max(first - reach, 0)
         stands = self.stands[low:first] & ~self.held[low:first]
         low += max(np.flatnonzero(~stands).tolist(), default=-1) + 1
@@ -162,13 +198,22 @@ class _Foot:
         return low + int(flat[-1]) + 1 if len(flat) else first
 
     def _flat_behind(self, end: int, reach: int) -> int:
+        """Return the first flat frame of the stance from `end` on, at most `reach` frames later."""
         stands = self.stands[end : end + reach] & ~self.held[end : end + reach]
         high = end + (len(stands) if stands.all() else int(np.argmin(stands)))
         flat = np.flatnonzero(self.flat[end:high])
         return end + int(flat[0]) if len(flat) else end
 
     def held_down(self, skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray) -> np.ndarray:
-        """Local rotations (T, J, 4) with the leg bent so that the foot is down where it is held."""
+        """Bend the leg so that the foot is down where it is held.
+
+        Args:
+            skeleton: the skeleton.
+            root: (T, 3) m, world.
+            rotations: (T, J, 4) local.
+        Returns:
+            (T, J, 4) local.
+        """
         at = np.flatnonzero(self.held)
         if not len(at):
             return rotations
@@ -184,7 +229,15 @@ class _Foot:
 
 
 class _Plan:
-    """Steps chosen one after the other, always the earliest: `feet`, `stands` and `stepped` (T, 2) are the result."""
+    """Plan of the steps, chosen one after the other, always the earliest.
+
+    Attributes:
+        feet: left and right foot, with lifts left out.
+        contacts: (T, 2) bool, in contact after the steps.
+        stepped: (T, 2) bool, in a step.
+        lag: (T, 2), how far each foot lags; 1 where a step is due.
+        dragged_stances: per foot the stances (first, end) that still drag too far.
+    """
 
     def __init__(self, feet: list[_Foot], given: np.ndarray, speed: np.ndarray, fps: float, free: np.ndarray):
         self.feet, self.speed, self.fps = feet, speed, fps
@@ -200,46 +253,54 @@ class _Plan:
         self.left = [self._dragged(side, 0) for side in (_LEFT, _RIGHT)]
 
     def _room(self) -> np.ndarray:
-        """(T,) m that a stride may be long without one foot coming nearer than APART to the other, to either side of
-        which it is half a stride away as the body drifts."""
+        """Compute how long (T,) m a stride may be without the feet coming closer than FOOT_SEPARATION.
+
+        As the body drifts, the foot moves from half a stride ahead of the other one to half a stride behind it.
+        """
         left, right = (foot.middle for foot in self.feet)
         way = 0.5 * (left + right)
         drift = np.gradient(zero_phase_hann(np.stack([way.real, way.imag], axis=1), self.fps, 1.0), axis=0)
+        # vector between the feet in the frame of the drift: real part along it, imaginary part across
         width = (left - right) * (drift[:, 0] - 1j * drift[:, 1]) / np.maximum(np.linalg.norm(drift, axis=1), 1e-9)
         along, across = np.abs(width.real), np.abs(width.imag)
         room = 2.0 * (along - np.sqrt(np.maximum(APART**2 - across**2, 0.0)))
         return np.where(across > APART, np.inf, np.maximum(room, STRIDE[0]))
 
     def _dragged(self, side: int, now: int) -> list[tuple[int, int]]:
-        """Stances (first, end) from `now` on that drag too far, the first one first; notes each frame's lag."""
+        """List the stances (first, end) from `now` on that drag too far, in order; stores the lag of each frame."""
         return [run for run in runs(self.stands[:, side]) if run[1] > now and self._drag(side, *run) > SPARED]
 
     def _drag(self, side: int, first: int, end: int) -> float:
-        """How far the foot would lag at most in frames first .. end, 1 where a step is due."""
+        """Compute the largest lag in frames first .. end; 1 where a step is due."""
         at, foot = slice(first, end), self.feet[side]
+        # distance in strides and turn in turns, as one length
         away = np.abs(foot.middle[at] - foot.middle[first]) / self.stride[at]
         self.lag[at, side] = np.hypot(away, (foot.yaw[at] - foot.yaw[first]) / self.turn[at])
         return float(self.lag[at, side].max(initial=0.0))
 
     def run(self) -> None:
-        """Breaks stances until none drags any more, or none can be broken."""
+        """Break stances until none drags any more, or none can be broken."""
         now = 0
         while any(self.left):
             chosen = [self._next(side, now) for side in (_LEFT, _RIGHT)]
             side = self._first(chosen)
+            # a stance that cannot be broken: hold the other foot down, or leave the stance as it is
             stuck = [(self.left[side][0][1], side) for side in (_LEFT, _RIGHT) if self.left[side] and not chosen[side]]
             if stuck and (side is None or min(stuck)[0] <= chosen[side][0]):
                 side = min(stuck)[1]
                 if not self._hold_other(side, now):
                     self.left[side].pop(0)
+            # take the step, unless it comes so late that holding the other foot down helps
             elif self.lag[chosen[side][0], side] <= LATE or not self._hold_other(side, now):
                 now = chosen[side][0]
                 self._take(side, *chosen[side])
 
     def _first(self, chosen: list[tuple[int, int] | None]) -> int | None:
-        """The foot that steps first, None where none does: the one that is due sooner; but where there is no time
-        for both before, the one that lags clearly more by then, unless it stepped last; or else the one that is
-        behind as the body goes."""
+        """Choose the foot that steps first, None where none does.
+
+        It is the one that is due sooner. Where there is no time for both before, it is the one that lags clearly more
+        by then, unless it stepped last; otherwise the one that is behind in the body's direction of movement.
+        """
         due = [side for side in (_LEFT, _RIGHT) if chosen[side]]
         if len(due) < 2:
             return due[0] if due else None
@@ -255,19 +316,24 @@ class _Plan:
         return _LEFT if left < right else _RIGHT
 
     def _take(self, side: int, at: int, down: int) -> None:
+        """Take a step of one foot from frame `at` to `down`, and queue the rest of its stance if that drags too."""
         self.last, (_, end) = side, self.left[side].pop(0)
         self.stands[at:down, side], self.stepped[at:down, side], self.lag[at:down, side] = False, True, 0.0
         if down < end and self._drag(side, down, end) > SPARED:
             self.left[side].insert(0, (down, end))
 
     def _hold_other(self, side: int, now: int) -> bool:
-        """Leaves out the first gentle lift of the other foot during this foot's dragged stance with which it can
-        step; whether there is one."""
+        """Leave out a gentle lift of the other foot during this foot's dragged stance, so that this foot can step.
+
+        Returns:
+            Whether there is such a lift; the first one that helps is left out.
+        """
         other, (first, end) = 1 - side, self.left[side][0]
         foot, reach = self.feet[other], int(round(0.3 * self.fps))
         for up, down in runs(~self.stands[:, other] & ~self.stepped[:, other]):
             inside = max(now, 1) <= up < end and down > first
             if inside and self._gentle(foot, up, down) and self.free_until[up] >= down:
+                # try it, and restore everything if this foot still cannot step
                 kept = foot, self.stands.copy(), self.lag.copy(), self.left[other]
                 self.feet[other] = foot.with_lift_left_out(up, down, min(reach, up - now))
                 self.stands[up:down, other] = True
@@ -278,25 +344,26 @@ class _Plan:
         return False
 
     def _look_again(self, side: int, at: int) -> None:
-        """Finds out whether the stance around frame `at` drags too far."""
+        """Update the list of dragged stances for the stance around frame `at`."""
         first = max(np.flatnonzero(~self.stands[:at, side]).tolist(), default=-1) + 1
         end = int(_until(self.stands[:, side])[at])
         left = [run for run in self.left[side] if run[1] <= first or run[0] >= end]
         self.left[side] = sorted([*left, (first, end)] if self._drag(side, first, end) > SPARED else left)
 
     def _gentle(self, foot: _Foot, up: int, down: int) -> bool:
+        """Return whether a lift up .. down is slow, low and short enough to be left out."""
         height, ends = foot.places[up:down, 2], foot.places[[up - 1, min(down, len(self.speed) - 1)], 2]
         slow = down - up <= GENTLE_SECONDS * self.fps and self.speed[up:down].max() < GENTLE_SPEED
         return bool(slow and height.max() - ends.min() < GENTLE_HEIGHT)
 
     def _behind(self, side: int, at: int) -> float:
-        """How far the foot is behind the other as the body goes."""
+        """Measure how far the foot is behind the other one in the body's direction of movement."""
         before, after = max(at - 8, 0), min(at + 8, len(self.speed) - 1)
         here, there = self.feet[side].middle, self.feet[1 - side].middle
         return float(((there[at] - here[at]) * np.conj(here[after] + there[after] - here[before] - there[before])).real)
 
     def _next(self, side: int, now: int) -> tuple[int, int] | None:
-        """Frames in which the foot's next dragged stance is to be broken and in which it stands again, or None."""
+        """Choose the frames in which the foot's next dragged stance is broken and regained; None if there are none."""
         if not self.left[side]:
             return None
         first, end = self.left[side][0]
@@ -305,16 +372,27 @@ class _Plan:
         if not len(places):
             return None
         lag = self.lag[first:end, side]
+        # break a stance of lag n into equal parts, each with at most DRAG_TOLERANCE
         share = lag.max() / np.ceil(lag.max() / SPARED)
         due = np.full(len(lag), share)
         if any(a < end and first < b for a, b in self.left[1 - side][:1]):
-            # both lag alike: one goes at half time, so that they take turns
+            # where both lag the same, one steps at half the lag, so that they take turns
             due *= 0.5 + 0.5 * np.clip(np.abs(lag - self.lag[first:end, 1 - side]) / (0.5 * share), 0.0, 1.0)
         at = int(places[np.argmin(np.abs(places - np.argmax(lag >= due)))])
         return first + at, int(down[at])
 
     def _down(self, side: int, first: int, end: int, now: int) -> np.ndarray:
-        """(end - first,) frame by which a step that begins there has to be over, since the other foot stands firmly."""
+        """Compute the frame by which a step has to be over, for each frame at which it may begin.
+
+        The other foot has to be in firm contact throughout. A value equal to its frame forbids a step there.
+
+        Args:
+            side: the foot.
+            first, end: the stance.
+            now: frame up to which all is decided.
+        Returns:
+            (end - first,) frames.
+        """
         at = np.arange(first, end)
         other = self.stands[:, 1 - side]
         until = _until(other)[at]
@@ -326,20 +404,32 @@ class _Plan:
 
 
 def _until(flags: np.ndarray) -> np.ndarray:
-    """(T + 1,) the first frame from each on in which `flags` (T,) is not set."""
+    """Compute (T + 1,) the first frame from each on in which `flags` (T,) is not set."""
+    # a running minimum from the end: unset frames keep their number, set ones take the next
     unset = np.where(flags, len(flags), np.arange(len(flags)))
     return np.append(np.minimum.accumulate(unset[::-1])[::-1], len(flags))
 
 
 def _apart(plan: _Plan, stepped: np.ndarray, left: np.ndarray) -> np.ndarray:
-    """(T, 2, 2) m by which feet that step are set down further apart, so that the left one stays to the left of the
-    right one; left (T,): that way, complex. A stance's foot stands at the mean of where the body takes it
-    (`foot_plant.shift`)."""
+    """Compute how far stepping feet are set down further apart, so that the left one stays to the left of the right
+    one.
+
+    The foot of a stance lies at the mean of where the body takes it (`foot_plant.solve_shift`).
+
+    Args:
+        plan: the steps.
+        stepped: (T, 2) bool.
+        left: (T,) complex unit, the body's left.
+    Returns:
+        (T, 2, 2) m.
+    """
     stances = [runs(plan.stands[:, side]) for side in (_LEFT, _RIGHT)]
     near = np.pad(stepped, ((1, 1), (0, 0)))
+    # a stance is loose, and may be moved, if a step begins or ends it
     loose = [[bool(near[a, side] or near[b + 1, side]) for a, b in stances[side]] for side in (_LEFT, _RIGHT)]
     place = [[foot.points[a:b].mean(axis=0) for a, b in stances[side]] for side, foot in enumerate(plan.feet)]
     pushed = [[0.0j] * len(side) for side in place]
+    # pairs of overlapping stances with the body's left in the middle of the overlap; one of them at least is loose
     pairs = [(i, j, complex(left[(max(a, c) + min(b, d)) // 2]))
              for i, (a, b) in enumerate(stances[_LEFT]) for j, (c, d) in enumerate(stances[_RIGHT])
              if max(a, c) <= min(b, d) and (loose[_LEFT][i] or loose[_RIGHT][j])]
@@ -348,6 +438,7 @@ def _apart(plan: _Plan, stepped: np.ndarray, left: np.ndarray) -> np.ndarray:
             between = place[_LEFT][i] - place[_RIGHT][j] + pushed[_LEFT][i] - pushed[_RIGHT][j]
             lacks = APART - float((between * way.conjugate()).real.min())
             if lacks > 0.0:
+                # split what lacks between the loose ones of the two
                 share = lacks / (loose[_LEFT][i] + loose[_RIGHT][j])
                 pushed[_LEFT][i] += share * loose[_LEFT][i] * way
                 pushed[_RIGHT][j] -= share * loose[_RIGHT][j] * way
@@ -355,13 +446,14 @@ def _apart(plan: _Plan, stepped: np.ndarray, left: np.ndarray) -> np.ndarray:
     for side in (_LEFT, _RIGHT):
         if any(pushed[side]):
             ends = np.ravel(stances[side]) - [0, 1] * len(stances[side])
+            # constant within each stance, linear over the steps between
             by = np.interp(np.arange(len(out)), ends, np.repeat(pushed[side], 2))
             out[:, side] = np.stack([by.real, by.imag], axis=1)
     return out
 
 
 def _swings(stepped: np.ndarray, fps: float) -> np.ndarray:
-    """(T, 2) bool: where the toes are off the ground in steps taken while `stepped` (T, 2)."""
+    """Return (T, 2) bool: where the toes are off the ground in the steps `stepped` (T, 2)."""
     off, on = int(round(HEEL_OFF * fps)), int(round(TOE_ON * fps))
     out = np.zeros_like(stepped)
     for side in (_LEFT, _RIGHT):
@@ -371,8 +463,15 @@ def _swings(stepped: np.ndarray, fps: float) -> np.ndarray:
 
 
 def _shape(stepped: np.ndarray, swings: np.ndarray, root: np.ndarray, feet: list[np.ndarray], fps: float):
-    """`moves` and `sway` of Steps taken while `stepped` (T, 2) with toes up in `swings` (T, 2); root and feet (T,) m,
-    complex."""
+    """Compute `moves` and `sway` of steps.
+
+    Args:
+        stepped: (T, 2) bool.
+        swings: (T, 2) bool, toes off the ground.
+        root: (T,) m, complex.
+        feet: (T,) m of each foot, complex.
+        fps: frames per second.
+    """
     moves, sway = np.zeros((len(stepped), 2, 4)), np.zeros((len(stepped), 2))
     early = int(0.2 * fps)
     for side in (_LEFT, _RIGHT):
@@ -389,10 +488,10 @@ def _shape(stepped: np.ndarray, swings: np.ndarray, root: np.ndarray, feet: list
 
 
 def _through(first: int, end: int) -> np.ndarray:
-    """How far each of frames first .. end is through them, between 0 and 1."""
+    """Compute how far each of the frames first .. end is through them, between 0 and 1."""
     return (np.arange(first, end) - first + 1.0) / (end - first + 1.0)
 
 
 def _tilt(through: np.ndarray) -> np.ndarray:
-    """Radians (N,) of heel over toe in a step that has come `through` (N,): the heel leaves first and lands first."""
+    """Compute the tilt (N,) rad of heel over toe for progress `through` (N,): the heel leaves first and lands first."""
     return 6.75 * through * (1.0 - through) * (HEEL_UP * (1.0 - through) - TOE_UP * through)

@@ -1,9 +1,10 @@
-"""The ball met: at each key moment the striking part of the body is on the ball's surface, and eases there and back.
+"""Bring the ball and the striking part together: at each key moment the part is on the ball's surface, eased in and
+out.
 
 The body never leaves its track for the ball. First the ball moves, within the noise of its measurement, to where the
-recorded foot (head, chest, hand) strikes; what is left the limb does by two-bone inverse kinematics, or the spine by
-bending, as far as a body reaches; what is left then is reported. A kick lasts a hundredth of a second, so between the
-two frames around the key moment the ball goes along with the foot.
+recorded foot (head, chest, hand) strikes. The limb does the rest by two-bone inverse kinematics, or the spine by
+bending, within the reach of a body; what remains is reported. A kick lasts a hundredth of a second, so between the two
+frames around the key moment the ball moves with the foot.
 """
 
 from __future__ import annotations
@@ -39,25 +40,31 @@ from .carry import (
 from .meeting import Aim, Room, best_aim, eased_around, held_meeting, lofted, meetings, shifted
 
 BALL_NOISE, FILLED_NOISE = 0.3, 1.0
-"""Metres that the ball may be moved from where it was measured, and where the feed has filled it in."""
+"""Metres that the ball may be moved from its place, where it was measured and where the feed has filled it in."""
 
-MOST_MOVED = {"foot": 0.45, "hand": 0.4, "head": 0.2, "chest": 0.12}  # m from where the recording has the part
+MOST_MOVED = {"foot": 0.45, "hand": 0.4, "head": 0.2, "chest": 0.12}  # m, largest move of a part from the recording
 PELVIS_RANGE = (0.20, 0.64)  # m on the ground from pelvis to striking foot in measured kicks, unless recorded further
-OUT_OF_REACH = 0.15  # m of gap that would be left, above which the body does not try, and plays as recorded
-MOST_DROP = 0.04  # m that the pelvis sinks
-_LONGEST_EASE, _SHORTEST_EASE = 0.5, 0.12  # s before and after a strike in which the body goes over
+OUT_OF_REACH = 0.15  # m of remaining gap above which the body does not reach at all, and plays as recorded
+MOST_DROP = 0.04  # m, largest drop of the pelvis
+_LONGEST_EASE, _SHORTEST_EASE = 0.5, 0.12  # s before and after a strike in which the body is eased
 _RISE = {"foot": 0.0, "hand": 0.0, "head": 0.6, "chest": 0.0}  # sine of the ball's elevation as seen from the part
 _IN_THE_AIR = 0.2  # m above which a ball may be met higher or lower
-_HANDS_APART = 0.6  # metres between the wrists, beyond which a dive's catch is one hand's
+_HANDS_APART = 0.6  # m between the hands beyond which one hand alone catches in a dive
 _STOPPING = frozenset(list_labels(ball="takes"))
 _HIGH = frozenset(list_labels(height="high"))
-_ROUNDS, _CLOSE = 4, 5e-4
+_ROUNDS, _CLOSE = 4, 5e-4  # most rounds of an iteration, and m of change at which it ends
 
 
 @dataclass(frozen=True)
 class Touch:
-    """A key moment in which the ball is met. frame: output frame, fractional. words: of the clip that plays there,
-    sides after mirroring. entry, leave: frames before and after `frame` within which the body may be changed."""
+    """A key moment in which the ball is met.
+
+    Attributes:
+        frame: output frame, fractional.
+        words: labels of the clip that plays there, sides after mirroring.
+        entry: frames before `frame` within which the body may be changed.
+        leave: frames after it.
+    """
 
     frame: float
     words: tuple[str, ...]
@@ -67,9 +74,17 @@ class Touch:
 
 @dataclass(frozen=True, eq=False)
 class Struck:
-    """root (T, 3) m, rotations (T, J, 4) local, ball (T, 3) m. Per touch, in the order given, NaN where the words touch
-    no ball or there is none: gap (K,) m between the surfaces at the nearest frame; ball_shift (K,) m on the ground that
-    the ball was moved there; moved (K,) m that the part was."""
+    """A motion with the ball met at every touch.
+
+    Attributes:
+        root: (T, 3) m, world.
+        rotations: (T, J, 4) local.
+        ball: (T, 3) m, its centre.
+        gap: (K,) m between the surfaces at the frame nearest to each touch; NaN where the labels touch no ball or there
+            is no ball, as in the next two.
+        ball_shift: (K,) m on the ground that the ball was moved there.
+        moved: (K,) m that the part was moved.
+    """
 
     root: np.ndarray
     rotations: np.ndarray
@@ -83,14 +98,23 @@ def strike(
     skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray, contacts: np.ndarray, ball: np.ndarray,
     touches: Sequence[Touch], fps: float, *, measured: np.ndarray | None = None, height_known: np.ndarray | None = None,
 ) -> Struck:
-    """The motion and the ball's path with every touch met, as far as a body can.
+    """Bring ball and body together at every touch, within the reach of a body.
 
-    root (T, 3) m and rotations (T, J, 4) local: the motion on the pitch, feet planted. contacts (T, 2) bool: left and
-    right foot on the ground; a striking foot is changed only between its lift-off and its landing. ball (T, 3) m: its
-    centre, NaN where there is none. measured (T,) bool: False where the feed filled the ball in; None: measured
-    everywhere. height_known (T,) bool: where the ball's height is measured, None: everywhere; elsewhere the ball lies
-    on the ground but for high touches, to which it rises and from which it falls freely. Frames outside the touches'
-    windows come back bit for bit."""
+    Frames outside the touches' windows stay bit for bit.
+
+    Args:
+        skeleton: the skeleton.
+        root: (T, 3) m, the motion on the pitch, feet planted.
+        rotations: (T, J, 4) local.
+        contacts: (T, 2) bool, left and right foot in contact; a striking foot changes only between lift-off and
+            landing.
+        ball: (T, 3) m, its centre, NaN where it is unknown.
+        touches: where the ball is met.
+        fps: frames per second.
+        measured: (T,) bool, False where the feed filled the ball in; None: measured everywhere.
+        height_known: (T,) bool, where the ball's height is measured; None: everywhere. Elsewhere the ball lies on the
+            ground, except at high touches, to which it rises and from which it falls freely.
+    """
     count = len(root)
     measured, height_known = (np.ones(count, bool) if flags is None else np.asarray(flags, bool)
                               for flags in (measured, height_known))
@@ -113,8 +137,10 @@ def strike(
 
 
 def _when_met(skeleton: Skeleton, root, rotations, feed, touch: Touch, fps: float) -> Touch:
-    """The touch at the frame at which a hand passes the ball nearest, where words allow for that and the ball is out of
-    reach at the key moment itself."""
+    """Move a touch to the frame at which a hand passes the ball nearest.
+
+    Only where the labels allow for that and the ball is out of reach at the key moment itself.
+    """
     first, last = _nearest(touch.frame, len(root)), _nearest(touch.frame + met_within(touch.words) * fps, len(root))
     if first == last or not np.isfinite(feed[first : last + 1]).all():
         return touch
@@ -128,8 +154,16 @@ def _when_met(skeleton: Skeleton, root, rotations, feed, touch: Touch, fps: floa
 
 @dataclass(frozen=True, kw_only=True)
 class _Moment:
-    """A touch in frames: the nearest one; the two around it, in which it is held; low and high, at which the body is as
-    it was; bounds, the held frames of the touches before and after."""
+    """A touch in frames.
+
+    Attributes:
+        words: labels of the clip.
+        frame: the nearest frame.
+        held: the two frames around it, in which the touch is held.
+        low: frame before which the body does not change.
+        high: frame after which it does not.
+        bounds: held frames of the touches before and after.
+    """
 
     words: frozenset[str]
     frame: int
@@ -140,10 +174,11 @@ class _Moment:
 
 
 def _moments(skeleton: Skeleton, touches: Sequence[Touch], count: int, fps: float):
-    """(number, moment) of every touch that some part can serve, in the order of time."""
+    """Generate (number, moment) of every touch that some part can serve, in order of time."""
     shortest, longest = _SHORTEST_EASE * fps, _LONGEST_EASE * fps
     order = sorted((t.frame, k) for k, t in enumerate(touches) if surfaces(skeleton, t.words))
     held = [held_frames(frame, count) for frame, _ in order]
+    # held frames of all touches, with sentinels far outside on both sides, so ends[place + 1] is this touch
     ends = [(-count, -count), *held, (2 * count, 2 * count)]
     for place, (frame, number) in enumerate(order):
         touch, (first, last) = touches[number], held[place]
@@ -155,12 +190,15 @@ def _moments(skeleton: Skeleton, touches: Sequence[Touch], count: int, fps: floa
 
 
 def _nearest(frame: float, count: int) -> int:
+    """Return the whole frame, of `count`, nearest to a fractional one."""
     return int(np.clip(np.rint(frame), 0, count - 1))
 
 
 def held_frames(frame: float, count: int) -> tuple[int, int]:
-    """The frames, of `count`, before and after a fractional one, in which a touch is held; twice the same where it is
-    nearly whole."""
+    """Return the two frames, of `count`, around a fractional one in which a touch is held.
+
+    Twice the same where the frame is nearly whole.
+    """
     if abs(frame - _nearest(frame, count)) < 0.02:
         frame = _nearest(frame, count)
     return _nearest(np.floor(frame), count), _nearest(np.ceil(frame), count)
@@ -168,9 +206,18 @@ def held_frames(frame: float, count: int) -> tuple[int, int]:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class _Scene:
-    """What a touch is played with: the parts, each with the share (W,) of its shift per frame; the ball's path (T, 3)
-    and whether it is measured (T,); the side of the part on which the ball is; what the ball avoids; `origin`, the
-    first of the body's W frames."""
+    """What a touch is solved with.
+
+    Attributes:
+        moment: the touch.
+        parts: the striking parts.
+        shares: (W,) of the shift per frame, for each part.
+        ball: (T, 3) m, the ball's trajectory.
+        measured: (T,) bool.
+        aim: where the part strikes.
+        avoid: (line, radius) that the ball must not lie in.
+        origin: the first of the body's W frames.
+    """
 
     moment: _Moment
     parts: tuple[Surface, ...]
@@ -183,15 +230,20 @@ class _Scene:
 
     @property
     def at(self) -> int:
-        """The moment among the body's frames."""
+        """Frame of the moment among the body's frames."""
         return self.moment.frame - self.origin
 
     def lines(self, body: Body, frame: int) -> np.ndarray:
-        """(P, 2, 3) m: both ends of every part's line."""
+        """Return both ends (P, 2, 3) m of every part's line."""
         return np.array([body.line(part, frame - self.origin) for part in self.parts])
 
     def ball_and_needs(self, lines: np.ndarray, frame: int) -> tuple[np.ndarray, np.ndarray]:
-        """Where the ball goes (3,) m, and what each part with lines (P, 2, 3) m then lacks (P, 3) m to touch it."""
+        """Compute the new place of the ball (3,) m, and what each part then lacks (P, 3) m to touch it.
+
+        Args:
+            lines: (P, 2, 3) m, the parts' lines.
+            frame: output frame.
+        """
         part, ball, room = self.parts[0], self.ball[frame], self.room(frame)
         if len(lines) == 2:
             return held_meeting(lines, part.radius, ball, room)
@@ -199,12 +251,13 @@ class _Scene:
         return met.ball[0], met.need
 
     def room(self, frame: int) -> Room:
-        """How far the ball may move; one on the ground stays there."""
+        """Return how far the ball may move; a ball on the ground stays there."""
         whole = BALL_NOISE if self.measured[frame] else FILLED_NOISE
         return Room(whole, BALL_NOISE if self.ball[frame, 2] > _IN_THE_AIR else 0.0)
 
 
 def _scene(body: Body, moment: _Moment, origin: int, contacts, path, measured, height_known, fps: float) -> _Scene:
+    """Build the scene of a touch: choose parts and aim."""
     at, choices = moment.frame - origin, surfaces(body.skeleton, moment.words)
     if choices[0].part == "hand" and _together(body, choices, at, moment.words):
         parts = choices
@@ -213,6 +266,7 @@ def _scene(body: Body, moment: _Moment, origin: int, contacts, path, measured, h
     shares = tuple(_share(moment, origin, len(body.root), _standing(contacts, part), fps) for part in parts)
     line, radius = body.line(parts[0], at), parts[0].radius
     if parts[0].part != "foot" or _HIGH & moment.words:
+        # without a measured height the ball flies through the part's height
         height = 0.5 * (line[0] + line[1])[2] + _RISE[parts[0].part] * (radius + BALL_RADIUS)
         path = lofted(path, moment.frame, float(height), ~height_known, fps)
     ahead = _direction(body, parts[0], moment, at=at, path=path, fps=fps)
@@ -227,21 +281,21 @@ def _scene(body: Body, moment: _Moment, origin: int, contacts, path, measured, h
 
 
 def _other_leg(body: Body, foot: Surface, at: int) -> list[tuple]:
-    """Line and radius of the foot and the shin that do not strike."""
+    """Return line and radius of the foot and the shin that do not strike."""
     other = next(part for part in part_surfaces(body.skeleton, "foot") if part.side != foot.side)
     knee, ankle = body.places[at, list(limb_chain(body.skeleton, other)[1:])]
     return [(body.line(other, at), other.radius), ((knee, ankle), other.radius)]
 
 
 def _together(body: Body, hands: Sequence[Surface], at: int, words: frozenset[str]) -> bool:
-    """Whether all hands that are named go to the ball: in a dive only to catch it, and where they are not far apart."""
+    """Return whether all labelled hands reach for the ball: in a dive only to catch it, and if close together."""
     middles = [np.mean(body.line(hand, at), axis=0) for hand in hands]
     near = np.linalg.norm(middles[0] - middles[-1]) < _HANDS_APART
     return not met_within(words) or bool(near and by_both_hands(words))
 
 
 def _likeliest(body: Body, choices: Sequence[Surface], at: int, contacts, ball: np.ndarray, fps: float) -> Surface:
-    """The part nearest to the ball, a swinging foot before one that stands."""
+    """Choose the part nearest to the ball, a swinging foot before one in contact."""
     def cost(part: Surface) -> float:
         gap = float(ball_gap(body.line(part, at), part.radius, ball))
         return gap + 0.3 * _standing(contacts, part)[at] - 0.05 * np.linalg.norm(_velocity(body, part, at, fps))
@@ -250,16 +304,20 @@ def _likeliest(body: Body, choices: Sequence[Surface], at: int, contacts, ball: 
 
 
 def _standing(contacts: np.ndarray, part: Surface) -> np.ndarray:
-    """(W,) bool: the part is a foot on the ground."""
+    """Return (W,) bool: whether the part is a foot in contact."""
     if part.part != "foot":
         return np.zeros(len(contacts), bool)
     return contacts[:, ("left", "right").index(part.side)]
 
 
 def _share(moment: _Moment, origin: int, count: int, standing: np.ndarray, fps: float) -> np.ndarray:
-    """(W,) how much of its shift a part has at each frame: 1 while the touch is held, 0 outside the clip's entry and
-    exit and while the foot stands, but for the least time that a body needs."""
+    """Compute the share (W,) of its shift that a part has at each frame.
+
+    It is 1 while the touch is held, 0 outside the clip's entry and exit and while the foot is in contact, except for
+    the shortest ease that a body needs.
+    """
     first, last = (frame - origin for frame in moment.held)
+    # contact frames before the touch, without a contact that lasts up to the touch itself; the same behind it
     before = np.flatnonzero(standing[:first] & ~np.logical_and.accumulate(standing[:first][::-1])[::-1])
     after = np.flatnonzero(standing[last + 1 :] & ~np.logical_and.accumulate(standing[last + 1 :]))
     lift, land = before[-1] if len(before) else -np.inf, last + 1 + after[0] if len(after) else np.inf
@@ -270,14 +328,17 @@ def _share(moment: _Moment, origin: int, count: int, standing: np.ndarray, fps: 
 
 
 def _velocity(body: Body, part: Surface, at: int, fps: float) -> np.ndarray:
-    """(3,) m/s of the part's middle."""
+    """Compute the velocity (3,) m/s of the part's middle."""
     middle = np.mean(body.line(part, slice(max(at - 1, 0), at + 2)), axis=0)
     return (middle[-1] - middle[0]) * fps / max(len(middle) - 1, 1)
 
 
 def _direction(body: Body, part: Surface, moment: _Moment, at: int, path: np.ndarray, fps: float) -> np.ndarray:
-    """(3,) level, unit: a kick drives the ball where the foot goes, and rather where it is seen to fly; who stops a
-    ball has it on the side from which it comes; head, chest and hands have it ahead."""
+    """Choose the direction (3,) level, unit, in which a part strikes.
+
+    A kick drives the ball where the foot moves, corrected towards where it is seen to fly; a player who stops a ball
+    has it on the side from which it comes; head, chest and hands have it ahead.
+    """
     angle = heading_from_positions(body.skeleton, body.places[at])
     ahead = np.array([np.cos(angle), np.sin(angle), 0.0])
     near, reach = moment.frame, max(int(round(0.1 * fps)), 1)
@@ -287,6 +348,7 @@ def _direction(body: Body, part: Surface, moment: _Moment, at: int, path: np.nda
         return unit_vector(-coming, ahead)
     if part.part != "foot":
         return ahead
+    # towards the incoming ball, or towards a slow ball's place, mixed with straight ahead
     if _STOPPING & moment.words:
         middle = np.mean(body.line(part, at), axis=0)
         wish = -coming if np.linalg.norm(coming) > 1.0 else _flat(path[moment.frame] - middle)
@@ -297,12 +359,16 @@ def _direction(body: Body, part: Surface, moment: _Moment, at: int, path: np.nda
 
 
 def _flat(v: np.ndarray) -> np.ndarray:
+    """Return a vector (3,) without its height."""
     return v * [1.0, 1.0, 0.0]
 
 
 def _reached(scene: _Scene, body: Body) -> tuple[Body, float]:
-    """The body with its parts at the ball, as far as they reach, and how far they were moved, m. What is asked for and
-    what the body makes of it are worked out in turns, since a nearly straight limb yields softly, a spine on an arc."""
+    """Bring the parts of a body to the ball, within their reach; also return how far they were moved, m.
+
+    Requested shifts and what the body can do are solved alternately, since a nearly straight limb yields softly and a
+    spine moves on an arc.
+    """
     own = scene.lines(body, scene.moment.frame)
     if np.linalg.norm(scene.ball_and_needs(own, scene.moment.frame)[1]) < _CLOSE:
         return body, 0.0
@@ -325,8 +391,14 @@ def _reached(scene: _Scene, body: Body) -> tuple[Body, float]:
 
 
 def _wished(scene: _Scene, body: Body, lines: np.ndarray, shifts: np.ndarray) -> np.ndarray:
-    """Shifts (P, 3) m that bring parts to the ball which are at `lines` (P, 2, 3) m by `shifts` (P, 3) m, as far as a
-    body can make them."""
+    """Compute the shifts that bring parts to the ball, within what a body can do.
+
+    Args:
+        lines: (P, 2, 3) m, the parts' lines with the shifts below.
+        shifts: (P, 3) m.
+    Returns:
+        (P, 3) m.
+    """
     wished = shifts
     for _ in range(_ROUNDS):
         _, needs = scene.ball_and_needs(lines + (wished - shifts)[:, None], scene.moment.frame)
@@ -340,7 +412,7 @@ def _wished(scene: _Scene, body: Body, lines: np.ndarray, shifts: np.ndarray) ->
 
 
 def _bounded(body: Body, part: Surface, at: int, shift: np.ndarray) -> np.ndarray:
-    """A shift (3,) m that a body can make: not too far, and a limb neither below the ground nor beyond its joints."""
+    """Limit a shift (3,) m to what a body can do: not too far, no limb below the ground or beyond its joints."""
     shift = shift * min(1.0, MOST_MOVED[part.part] / max(np.linalg.norm(shift), 1e-9))
     if part.part == "foot":
         shift = above_ground(body, part, at, _beside_pelvis(body, part, at, shift))
@@ -350,6 +422,7 @@ def _bounded(body: Body, part: Surface, at: int, shift: np.ndarray) -> np.ndarra
 
 
 def _beside_pelvis(body: Body, part: Surface, at: int, shift: np.ndarray) -> np.ndarray:
+    """Limit the shift (3,) m of a foot to PELVIS_RANGE from the pelvis on the ground."""
     pelvis, middle = body.places[at, identify(body.skeleton).hips], np.mean(body.line(part, at), axis=0)
     away = _flat(middle + shift - pelvis)
     own, wanted = np.linalg.norm(_flat(middle - pelvis)), np.linalg.norm(away)
@@ -358,7 +431,7 @@ def _beside_pelvis(body: Body, part: Surface, at: int, shift: np.ndarray) -> np.
 
 
 def _swing(body: Body, part: Surface, at: int, shift: np.ndarray) -> Swing:
-    """The limb's swing with which the part is moved by `shift` (3,) m; the pelvis sinks where its leg is too short."""
+    """Solve the limb's swing that moves a part by `shift` (3,) m; the pelvis sinks where its leg is too short."""
     chain = limb_chain(body.skeleton, part)
     place = body.places[at, chain[2]] + shift
     lowered = _drop(body, chain, at, place) if part.part == "foot" else 0.0
@@ -366,16 +439,17 @@ def _swing(body: Body, part: Surface, at: int, shift: np.ndarray) -> Swing:
 
 
 def _drop(body: Body, chain: tuple[int, int, int], at: int, ankle: np.ndarray) -> float:
-    """Metres, at most MOST_DROP, to lower the pelvis so that the leg reaches the place (3,) of its ankle."""
+    """Compute how far the pelvis sinks so that the leg reaches the place (3,) of its ankle, m, at most MAX_DROP."""
     hip, knee, own = body.places[at, list(chain)]
     upper, lower = np.linalg.norm(knee - hip), np.linalg.norm(own - knee)
+    # law of cosines: length of the leg at its largest knee angle
     length = np.sqrt(upper**2 + lower**2 - 2.0 * upper * lower * np.cos(MOST_ANGLE))
     length, level = max(length, np.linalg.norm(own - hip)), np.linalg.norm(_flat(ankle - hip))
     return float(np.clip(hip[2] - ankle[2] - np.sqrt(max(length**2 - level**2, 0.0)), 0.0, MOST_DROP))
 
 
 def _moved(scene: _Scene, body: Body, limbs: Sequence[Resting], shifts: np.ndarray) -> Body:
-    """The body with each part moved by its shift (3,) m, blended by its share."""
+    """Move each part of the body by its shift (3,) m, weighted by its share."""
     root, rotations = body.root, body.rotations
     if not limbs:
         rotations = spine_bent(body, scene.parts[0], scene.at, shifts[0], scene.shares[0])
@@ -389,7 +463,7 @@ def _moved(scene: _Scene, body: Body, limbs: Sequence[Resting], shifts: np.ndarr
 
 
 def _gaps_and_shifts(skeleton: Skeleton, root, rotations, feed, path, touches) -> tuple[np.ndarray, np.ndarray]:
-    """Gap (K,) m and the ball's shift on the ground (K,) m at the frame nearest to each touch."""
+    """Measure gap (K,) m and level shift of the ball (K,) m at the frame nearest to each touch."""
     frames = np.array([_nearest(touch.frame, len(root)) for touch in touches], dtype=int)
     places, world = pose_kinematics(skeleton, root[frames], rotations[frames])
     rows = zip(places, world, touches, path[frames])

@@ -1,8 +1,8 @@
-"""A part of the body brought to a ball that stays where it is: the ball's flight is given, the body meets it.
+"""Bring a part of the body to a ball that stays where it is: the ball's flight is given, the body meets it.
 
-`synthesis.construct.strike` moves a tracked ball within its noise; here there is no noise. The part is moved by
-the shortest way that closes the gap at the frame of the strike: a limb swings about its upper joint, head and chest by
-bending the spine, any other joint with the whole body; before and after it eases back, a foot between its lift-off and
+`synthesis.construct.strike` moves a tracked ball within its noise; here there is no noise. The part moves by the
+shortest vector that closes the gap at the frame of the strike: a limb swings about its upper joint, head and chest move
+by bending the spine, any other joint with the whole body. Before and after it is eased, a foot between its lift-off and
 its landing.
 """
 
@@ -30,15 +30,23 @@ from .carry import (
 )
 from .meeting import eased_around
 
-LONGEST, SHORTEST = 0.5, 0.12  # s before and after a strike within which the part comes to the ball and goes back
-MOST = 0.35  # m that a part is moved at most
-_ROUNDS, _CLOSE = 6, 2e-4
+LONGEST, SHORTEST = 0.5, 0.12  # s before and after a strike within which the part comes to the ball and returns
+MOST = 0.35  # m, largest move of a part
+_ROUNDS, _CLOSE = 6, 2e-4  # most rounds of the iteration, and m at which it ends
 
 
 @dataclass(frozen=True, eq=False)
 class Meeting:
-    """One strike. frame: fractional. surface: what strikes. ball (3,) m: the ball's centre, NaN where it is missed;
-    radius: its radius, m. entry, leave: frames before and after within which the body may be changed."""
+    """One strike.
+
+    Attributes:
+        frame: output frame, fractional.
+        surface: what strikes.
+        ball: (3,) m, the ball's centre, NaN where it is missed.
+        radius: m, of the ball.
+        entry: frames before within which the body may be changed.
+        leave: frames after.
+    """
 
     frame: float
     surface: Surface
@@ -50,7 +58,13 @@ class Meeting:
 
 @dataclass(frozen=True, eq=False)
 class Met:
-    """motion; per strike gap (K,) m between the surfaces and moved (K,) m that the part was, NaN where it is missed."""
+    """A motion with its strikes solved.
+
+    Attributes:
+        motion: the motion.
+        gap: (K,) m between the surfaces at each strike, NaN where the ball is missed.
+        moved: (K,) m that the part was moved, NaN where the ball is missed.
+    """
 
     motion: Motion
     gap: np.ndarray
@@ -58,9 +72,16 @@ class Met:
 
 
 def met_at(motion: Motion, standing: np.ndarray, meetings: Sequence[Meeting], grounded: bool = False) -> Met:
-    """A motion with its parts on the ball at every strike, as far as a body can; standing (T, 2) bool: left and right
-    foot on the ground. grounded: the ground is at height 0, and no foot goes through it. Frames away from the strikes
-    keep their bits."""
+    """Bring the parts of a motion to the ball at every strike, within the reach of a body.
+
+    Frames away from the strikes stay bit for bit.
+
+    Args:
+        motion: T frames.
+        foot_contacts: (T, 2) bool, left and right foot in contact.
+        strikes: K strikes.
+        has_ground: whether the ground is at height 0 and no foot goes through it.
+    """
     root, rotations = np.array(motion.root_positions), np.array(motion.rotations)
     gap, moved = np.full(len(meetings), np.nan), np.full(len(meetings), np.nan)
     count = len(motion)
@@ -78,8 +99,11 @@ def met_at(motion: Motion, standing: np.ndarray, meetings: Sequence[Meeting], gr
 
 
 def _share(meeting: Meeting, at: int, count: int, standing: np.ndarray, fps: float) -> np.ndarray:
-    """(T,) how much of its shift the part has: 1 at the strike, 0 outside the hit motion and while the foot stands, but
-    for the least time that a body needs."""
+    """Compute the share (T,) of the shift that the part has.
+
+    It is 1 at the strike, 0 outside entry and exit and while the foot is in contact, except for the shortest ease that
+    a body needs.
+    """
     low = at - np.clip(meeting.entry, SHORTEST * fps, LONGEST * fps)
     high = at + np.clip(meeting.leave, SHORTEST * fps, LONGEST * fps)
     if meeting.surface.part == "foot":
@@ -91,7 +115,7 @@ def _share(meeting: Meeting, at: int, count: int, standing: np.ndarray, fps: flo
 
 
 def _reached(body: Body, meeting: Meeting, at: int, share: np.ndarray, grounded: bool) -> tuple[Body, float, float]:
-    """The body with its part at the ball, how far the part was moved and what gap is left, m."""
+    """Bring the part to the ball; return the body, how far the part was moved, and the gap that is left, m."""
     shift, struck, best = np.zeros(3), body, (body, 0.0, abs(_gap(body, meeting, at)))
     for _ in range(_ROUNDS):
         line = struck.line(meeting.surface, at)
@@ -112,11 +136,12 @@ def _reached(body: Body, meeting: Meeting, at: int, share: np.ndarray, grounded:
 
 
 def _gap(body: Body, meeting: Meeting, at: int) -> float:
+    """Measure the gap, m, between part and ball."""
     return float(ball_gap(body.line(meeting.surface, at), meeting.surface.radius, meeting.ball, meeting.radius))
 
 
 def _carried(body: Body, surface: Surface, at: int, shift: np.ndarray, share: np.ndarray, grounded: bool) -> Body:
-    """The body with the surface moved by `shift` (3,) m at frame `at`, by its share (W,) around it."""
+    """Move the surface by `shift` (3,) m at frame `at`, by its share (W,) around it."""
     root, rotations = body.root, body.rotations
     if surface.part in ("foot", "hand", "tool"):
         chain, most = limb_chain(body.skeleton, surface), MOST_SWING["foot" if surface.part == "foot" else "hand"]

@@ -1,5 +1,6 @@
-"""The ground under Faustino's block searches: the track's place by travelled distance, or the clips' own paths put one
-behind the other (§3.2.6)."""
+"""Root motion of Faustino's block searches: the track's place by travelled distance, or the clips' own paths chained
+one after the other (§3.2.6).
+"""
 
 from __future__ import annotations
 
@@ -22,13 +23,16 @@ from .on_track import facing, root_with_sway
 from .steps import Steps
 from .transitions import spread_rotations, spread_values
 
-UPRIGHT = np.cos(np.radians(50.0))  # height of the trunk's unit vector below which a body lies
+UPRIGHT = np.cos(np.radians(50.0))  # height of the trunk's unit vector below which a body is not upright (§3.2.6)
 
 
 def lay_out_blocks(construction: Construction, travelled: np.ndarray | None) -> tuple[Planted, Steps]:
-    """Lay T source frames on the ground as the thesis does: nothing is planted.
+    """Construct the motion of T source frames as the thesis does: no foot is planted.
 
-    travelled: (T,) m by method "distance", None by "blocks"."""
+    Args:
+        construction: the source frames and the track.
+        travelled: (T,) m by method "distance", None by "blocks".
+    """
     track, source = construction.track, construction.source
     smooth = _spread_transitions(construction.plan, source)
     if travelled is None:
@@ -41,7 +45,10 @@ def lay_out_blocks(construction: Construction, travelled: np.ndarray | None) -> 
 
 
 def _spread_transitions(plan: ResolvedPlan, source: Footage) -> Footage:
-    """Spread the jump at each transition over the frames around it. Source: Faustino eq. 25."""
+    """Spread the jump at each transition over the frames around it.
+
+    Source: Faustino 2024, §3.3.1, eq. 25.
+    """
     reach = 0.5 * plan.asked.seam_window * plan.fps
     return replace(
         source,
@@ -52,7 +59,15 @@ def _spread_transitions(plan: ResolvedPlan, source: Footage) -> Footage:
 
 
 def root_at_distance(track: SampledTrack, smooth: Footage, travelled: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Heading (T,) rad and root (T, 2) m where the track has come as far as `travelled` (T,) m."""
+    """Place the root where the track has travelled a given distance.
+
+    Args:
+        track: T frames.
+        smooth_source: T source frames without jumps.
+        travelled: (T,) m.
+    Returns:
+        Heading (T,) rad and root (T, 2) m, world.
+    """
     place, direction = place_along(track, travelled)
     speed = np.abs(np.gradient(travelled)) * track.fps if len(travelled) > 1 else np.zeros(1)
     heading = facing(direction, speed, smooth.velocity, smooth.turn)
@@ -60,11 +75,18 @@ def root_at_distance(track: SampledTrack, smooth: Footage, travelled: np.ndarray
 
 
 def place_along(track: SampledTrack, travelled: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Places (T, 2) m on the track's path after `travelled` (T,) m, and the direction (T,) rad of the path there.
+    """Find the places on the track's path after a travelled distance.
 
-    Beyond the track's end the last direction is kept. Source: Faustino eq. 29, which steps from the present place
-    towards the track's place at the next travelled distance; since both lie on the same path, the steps add up to the
-    path itself. (As printed the difference points backwards.)
+    Beyond the track's end the last direction is kept.
+
+    Args:
+        track: the sampled track.
+        travelled: (T,) m.
+    Returns:
+        Places (T, 2) m and direction (T,) rad of the path there, world.
+    Source: Faustino 2024, eq. 29, which steps from the present place towards the track's place at the next travelled
+        distance; since both lie on the same path, the steps add up to the path itself. (As printed the difference
+        points backwards.)
     """
     path = travelled_distance(track) + 1e-6 * np.arange(len(track.times))
     place = np.stack([np.interp(travelled, path, track.positions[:, axis]) for axis in (0, 1)], axis=1)
@@ -76,8 +98,16 @@ def place_along(track: SampledTrack, travelled: np.ndarray) -> tuple[np.ndarray,
 def root_by_integration(
     library: Library, source: Footage, smooth: Footage, track: SampledTrack
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Heading (T,) rad and root (T, 2) m from the track's first place and direction on, wherever the clips lead;
-    smooth: `source` without jumps."""
+    """Integrate the root from the track's first place and direction on, wherever the clips lead.
+
+    Args:
+        library: the clips.
+        source: T source frames.
+        smooth_source: the same without jumps.
+        track: T frames.
+    Returns:
+        Heading (T,) rad and root (T, 2) m, world.
+    """
     turn = source.turn.copy()
     torso, expected = _torso(library, source.pose), _torso(library, source.ahead_pose)
     turn[source.seams] += torso_corrections(torso, source.seams, expected)
@@ -86,7 +116,7 @@ def root_by_integration(
 
 
 def _torso(library: Library, pose: np.ndarray) -> np.ndarray:
-    """(T, 3) unit vector from hips to chest or neck in the facing frame."""
+    """Compute the unit vectors (T, 3) from hips to chest or neck in the facing frame."""
     body = identify(library.skeleton)
     top = body.neck if body.neck is not None else body.chest
     places, _ = pose_kinematics(library.skeleton, np.zeros((len(pose), 3)), pose)
@@ -94,17 +124,31 @@ def _torso(library: Library, pose: np.ndarray) -> np.ndarray:
 
 
 def chained_facing(start: float, turn: np.ndarray) -> np.ndarray:
-    """(T,) facing in radians from `start` on, turning by `turn` (T,) per frame as recorded; at a seam `turn` is 0, so
-    that the next stretch begins in the direction in which the last one ended."""
+    """Add up the recorded turning to a heading.
+
+    Args:
+        start: rad, heading of the first frame.
+        turn: (T,) rad since the frame before; 0 at a transition, so that a piece begins in the direction in which the
+            one before ended.
+    Returns:
+        (T,) rad.
+    """
     return start + np.cumsum(turn) - turn[0]
 
 
 def torso_corrections(up: np.ndarray, seams: np.ndarray, expected: np.ndarray) -> np.ndarray:
-    """(S,) radians by which a stretch has to be turned more at each seam because the body is not upright there.
+    """Compute by how much more a piece has to turn at each transition because the body is not upright there.
 
-    up: (T, 3) direction of the torso (hips to neck) in the facing frame; expected: (S, 3) the same for the frame that
-    the stretch before would have gone on with. Facing says little about a body that lies or dives: where both torsos
-    lean more than 50 degrees, the stretch is turned until they lie the same way (§3.2.6, the extra check on the spine).
+    Heading says little about a body that lies or dives: where both torsos lean more than 50 degrees, the piece is
+    turned until they lie in the same direction.
+
+    Args:
+        up: (T, 3) unit, direction of the torso (hips to neck) in the facing frame.
+        transitions: (S,) frames of transitions.
+        expected: (S, 3) unit, the same for the frame with which the piece before would continue.
+    Returns:
+        (S,) rad.
+    Source: Faustino 2024, §3.2.6, the extra check on the spine.
     """
     out = np.zeros(len(seams))
     for number, (after, before) in enumerate(zip(up[seams], expected)):
@@ -116,8 +160,20 @@ def torso_corrections(up: np.ndarray, seams: np.ndarray, expected: np.ndarray) -
 def chained_root(
     place: np.ndarray, velocity: np.ndarray, sway: np.ndarray, facing: np.ndarray, fps: float
 ) -> np.ndarray:
-    """(T, 2) root on the ground from `place` (2,) on: the path's velocity (T, 2, m/s, facing frame) summed up, plus
-    sway (T, 2). Across a seam the last displacement is repeated (eq. 24), which is what summing velocities does."""
+    """Integrate the root on the ground.
+
+    Across a transition the last displacement is repeated, which is what summing velocities does.
+
+    Args:
+        place: (2,) m, first place.
+        velocity: (T, 2) m/s of the path, facing frame.
+        sway: (T, 2) m, facing frame.
+        facing: (T,) rad, heading.
+        fps: frames per second.
+    Returns:
+        (T, 2) m, world.
+    Source: Faustino 2024, eq. 24.
+    """
     turn = quaternion.about_up(facing)
     step, away = (quaternion.rotate(turn, np.pad(flat, ((0, 0), (0, 1))))[:, :2] for flat in (velocity, sway))
     path = place + np.concatenate([np.zeros((1, 2)), np.cumsum(step[:-1] / fps, axis=0)])

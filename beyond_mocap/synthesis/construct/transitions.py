@@ -1,11 +1,13 @@
-"""Transitions between pieces: faded over, where both recordings go on and one relaxes into the other by a quintic, or
-their jump spread over the frames around it (Faustino §3.3.1 eq. 25, 26, after Arikan and Forsyth 2002).
+"""Transitions between pieces: blended, or their jump spread over the frames around it.
 
-In a fade both are real, so that places, velocities and accelerations agree at both ends of it. Compared on 33 takes of
-20 s from three libraries, jerk at transitions over the real 95th percentile (median; share of transitions above
-it): the jump spread by eq. 25 0.90; 33 %, inertialization (the jump and its velocity decaying by a quintic, half on
-each side; Bollo 2018) 0.84; 31 %, all of it after the transition 0.84; 30 % with feet moved half as far again, and this
-fade 0.73; 25 %.
+A blend runs where both recordings continue and one relaxes into the other by a quintic: both are real, so places,
+velocities and accelerations agree at both ends of it. Spreading follows Faustino 2024, §3.3.1, eq. 25, 26 (after Arikan
+and Forsyth 2002).
+
+Compared on 33 takes of 20 s from three libraries: jerk at transitions over the real 95th percentile (median; share of
+transitions above it). The jump spread by eq. 25: 0.90; 33 %. Inertialization (the jump and its velocity decay by a
+quintic, half on each side; Bollo 2018): 0.84; 31 %. All of it after the transition: 0.84; 30 % with feet moved half as
+far again. This blend: 0.73; 25 %.
 """
 
 from __future__ import annotations
@@ -20,16 +22,29 @@ LONGEST_SPREAD = 12  # frames to either side of a jump
 
 
 def fade_share(through: np.ndarray, after: np.ndarray) -> np.ndarray:
-    """(R,) share that the other piece has in each frame of a fade.
+    """Compute the share that the other piece has in each frame of a blend.
 
-    through (R,) from 0 to 1: how far the fade has come; after (R,) bool: whether the frame lies behind the seam, where
-    the other piece is the one that ends."""
+    Args:
+        through: (R,) from 0 to 1, progress of the blend.
+        after: (R,) bool, whether the frame lies behind the transition, where the other piece is the one that ends.
+    Returns:
+        (R,) 0 to 1.
+    """
     begun = quintic_step(through)
     return np.where(after, 1.0 - begun, begun)
 
 
 def faded_values(values: np.ndarray, at: np.ndarray, other: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """Values (T, ...) mixed at frames `at` (R,) with those of the other piece (R, ...) by `weight` (R,)."""
+    """Blend values with those of the other piece.
+
+    Args:
+        values: (T, ...).
+        at: (R,) frames.
+        other: (R, ...) of the other piece there.
+        weight: (R,) of the other piece.
+    Returns:
+        (T, ...).
+    """
     out = np.array(values, dtype=float)
     out[at] += weight.reshape(-1, *[1] * (out.ndim - 1)) * (other - out[at])
     return out
@@ -38,10 +53,21 @@ def faded_values(values: np.ndarray, at: np.ndarray, other: np.ndarray, weight: 
 def faded_rotations(
     rotations: np.ndarray, at: np.ndarray, other: np.ndarray, through: np.ndarray, after: np.ndarray
 ) -> np.ndarray:
-    """Rotations (T, J, 4) mixed at frames `at` (R,) with those of the other piece (R, J, 4) by their `fade_share`.
+    """Blend rotations with those of the other piece by their `compute_blend_share`.
 
-    A joint turns the same way round throughout a fade: two swinging arms may be half a turn apart, and the shorter arc
-    of each frame alone would change sides in the middle. Taken is the side that is shorter in the mean of the fade."""
+    A joint turns in the same sense throughout a blend: two swinging arms may be half a turn apart, and the shorter arc
+    of each frame alone would change sides in the middle. The side is the one that is shorter in the mean over the
+    blend.
+
+    Args:
+        rotations: (T, J, 4).
+        at: (R,) frames.
+        other: (R, J, 4) of the other piece there.
+        through: (R,) progress of the blend.
+        after: (R,) bool, behind the transition.
+    Returns:
+        (T, J, 4).
+    """
     out = np.array(rotations, dtype=float)
     ends = np.where(after[:, None, None], other, out[at])
     begins = np.where(after[:, None, None], out[at], other)
@@ -52,12 +78,16 @@ def faded_rotations(
 
 
 def _steady_arc(turn: np.ndarray, through: np.ndarray) -> np.ndarray:
-    """Rotation vectors (R, J, 3) in radians, of up to a whole turn, that make rotations (R, J, 4) without changing
-    sides within a fade; `through` (R,) falls where the next fade begins."""
+    """Convert rotations (R, J, 4) to rotation vectors (R, J, 3) that do not change sides within a blend.
+
+    Lengths go up to a whole turn; `through` (R,) falls where the next blend begins.
+    """
     begins = np.diff(through, prepend=np.inf) <= 0.0
+    # make quaternions continuous within each blend: an odd number of sign flips so far changes the sign
     flips = np.sum(turn * np.roll(turn, 1, axis=0), axis=-1) < 0.0
     turn = turn * np.where(np.cumsum(flips & ~begins[:, None], axis=0) % 2 == 1, -1.0, 1.0)[..., None]
     fade = np.cumsum(begins) - 1
+    # sum of the scalar parts per blend and joint: negative means that the long arc is the mean
     middle = np.zeros((begins.sum(), turn.shape[1]))
     np.add.at(middle, fade, turn[..., 0])
     turn = turn * np.where(middle < 0.0, -1.0, 1.0)[fade][..., None]
@@ -67,8 +97,18 @@ def _steady_arc(turn: np.ndarray, through: np.ndarray) -> np.ndarray:
 
 
 def spread_share(offset: np.ndarray, reach: float) -> np.ndarray:
-    """Eq. 25: how much of a discontinuity is added at `offset` frames (N,) from it, `reach` being s: it grows to 1/2
-    just before the discontinuity, jumps to -1/2 at it and shrinks to 0, with a continuous slope everywhere else."""
+    """Compute how much of a discontinuity is added at an offset from it.
+
+    It grows to 1/2 just before the discontinuity, jumps to -1/2 at it and shrinks to 0, with a continuous slope
+    everywhere else.
+
+    Args:
+        offset: (N,) frames from the discontinuity.
+        reach: frames, s of eq. 25.
+    Returns:
+        (N,) share.
+    Source: Faustino 2024, eq. 25.
+    """
     x = (np.asarray(offset, dtype=float) + reach) / max(reach, 1e-9)
     rising = 0.5 * x**2
     falling = -0.5 * x**2 + 2.0 * x - 2.0
@@ -76,8 +116,15 @@ def spread_share(offset: np.ndarray, reach: float) -> np.ndarray:
 
 
 def spread_reaches(seams: np.ndarray, count: int, longest: float = LONGEST_SPREAD) -> np.ndarray:
-    """(S,) the s of eq. 25 for each seam: half of the shorter neighbouring stretch, so that windows never overlap, and
-    at most `longest` frames."""
+    """Compute the reach of each transition: half of the shorter neighbouring piece, so that windows never overlap.
+
+    Args:
+        transitions: (S,) frames of transitions.
+        count: number of frames.
+        longest: frames, limit.
+    Returns:
+        (S,) frames, s of eq. 25.
+    """
     lengths = np.diff(np.concatenate([[0], seams, [count]]))
     return np.minimum(np.minimum(lengths[:-1], lengths[1:]) / 2.0, longest)
 
@@ -85,8 +132,16 @@ def spread_reaches(seams: np.ndarray, count: int, longest: float = LONGEST_SPREA
 def spread_values(
     values: np.ndarray, seams: np.ndarray, ahead: np.ndarray, longest: float = LONGEST_SPREAD
 ) -> np.ndarray:
-    """Values (T, ...) without their jumps at `seams`; `ahead` (S, ...): what the frame at each seam would have been if
-    the piece before had gone on."""
+    """Spread the jumps of values at transitions.
+
+    Args:
+        values: (T, ...).
+        transitions: (S,) frames of transitions.
+        ahead: (S, ...), what the frame at each transition would have been if the piece before had continued.
+        longest: frames, limit of the reach.
+    Returns:
+        (T, ...) without jumps.
+    """
     out = np.array(values, dtype=float)
     for seam, expected, reach in zip(seams, ahead, spread_reaches(seams, len(values), longest)):
         at, weight = _window(seam, reach, len(values))
@@ -97,10 +152,20 @@ def spread_values(
 def spread_rotations(
     rotations: np.ndarray, seams: np.ndarray, ahead: np.ndarray, longest: float = LONGEST_SPREAD
 ) -> np.ndarray:
-    """The same for rotations (T, J, 4), `ahead` (S, J, 4): the discontinuity of eq. 26 is the rotation from the
-    expected pose to the one after the seam, spread as a share of its rotation vector.
+    """Spread the jumps of rotations at transitions.
 
-    Eq. 26 subtracts the other way round for the root, which would double its jump; all joints are treated alike here.
+    The discontinuity is the rotation from the expected pose to the one after the transition, spread as a share of its
+    rotation vector. Eq. 26 subtracts the other way round for the root, which would double its jump; all joints are
+    treated alike here.
+
+    Args:
+        rotations: (T, J, 4).
+        transitions: (S,) frames of transitions.
+        ahead: (S, J, 4), the pose if the piece before had continued.
+        longest: frames, limit of the reach.
+    Returns:
+        (T, J, 4) without jumps.
+    Source: Faustino 2024, eq. 26.
     """
     out = np.array(rotations, dtype=float)
     for seam, expected, reach in zip(seams, ahead, spread_reaches(seams, len(rotations), longest)):
@@ -112,5 +177,6 @@ def spread_rotations(
 
 
 def _window(seam: int, reach: float, count: int) -> tuple[slice, np.ndarray]:
+    """Return the frames around a transition as a slice, and the share of the jump in each."""
     low, high = max(0, int(np.ceil(seam - reach))), min(count, int(np.floor(seam + reach)) + 1)
     return slice(low, high), spread_share(np.arange(low, high) - seam, reach)

@@ -1,1 +1,1 @@
-"""What a take is measured by while it is made, and what gave way."""
+"""Quality of a take: the measures that synthesis itself needs, and the report of unmet constraints."""

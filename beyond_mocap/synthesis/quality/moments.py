@@ -1,4 +1,4 @@
-"""Key moments: which clip served each, when its key frame is played, and where body and ball were."""
+"""Key moments of a take: which clip served each, when its key frame is played, and where body and ball were."""
 
 from __future__ import annotations
 
@@ -21,11 +21,17 @@ from .played import Played, find_transitions, number_pieces
 class Moment:
     """How one key moment was served.
 
-    asked: the timeline's line. frame: output frame nearest to the time in force (the asked or the solved one). clip,
-    clip_frame (the clip's key frame, in its own rate), None where no key of a clip is played there. played_at: seconds
-    on the track's clock at which that key frame is played, NaN where it is not. words: those that the source carries at
-    `frame`. entry, exit: first and last output frame, without a seam between, that the clip's annotated row covers.
-    used_instead: words in place of the asked ones, None where the asked ones were had."""
+    Attributes:
+        requested: the key moment of the timeline.
+        frame: output frame nearest to its resolved time (the requested or the solved one).
+        clip: path of the clip, None where no key of a clip is played there.
+        clip_frame: the clip's key frame, in its own rate, None as above.
+        played_at: s on the track's clock at which that key frame is played, NaN where it is not.
+        words: labels that the source carries at `frame`.
+        entry: first output frame, without a transition between, that the clip's annotated row covers.
+        exit: last one.
+        used_instead: the labels used where the library lacks the requested ones, else None.
+    """
 
     asked: KeyMoment
     frame: int
@@ -39,7 +45,14 @@ class Moment:
 
 
 def moments(played: Played, keys: tuple[KeyMoment, ...], stride: np.ndarray, library: Library | None) -> list[Moment]:
-    """Every asked key moment as it was played; stride (T,): source frames per output frame at recorded speed."""
+    """Evaluate every requested key moment as it was played.
+
+    Args:
+        played: the take as played.
+        keys: the requested key moments.
+        stride: (T,) source frames per output frame at recorded speed.
+        library: the recordings, None where it is not known.
+    """
     starts = find_transitions(played.clip, played.mirrored, played.clip_frame, stride)
     number = number_pieces(len(played.clip), starts)
     results = {result.asked: result for result in played.keys}
@@ -48,13 +61,14 @@ def moments(played: Played, keys: tuple[KeyMoment, ...], stride: np.ndarray, lib
 
 
 def with_made(library: Library | None, played: Played) -> Library | None:
-    """The library whose gaits and key moments were played: with its made clips where one of them is shown."""
+    """Return the library that was played: with its synthetic clips where one of them is shown."""
     if library is None or not any(path.startswith(MADE_FOLDER) for path in played.clips):
         return library
     return library.extended
 
 
 def _moment(played: Played, key: KeyMoment, number: np.ndarray, result, library: Library | None) -> Moment:
+    """Evaluate one key moment."""
     frame = _frame_at(played, (key.in_force - played.start_time) * played.motion.fps)
     run = np.flatnonzero(number == number[frame if result is None else _frame_at(played, result.frame)])
     words = () if played.words is None else tuple(played.words[frame])
@@ -74,12 +88,12 @@ def _moment(played: Played, key: KeyMoment, number: np.ndarray, result, library:
 
 
 def _frame_at(played: Played, frame: float) -> int:
+    """Return the output frame nearest to a fractional one."""
     return int(np.clip(np.rint(frame), 0, len(played.motion) - 1))
 
 
 def _key_in_run(played: Played, run: np.ndarray, frame: int, key: KeyMoment, library: Library | None):
-    """The library's key that the run plays: carrying the asked words if any does, then nearest to what `frame`
-    shows."""
+    """Find the library key that the run plays: with the requested labels if any, then nearest to `frame`."""
     if library is None or played.clip[run[0]] < 0:
         return None
     path, side = played.clips[played.clip[run[0]]], bool(played.mirrored[run[0]])
@@ -90,17 +104,24 @@ def _key_in_run(played: Played, run: np.ndarray, frame: int, key: KeyMoment, lib
 
 
 def _instead(key: KeyMoment, words, result) -> tuple[str, ...] | None:
-    """The words used in place of the asked ones: what a take says of it, else those played where they lack some."""
+    """Return the labels used instead of the requested ones, by the take or by what is played there."""
     if result is not None and result.used_instead is not None:
         return tuple(result.used_instead)
     return None if set(key.words) <= set(words) else tuple(sorted(words))
 
 
 def crossing(clip_frames: np.ndarray, times: np.ndarray, key_frame: float) -> float:
-    """Seconds at which a run plays `key_frame`: clip_frames (R,) ascending, times (R,) s.
+    """Find when a run plays a key frame.
 
-    Up to one output frame before or after the run the rate is taken to go on; NaN farther out, where it is never
-    played."""
+    Up to one output frame before or after the run its rate continues.
+
+    Args:
+        clip_frames: (R,) ascending.
+        times: (R,) s.
+        key_frame: in the clip's own rate.
+    Returns:
+        Seconds, NaN where it is never played.
+    """
     if len(times) < 2 or not np.all(np.diff(clip_frames) > 0):
         hit = np.flatnonzero(np.abs(clip_frames - key_frame) < 0.5)
         return float(times[hit[0]]) if len(hit) else np.nan
@@ -113,10 +134,14 @@ def crossing(clip_frames: np.ndarray, times: np.ndarray, key_frame: float) -> fl
 
 
 def ball_gap(played: Played, moment: Moment) -> float:
-    """Distance in metres between the striking surface and the surface of the ball as written out, at the output frame
-    nearest to the asked time (`ball_contact.contact_gap`, overlap counted as distance too); NaN without ball or part.
+    """Measure the distance between the striking surface and the surface of the written ball at a key moment.
 
-    The part is that of the words which are played there; of the asked ones where those touch no ball."""
+    Measured at the output frame nearest to the requested time (`ball_contact.measure_contact_gap`, overlap counts as
+    distance too). The part is that of the labels played there; of the requested ones where those touch no ball.
+
+    Returns:
+        m, NaN without ball or part.
+    """
     if played.ball is None:
         return np.nan
     pose = played.positions[moment.frame], played.rotations[moment.frame]
@@ -125,9 +150,14 @@ def ball_gap(played: Played, moment: Moment) -> float:
 
 
 def met(played: Played, moment: Moment) -> tuple[float, float]:
-    """Seconds on the track's clock at which the ball is met, and the gap there, m, as `ball_gap` measures it. Both are
-    the key moment's, but for dives, in which a hand meets the ball at its nearest on the flight
-    (`ball_contact.met_within`); NaN without ball or part."""
+    """Measure when the ball is met, and the gap there.
+
+    Both are at the key moment, except for dives, in which a hand meets the ball at its nearest on the flight
+    (`ball_contact.find_contact_window`).
+
+    Returns:
+        Seconds on the track's clock and m, as in `measure_ball_gap`; NaN without ball or part.
+    """
     last = min(moment.frame + int(met_within(touching_words(moment)) * played.motion.fps), len(played.motion) - 1)
     frames = range(moment.frame, last + 1)
     gaps = [ball_gap(played, replace(moment, frame=frame)) for frame in frames]
@@ -138,19 +168,27 @@ def met(played: Played, moment: Moment) -> tuple[float, float]:
 
 
 def touching_words(moment: Moment) -> tuple[str, ...]:
-    """The words that say which part meets the ball (`ball_contact.meeting_words`)."""
+    """Return the labels that say which part meets the ball (`ball_contact.choose_contact_labels`)."""
     return meeting_words(moment.words, moment.asked.words)
 
 
 def written_ball(played: Played, frame: int) -> np.ndarray:
-    """The ball's centre (3,) m as written out with the take, at the row nearest to an output frame's time."""
+    """Return the ball's centre (3,) m as written with the take, at the row nearest to an output frame's time."""
     row = int(np.argmin(np.abs(played.ball.times - played.times[frame])))
     return played.ball.positions[row]
 
 
 def dribble_touches(played: Played, touches: Sequence[DribbleTouch], track: Track | None) -> list[dict]:
-    """Every touch of a dribble: its second, the foot, the largest gap of the foot's surface and the ball's while it
-    lasts, and how far the ball lies from its samples where it begins, m."""
+    """Measure every touch of a dribble.
+
+    Args:
+        played: the take as played.
+        touches: the touches.
+        track: the player's track, None where it is not known.
+    Returns:
+        Per touch its second, the foot, the largest gap between foot and ball while it lasts, and how far the ball is
+        from its samples where it begins, m.
+    """
     return [
         {
             "time_s": float(played.times[touch.first]),
@@ -162,14 +200,18 @@ def dribble_touches(played: Played, touches: Sequence[DribbleTouch], track: Trac
 
 
 def _foot_gap(played: Played, frame: int, side: str) -> float:
+    """Measure the gap, m, between a foot and the ball at a frame."""
     pose = played.positions[frame], played.rotations[frame]
     foot = part_surfaces(played.motion.skeleton, "foot", (side,))
     return abs(float(smallest_gap(foot, *pose, written_ball(played, frame))))
 
 
 def ball_shift(played: Played, frame: int, track: Track) -> float:
-    """How far on the ground the written ball lies from the measured one (straight lines between samples), m; NaN where
-    either is missing."""
+    """Measure how far on the ground the written ball is from the measured one (linear between samples).
+
+    Returns:
+        m, NaN where either is missing.
+    """
     known = np.isfinite(track.ball[:, :2]).all(axis=1)
     if played.ball is None or not known.any():
         return np.nan

@@ -1,11 +1,10 @@
-"""How a body moves: how well it is where the track says, its sway, surge and speeds, how hard its transitions are, and
-what its feet do: skate on contacts, slide per stance, GMD's skating ratio, the ground.
+"""Measures of movement: following the track, sway, surge, speeds, hardness of transitions, and the feet.
 
 Pelvis (T, 2) and track (T, 2) are in metres on the pitch, one row per output frame. The *root* of
-`../shared/metrics.md` is the pelvis behind a 1.5 s window, which takes out the sway that a body must keep; the track
-goes through the same window. Jerk, the third difference, is compared with what uncut recordings of the same speed show.
-Its index t stands for frames t .. t+3, so its middle is frame t + 1.5. A transition at frame s (the first of the new
-piece) has its middle at s - 0.5; its window of +-8 frames is jerk indices s-10 .. s+6.
+`../shared/metrics.md` is the pelvis seen through a 1.5 s window, which removes the sway that a body must keep; the
+track goes through the same window. Jerk, the third difference, is compared with what uncut recordings of the same speed
+show. Its index t stands for frames t .. t+3, so its middle is frame t + 1.5. A transition at frame s (the first of the
+new piece) has its middle at s - 0.5; its window of +-8 frames is jerk indices s-10 .. s+6.
 
 Feet are (T, 2, 2, 3) metres: frame, side (left, right), joint (heel, toe), world position with Z up. The heel is the
 foot (ankle) joint; a skeleton without a toe joint repeats it. Contacts are (T, 2) bool, labelled on the source clip and
@@ -24,23 +23,30 @@ from ...motion.humanoid import identify
 from ...motion.skeleton import Skeleton
 from ...motion.track import Track, zero_phase_hann
 
-ROOT_WINDOW = 1.5  # s
-TRAVEL_WINDOW = 1.0  # s
-STANDING = 0.5  # m/s: slower counts as standing
-SPEED_EDGES = (1.0, 2.0, 3.0, 4.5)  # m/s between the classes of `speed_class`
-JERK_REACH, SEAM_TO_JERK = 8, 2
+ROOT_WINDOW = 1.5  # s, of the root error
+TRAVEL_WINDOW = 1.0  # s, of the travel speed
+STANDING = 0.5  # m/s below which a body counts as standing
+SPEED_EDGES = (1.0, 2.0, 3.0, 4.5)  # m/s between the classes of `classify_speed`
+JERK_REACH, SEAM_TO_JERK = 8, 2  # jerk indices to either side of a transition, and from its middle index to its frame
 _WIDTH = 2 * JERK_REACH + 1
-NOTICED_SLIDE = 0.021  # m
-GMD_HEIGHT, GMD_SPEED, GMD_SECONDS = 0.05, 0.5, 0.25
-# directions that a stance's travel is measured along: the widest of 24 is at least 0.998 of the true one
+NOTICED_SLIDE = 0.021  # m of foot slide from which on people notice it
+GMD_HEIGHT, GMD_SPEED, GMD_SECONDS = 0.05, 0.5, 0.25  # m, m/s, s of GMD's skating ratio
+# directions along which a stance's travel is measured: the widest of 24 is at least 0.998 of the true one
 _DIRECTIONS = np.linspace(0.0, np.pi, 24, endpoint=False)
 _DIRECTIONS = np.stack([np.cos(_DIRECTIONS), np.sin(_DIRECTIONS)])
 
 
 def track_at(track: Track, at: np.ndarray) -> np.ndarray:
-    """The measured track (T, 2) m at the seconds `at` (T,): straight lines between samples, held beyond the ends.
+    """Interpolate the measured track at given seconds: linear between samples, held beyond the ends.
 
-    Not smoothed. Samples that cleaning filled in or replaced as outliers are left out. NaN where none is measured."""
+    Not smoothed. Samples that cleaning filled in or replaced as outliers are left out.
+
+    Args:
+        track: the track.
+        at: (T,) s.
+    Returns:
+        (T, 2) m, NaN where no sample is measured.
+    """
     known = track.measured
     if not known.any():
         return np.full((len(at), 2), np.nan)
@@ -48,37 +54,52 @@ def track_at(track: Track, at: np.ndarray) -> np.ndarray:
 
 
 def root_error(pelvis: np.ndarray, track: np.ndarray, fps: float) -> np.ndarray:
-    """Distance (T,) m between pelvis (T, 2) and track (T, 2), both through the same zero-phase Hann window of 1.5 s.
+    """Measure the distance between pelvis and track, both through the same zero-phase Hann window of 1.5 s.
 
-    The window is linear, so one pass over the difference is the difference of two passes."""
+    The window is linear, so one pass over the difference is the difference of two passes.
+
+    Args:
+        pelvis: (T, 2) m.
+        track: (T, 2) m.
+        fps: frames per second.
+    Returns:
+        (T,) m.
+    """
     return np.linalg.norm(zero_phase_hann(pelvis - track, fps, ROOT_WINDOW), axis=-1)
 
 
 def pelvis_error(pelvis: np.ndarray, track: np.ndarray) -> np.ndarray:
-    """Distance (T,) m between pelvis (T, 2) and track (T, 2) as they are, no window."""
+    """Measure the distance (T,) m between pelvis (T, 2) and track (T, 2) as they are, without a window."""
     return np.linalg.norm(pelvis - track, axis=-1)
 
 
 def sway(pelvis: np.ndarray, fps: float) -> np.ndarray:
-    """Distance (T,) m of a pelvis (T, 2) from its own 1.5 s Hann path: a recording's own pelvis error."""
+    """Measure the distance (T,) m of a pelvis (T, 2) from its own 1.5 s Hann path: a recording's own pelvis error."""
     return pelvis_error(pelvis, zero_phase_hann(pelvis, fps, ROOT_WINDOW))
 
 
 def travel_speed(pelvis: np.ndarray, fps: float) -> np.ndarray:
-    """Speed (T,) m/s of a pelvis or track (T, 2) behind a 1 s Hann window: how fast the body gets about."""
+    """Measure the speed (T,) m/s of a pelvis or track (T, 2) through a 1 s Hann window."""
     return np.linalg.norm(time_derivative(zero_phase_hann(pelvis, fps, TRAVEL_WINDOW), fps), axis=-1)
 
 
 def speed_class(speed: np.ndarray) -> np.ndarray:
-    """Class 0..4 of speeds (...,) m/s: 0-1, 1-2, 2-3, 3-4.5, above."""
+    """Return the class 0..4 of speeds (...,) m/s: 0-1, 1-2, 2-3, 3-4.5, above."""
     return np.digitize(speed, SPEED_EDGES)
 
 
 def surge(pelvis: np.ndarray, fps: float) -> np.ndarray:
-    """Pelvis speed along its path minus that speed's 1.5 s Hann: (T, 2) m -> (T,) m/s.
+    """Measure the pelvis speed along its path minus that speed's 1.5 s Hann.
 
-    The path's direction is that of the velocity behind the same window. Its rms guards against buying still feet with a
-    surging pelvis."""
+    The path's direction is that of the velocity through the same window. Its rms guards against still feet that are
+    bought with a surging pelvis.
+
+    Args:
+        pelvis: (T, 2) m.
+        fps: frames per second.
+    Returns:
+        (T,) m/s.
+    """
     speed = time_derivative(pelvis, fps)
     course = unit_vectors(zero_phase_hann(speed, fps, ROOT_WINDOW))
     along = np.sum(speed * course, axis=-1, keepdims=True)
@@ -86,14 +107,21 @@ def surge(pelvis: np.ndarray, fps: float) -> np.ndarray:
 
 
 def class_rms(values: np.ndarray, classes: np.ndarray, least: int = 30) -> np.ndarray:
-    """Root mean square (5,) of values (N,) in each speed class (N,); classes with fewer than `least` values take the
-    nearest class that has them, NaN where none has."""
+    """Compute the root mean square in each speed class.
+
+    Args:
+        values: (N,).
+        classes: (N,) class of each.
+        least: values that a class needs; others take the nearest class that has them.
+    Returns:
+        (5,), NaN where no class has enough.
+    """
     rms = [np.sqrt(np.mean(values[classes == k] ** 2)) if np.sum(classes == k) >= least else np.nan for k in range(5)]
     return nearest_known(np.array(rms))
 
 
 def nearest_known(values: np.ndarray) -> np.ndarray:
-    """Values (K,) with every NaN replaced by the nearest entry that is not NaN (the lower one of two)."""
+    """Replace every NaN in values (K,) by the nearest entry that is not NaN (the lower one of two)."""
     known = np.flatnonzero(np.isfinite(values))
     if not len(known):
         return values
@@ -101,17 +129,31 @@ def nearest_known(values: np.ndarray) -> np.ndarray:
 
 
 def speed_coverage(wanted: np.ndarray, fastest: float, slowest: float, reach=(0.85, 1.15)) -> dict[str, float]:
-    """Shares of frames that ask for a speed the library cannot play within the warp limits.
+    """Measure the shares of frames with a speed that the library cannot play within the warp limits.
 
-    wanted (T,) m/s; fastest root and slowest gait of the library, m/s. above: wanted > fastest x 1.15; below: wanted <
-    slowest x 0.85 and more than standing (0.5 m/s). NaN where the library's speed is not known."""
+    Args:
+        requested: (T,) m/s of the track.
+        fastest: m/s, fastest root of the library.
+        slowest: m/s, slowest gait of the library.
+        reach: warp limits.
+    Returns:
+        above: share with wanted > fastest x 1.15; below: share with wanted < slowest x 0.85 and more than standing
+        (0.5 m/s). NaN where the library's speed is not known.
+    """
     above = np.mean(wanted > fastest * reach[1]) if np.isfinite(fastest) else np.nan
     below = np.mean((wanted < slowest * reach[0]) & (wanted > STANDING)) if np.isfinite(slowest) else np.nan
     return {"above": float(above), "below": float(below)}
 
 
 def jerk(positions: np.ndarray, fps: float) -> np.ndarray:
-    """Largest third difference of any joint: positions (T, J, 3) m -> (T-3,) m/s^3, empty for less than four frames."""
+    """Compute the largest third difference of any joint.
+
+    Args:
+        positions: (T, J, 3) m.
+        fps: frames per second.
+    Returns:
+        (T-3,) m/s^3, empty for less than four frames.
+    """
     if len(positions) < 4:
         return np.zeros(0)
     third = positions[3:] - positions[:-3] + 3.0 * (positions[1:-2] - positions[2:-1])
@@ -119,14 +161,19 @@ def jerk(positions: np.ndarray, fps: float) -> np.ndarray:
 
 
 def windowed(values: np.ndarray) -> np.ndarray:
-    """Largest value within +-8 indices: (N,) -> (N,); windows end with the values."""
+    """Compute the largest value within +-8 indices: (N,) -> (N,); windows end with the values."""
     return maximum_filter1d(values, _WIDTH, mode="nearest") if len(values) else values
 
 
 def uncut_windows(values: np.ndarray, speed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Windowed maxima of an uncut clip where the whole window lies inside it, and the speed in their middle.
+    """Compute windowed maxima of an uncut clip where the whole window lies inside it, and the speed in their middle.
 
-    values (T-3,) m/s^3 of `jerk`, speed (T,) m/s -> (M,), (M,) with M = T - 19, or none in a short clip."""
+    Args:
+        values: (T-3,) m/s^3 of `compute_jerk`.
+        speed: (T,) m/s.
+    Returns:
+        (M,) and (M,) with M = T - 19, or none in a short clip.
+    """
     if len(values) < _WIDTH:
         return np.zeros(0), np.zeros(0)
     whole = slice(JERK_REACH, len(values) - JERK_REACH)
@@ -134,19 +181,33 @@ def uncut_windows(values: np.ndarray, speed: np.ndarray) -> tuple[np.ndarray, np
 
 
 def real_p95(windows: np.ndarray, speed: np.ndarray, least: int = 30) -> np.ndarray:
-    """95th percentile (5,) m/s^3 of uncut windows (M,) in each speed class of speed (M,) m/s.
+    """Compute the 95th percentile of uncut windows in each speed class.
 
-    A class with fewer than `least` windows takes the nearest class that has them (runs above 4.5 m/s are rare); NaN
-    where none has."""
+    A class with fewer than `least` windows takes the nearest class that has them (runs above 4.5 m/s are rare).
+
+    Args:
+        windows: (M,) m/s^3.
+        speed: (M,) m/s.
+        least: windows that a class needs.
+    Returns:
+        (5,) m/s^3, NaN where no class has enough.
+    """
     classes = speed_class(speed)
     values = [windows[classes == k] for k in range(5)]
     return nearest_known(np.array([np.percentile(v, 95) if len(v) >= least else np.nan for v in values]))
 
 
 def seam_ratios(values: np.ndarray, seams: np.ndarray, speed: np.ndarray, real: np.ndarray) -> np.ndarray:
-    """Windowed jerk at each seam over the real p95 at that speed: (S,).
+    """Compute windowed jerk at each transition over the real p95 at that speed.
 
-    values (T-3,) m/s^3; seams (S,) frames; speed (T,) m/s; real (5,) m/s^3 of `real_p95`."""
+    Args:
+        values: (T-3,) m/s^3.
+        transitions: (S,) frames of transitions.
+        speed: (T,) m/s.
+        real: (5,) m/s^3 of `compute_real_p95`.
+    Returns:
+        (S,).
+    """
     if not len(values) or not len(seams):
         return np.zeros(0)
     middle = np.clip(seams - SEAM_TO_JERK, 0, len(values) - 1)
@@ -154,14 +215,16 @@ def seam_ratios(values: np.ndarray, seams: np.ndarray, speed: np.ndarray, real: 
 
 
 def jerk_ratios(values: np.ndarray, speed: np.ndarray, real: np.ndarray) -> np.ndarray:
-    """Windowed jerk over the real p95 at that speed, in the middle of every window: (T-3,); see `seam_ratios`."""
+    """Compute windowed jerk over the real p95 at that speed, in the middle of every window: (T-3,)."""
     pace = speed[SEAM_TO_JERK : SEAM_TO_JERK + len(values)]
     return windowed(values) / real[speed_class(pace)]
 
 
 def rest_ratios(values: np.ndarray, seams: np.ndarray, speed: np.ndarray, real: np.ndarray) -> np.ndarray:
-    """The same ratio in the middle of every window that touches no seam's window: (M,). A locked knee can pop
-    anywhere."""
+    """Compute the same ratio in the middle of every window that touches no transition's window: (M,).
+
+    A locked knee can pop anywhere.
+    """
     if not len(values):
         return np.zeros(0)
     free = np.ones(len(values), dtype=bool)
@@ -171,22 +234,30 @@ def rest_ratios(values: np.ndarray, seams: np.ndarray, speed: np.ndarray, real: 
 
 
 def foot_joints(skeleton: Skeleton) -> np.ndarray:
-    """Joint indices (2, 2): side (left, right) x (heel, toe)."""
+    """Return joint indices (2, 2): side (left, right) x (heel, toe)."""
     body = identify(skeleton)
     return np.array([[limb.foot, limb.toe_or_foot] for limb in (body.left, body.right)])
 
 
 def contact_speeds(feet: np.ndarray, contacts: np.ndarray, fps: float) -> np.ndarray:
-    """Horizontal speed of each foot while it is labelled contact: (T-1, 2) m/s, NaN elsewhere.
+    """Measure the level speed of each foot while it is in contact.
 
-    Mean of heel and toe from one frame to the next, counted where both frames are contact (Kimodo's skate on contacts).
+    Mean of heel and toe from one frame to the next, counted where both frames are in contact (Kimodo's skate on
+    contacts).
+
+    Args:
+        feet: (T, 2, 2, 3) m.
+        contacts: (T, 2) bool.
+        fps: frames per second.
+    Returns:
+        (T-1, 2) m/s, NaN elsewhere.
     """
     step = np.linalg.norm(np.diff(feet[..., :2], axis=0), axis=-1).mean(axis=-1) * fps
     return np.where(contacts[:-1] & contacts[1:], step, np.nan)
 
 
 def stances(contacts: np.ndarray) -> np.ndarray:
-    """Runs of at least two contact frames: (S, 3) int rows of first frame, frame after the last, side."""
+    """List the runs of at least two contact frames: (S, 3) int rows of first frame, frame after the last, side."""
     rows = []
     for side in range(contacts.shape[1]):
         rows += [(start, stop, side) for start, stop in runs(contacts[:, side]) if stop - start >= 2]
@@ -194,25 +265,40 @@ def stances(contacts: np.ndarray) -> np.ndarray:
 
 
 def stance_travel(toes: np.ndarray, spans: np.ndarray) -> np.ndarray:
-    """Largest horizontal distance between two places of the planted toe within each stance: (S,) m.
+    """Measure the largest level distance between two places of the planted toe within each stance.
 
-    toes (T, 2, 3) m; spans (S, 3) of `stances`."""
+    Args:
+        toes: (T, 2, 3) m.
+        spans: (S, 3) of `list_stances`.
+    Returns:
+        (S,) m.
+    """
     travel = np.zeros(len(spans))
+    # positions along each direction; a last row of zeros, so that a stance may end at T for `reduceat`
     along = np.concatenate([toes[..., :2] @ _DIRECTIONS, np.zeros((1, 2, _DIRECTIONS.shape[1]))])
     for side in (0, 1):
         mine = spans[:, 2] == side
         if mine.any():
             bounds = spans[mine, :2].ravel()
+            # `reduceat` over (first, end) pairs: every second result is the stance itself
             widest = np.maximum.reduceat(along[:, side], bounds)[::2] - np.minimum.reduceat(along[:, side], bounds)[::2]
             travel[mine] = widest.max(axis=1)
     return travel
 
 
 def skating_steps(toes: np.ndarray, floor: float, fps: float) -> np.ndarray:
-    """GMD's skating frames: (T-1,) bool, either foot.
+    """Find GMD's skating frames, of either foot.
 
-    toes (T, 2, 3) m. Toe lower than 5 cm above the floor at t and t+1, faster than 0.5 m/s, and its 0.25 s mean speed
-    too (Karunratanakul et al. 2023, Guided Motion Diffusion, `calculate_skating_ratio`; their code works at 20 fps)."""
+    Toe lower than 5 cm above the floor at t and t+1, faster than 0.5 m/s, and its 0.25 s mean speed too.
+
+    Args:
+        toes: (T, 2, 3) m.
+        floor: m, height of the floor.
+        fps: frames per second.
+    Returns:
+        (T-1,) bool.
+    Source: Karunratanakul et al. 2023, Guided Motion Diffusion, `calculate_skating_ratio` (their code works at 20 fps).
+    """
     speed = np.linalg.norm(np.diff(toes[..., :2], axis=0), axis=-1) * fps
     width = 2 * int(GMD_SECONDS * fps / 2) + 1
     mean = uniform_filter1d(speed, width, axis=0, mode="constant") if len(speed) else speed
@@ -221,20 +307,34 @@ def skating_steps(toes: np.ndarray, floor: float, fps: float) -> np.ndarray:
 
 
 def support_height(feet: np.ndarray, contacts: np.ndarray, heel_rest: float) -> np.ndarray:
-    """Height above the ground of each planted foot's lower part: (T, 2) m, NaN where there is no contact.
+    """Measure the height above the ground of each planted foot's lower part.
 
-    feet (T, 2, 2, 3) m; `heel_rest`: height of the heel joint while the sole is flat, m. A foot on its heel counts by
-    the heel, a foot on its toes by the toe, so neither rolling raises the figure."""
+    A foot on its heel counts by the heel, a foot on its toes by the toe, so neither rolling raises the figure.
+
+    Args:
+        feet: (T, 2, 2, 3) m.
+        contacts: (T, 2) bool.
+        heel_rest: m, height of the heel joint while the sole is flat.
+    Returns:
+        (T, 2) m, NaN where there is no contact.
+    """
     lower = np.minimum(feet[..., 1, 2], feet[..., 0, 2] - heel_rest)
     return np.where(contacts, lower, np.nan)
 
 
 def tip_height(skeleton: Skeleton, positions: np.ndarray, rotations: np.ndarray) -> np.ndarray:
-    """Height (T,) m of the lower foot's tip, the end site of its toe (of the foot where it has no toe); NaN without
-    one.
+    """Measure the height of the lower foot's tip, the end site of its toe (of the foot where it has no toe).
 
-    positions (T, J, 3) m and rotations (T, J, 4) of the joints, world. Where a skeleton has no toe joints the floor is
-    known from the ankles alone, and only the tips show a boot that is in the ground."""
+    Where a skeleton has no toe joints the floor is known from the ankles alone, and only the tips show a boot that is
+    in the ground.
+
+    Args:
+        skeleton: the skeleton.
+        positions: (T, J, 3) m, world.
+        rotations: (T, J, 4), world.
+    Returns:
+        (T,) m, NaN without an end site.
+    """
     body, lowest = identify(skeleton), np.full(len(positions), np.nan)
     for parent, offset in zip(skeleton.end_parents, skeleton.end_offsets):
         if parent in (body.left.toe_or_foot, body.right.toe_or_foot) and np.any(offset):
@@ -244,17 +344,31 @@ def tip_height(skeleton: Skeleton, positions: np.ndarray, rotations: np.ndarray)
 
 
 def heel_rest_height(feet: np.ndarray, contacts: np.ndarray) -> float:
-    """Height of the heel joint on a flat foot, m: 2nd percentile over feet (T, 2, 2, 3) while both are in contact (T,
-    2).
+    """Measure the height of the heel joint on a flat foot: the 2nd percentile while both feet are in contact.
 
-    Over all frames where they never are, as in a run; NaN for no frames."""
+    Over all frames where they never are, as in a run.
+
+    Args:
+        feet: (T, 2, 2, 3) m.
+        contacts: (T, 2) bool.
+    Returns:
+        m, NaN for no frames.
+    """
     both = contacts.all(axis=1)
     heights = feet[both if both.any() else slice(None), :, 0, 2]
     return float(np.percentile(heights, 2)) if heights.size else np.nan
 
 
 def planted_shift(feet: np.ndarray, wanted: np.ndarray, contacts: np.ndarray) -> np.ndarray:
-    """How far planted feet stand from where the laid-out clip had them: feet, wanted (T, 2, 2, 3) m -> (N,) m.
+    """Measure how far planted feet are from where the placed clip had them.
 
-    Heel and toe joints' mean distance, one value per planted foot and frame."""
+    Mean distance of heel and toe joints, one value per planted foot and frame.
+
+    Args:
+        feet: (T, 2, 2, 3) m.
+        placed: (T, 2, 2, 3) m.
+        contacts: (T, 2) bool.
+    Returns:
+        (N,) m.
+    """
     return np.linalg.norm(feet - wanted, axis=-1).mean(axis=-1)[contacts]

@@ -1,5 +1,5 @@
-"""What was played: a body's motion, the ball, where every frame came from, and the pieces of clips that it is made of;
-the same from memory and from files.
+"""Playback: a body's motion, the ball, the source of every frame, and the pieces of clips that it consists of; the same
+from memory and from files.
 
 Pieces are read off clip (T,) an integer per clip (negative where unknown), mirrored (T,) bool, clip_frame (T,)
 fractional in the clip's own rate, and `stride` (T,), the source frames that pass in one output frame at recorded speed.
@@ -24,19 +24,27 @@ from ...motion.track.ball_path import BallPath
 from ..take import KeyResult, Take
 from .movement import foot_joints
 
-LOOP_SECONDS = 4.0
-LOOP_REACH = 80.0 / 60.0
+LOOP_SECONDS = 4.0  # s within which a stretch shown again counts as replayed
+LOOP_REACH = 80.0 / 60.0  # s of a clip around a shown frame that count as shown
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Played:
     """One player's take as evaluation sees it.
 
-    motion: T frames on the pitch; frame 0 is at `start_time` s on the track's clock. clips: table of clip paths below
-    the library; clip (T,) int index into it, -1 where the source is not known; clip_frame (T,) fractional frame in that
-    clip's own rate, NaN where not known; mirrored (T,) bool. words: T word tuples of the source frames, sides after
-    mirroring, or None. contacts (T, 2) bool, left and right. ball: as written out, or None. correction (T, 2) m each
-    foot was moved by polish, or None. keys: how key moments were served, empty where only files tell."""
+    Attributes:
+        motion: T frames on the pitch.
+        start_time: s on the track's clock of frame 0.
+        clips: table of clip paths below the library.
+        clip: (T,) int index into it, -1 where the source is not known.
+        clip_frame: (T,) fractional frame in that clip's own rate, NaN where not known.
+        mirrored: (T,) bool.
+        words: T tuples, labels of the source frames, sides after mirroring; None where not known.
+        contacts: (T, 2) bool, left and right foot.
+        ball: as written, or None.
+        correction: (T, 2) m each foot was moved by polishing, or None.
+        keys: how key moments were served, empty for a take read from files.
+    """
 
     motion: Motion
     start_time: float
@@ -52,7 +60,7 @@ class Played:
 
     @property
     def times(self) -> np.ndarray:
-        """Seconds (T,) on the track's clock."""
+        """(T,) s on the track's clock."""
         return self.start_time + np.arange(len(self.motion)) / self.motion.fps
 
     @cached_property
@@ -62,31 +70,39 @@ class Played:
 
     @cached_property
     def _kinematics(self) -> tuple[np.ndarray, np.ndarray]:
+        """World positions and rotations of the joints, computed once."""
         return forward_kinematics(self.motion)
 
     @property
     def positions(self) -> np.ndarray:
-        """World positions (T, J, 3) m of the joints."""
+        """(T, J, 3) m, world positions of the joints."""
         return self._kinematics[0]
 
     @property
     def rotations(self) -> np.ndarray:
-        """World rotations (T, J, 4) of the joints."""
+        """(T, J, 4) world rotations of the joints."""
         return self._kinematics[1]
 
     @property
     def pelvis(self) -> np.ndarray:
-        """Ground positions (T, 2) m of the hips joint."""
+        """(T, 2) m, ground positions of the hips joint."""
         return self.positions[:, self.body.hips, :2]
 
     @property
     def feet(self) -> np.ndarray:
-        """World positions (T, 2, 2, 3) m: side, (heel, toe)."""
+        """(T, 2, 2, 3) m, world positions: side, (heel, toe)."""
         return self.positions[:, foot_joints(self.motion.skeleton)]
 
     def stride(self, library: Library | None) -> np.ndarray:
-        """Source frames that pass per output frame at recorded speed, (T,); the usual step of clips whose own rate is
-        not known, as it is without a library."""
+        """Compute the source frames that pass per output frame at recorded speed.
+
+        For clips whose own rate is not known, as without a library, this is their usual step.
+
+        Args:
+            library: the recordings, or None.
+        Returns:
+            (T,).
+        """
         known = {} if library is None else {clip.path: clip.motion.fps for clip in library.clips}
         rates = np.ones(len(self.clips) + 1)
         for index, path in enumerate(self.clips):
@@ -96,7 +112,7 @@ class Played:
 
 
 def played_from_take(take: Take) -> Played:
-    """What a take in memory plays."""
+    """Build the playback of a take in memory."""
     return Played(
         motion=take.motion, start_time=take.start_time, clips=tuple(take.clips), clip=np.asarray(take.clip, dtype=int),
         clip_frame=np.asarray(take.clip_frame, dtype=float), mirrored=np.asarray(take.mirrored, dtype=bool),
@@ -108,12 +124,20 @@ def played_from_take(take: Take) -> Played:
 def played_from_tables(
     motion: Motion, provenance=None, ball: BallPath | None = None, start_time: float = 0.0, where: str = "provenance"
 ) -> Played:
-    """What a motion read from a file plays, with its provenance and ball where they are known.
+    """Build the playback of a motion read from a file, with its provenance and ball where they are known.
 
-    provenance: `synthesis.provenance.Provenance`, or anything with its arrays: times (T,) s, clip (T paths),
-    clip_frame (T,), mirrored (T,) bool, words (T tuples), contacts (T, 2) bool. Without it the motion starts at
-    `start_time` and contacts are detected on the motion itself. where: the table's file, for messages. InputError where
-    it has another length."""
+    Without provenance contacts are detected on the motion itself.
+
+    Args:
+        motion: T frames.
+        provenance: `synthesis.provenance.Provenance`, or anything with its arrays: times (T,) s, clip (T paths),
+            clip_frame (T,), mirrored (T,) bool, words (T tuples), contacts (T, 2) bool.
+        ball: the ball's path.
+        start_time: s of frame 0 where there is no provenance.
+        where: the table's file, for messages.
+    Raises:
+        InputError: where the provenance has another length.
+    """
     count = len(motion)
     if provenance is None:
         unknown, nowhere, plain = np.full(count, -1), np.full(count, np.nan), np.zeros(count, bool)
@@ -131,10 +155,19 @@ def played_from_tables(
 
 
 def find_transitions(clip: np.ndarray, mirrored: np.ndarray, clip_frame: np.ndarray, stride: np.ndarray) -> np.ndarray:
-    """Output frames (S,) that start a new piece: the clip (or its mirroring) changes, or clip_frame jumps.
+    """Find the output frames that start a new piece: the clip (or its mirroring) changes, or clip_frame jumps.
 
     A jump is a step of more than 1.5 frames times the warp there, in frames of the output's rate, or of less than half
-    of it (a step back, a repeated stretch). The warp is the median rate of up to four steps on either side."""
+    of it (a step back, a repeated stretch). The warp is the median rate of up to four steps on either side.
+
+    Args:
+        clip: (T,) int.
+        mirrored: (T,) bool.
+        clip_frame: (T,).
+        stride: (T,).
+    Returns:
+        (S,) frames.
+    """
     rate = played_rate(clip, mirrored, clip_frame, stride)
     known = (clip[1:] >= 0) | (clip[:-1] >= 0)
     warp = np.maximum(_neighbours_median(rate), 0.25)
@@ -143,21 +176,25 @@ def find_transitions(clip: np.ndarray, mirrored: np.ndarray, clip_frame: np.ndar
 
 
 def number_pieces(count: int, starts: np.ndarray) -> np.ndarray:
-    """Number of the run that each of `count` frames belongs to: (T,) int, one more at every seam in `starts`."""
+    """Number the pieces: (T,) int, one more at every transition in `starts`."""
     flags = np.zeros(count, dtype=int)
     flags[starts] = 1
     return np.cumsum(flags)
 
 
 def played_rate(clip: np.ndarray, mirrored: np.ndarray, clip_frame: np.ndarray, stride: np.ndarray) -> np.ndarray:
-    """Played / recorded speed from each frame to the next: (T-1,), NaN where the clip changes or is not known."""
+    """Compute the playback rate (played / recorded speed) from each frame to the next.
+
+    Returns:
+        (T-1,), NaN where the clip changes or is not known.
+    """
     rate = np.diff(clip_frame) / stride[:-1]
     same = (clip[1:] == clip[:-1]) & (mirrored[1:] == mirrored[:-1]) & (clip[1:] >= 0)
     return np.where(same, rate, np.nan)
 
 
 def warp_rates(clip: np.ndarray, mirrored: np.ndarray, clip_frame: np.ndarray, stride: np.ndarray) -> np.ndarray:
-    """Played / recorded speed of every step inside a run: (N,)."""
+    """Compute the playback rate of every step inside a piece: (N,)."""
     rate = played_rate(clip, mirrored, clip_frame, stride)
     rate[find_transitions(clip, mirrored, clip_frame, stride) - 1] = np.nan
     return rate[np.isfinite(rate)]
@@ -166,16 +203,22 @@ def warp_rates(clip: np.ndarray, mirrored: np.ndarray, clip_frame: np.ndarray, s
 def find_replayed(
     clip: np.ndarray, mirrored: np.ndarray, clip_frame: np.ndarray, stride: np.ndarray, fps: float
 ) -> np.ndarray:
-    """Frames that replay a stretch played less than 4 s before: (T,) bool.
+    """Find frames that replay a stretch played less than 4 s before.
 
-    A frame replays where an earlier run of the same clip (same side) showed a frame within 80 source frames at 60 fps
-    (1.33 s of the clip) of it in the last 4 s. A run that starts beyond everything the earlier run showed only skipped
-    ahead, and does not count."""
+    A frame replays where an earlier piece of the same clip (same side) showed a frame within 80 source frames at 60 fps
+    (1.33 s of the clip) of it in the last 4 s. A piece that starts beyond everything the earlier one showed only
+    skipped ahead, and does not count.
+
+    Returns:
+        (T,) bool.
+    """
     number = number_pieces(len(clip), find_transitions(clip, mirrored, clip_frame, stride))
+    # first and last clip frame of each piece
     first, last = np.full(number[-1] + 1, np.inf), np.full(number[-1] + 1, -np.inf)
     np.fmin.at(first, number, clip_frame)
     np.fmax.at(last, number, clip_frame)
     out = np.zeros(len(clip), dtype=bool)
+    # compare every frame with the one `lag` frames earlier
     for lag in range(1, min(int(np.ceil(LOOP_SECONDS * fps)), len(clip))):
         same = (clip[lag:] == clip[:-lag]) & (mirrored[lag:] == mirrored[:-lag]) & (clip[lag:] >= 0)
         other = same & (number[lag:] != number[:-lag]) & (first[number[lag:]] < last[number[:-lag]])
@@ -185,16 +228,20 @@ def find_replayed(
 
 
 def _usual_step(clip_frame: np.ndarray, mine: np.ndarray) -> float:
+    """Return the median step forward of one clip's frames, 1 without any."""
     steps = np.diff(clip_frame)[mine[1:] & mine[:-1]]
     forward = steps[steps > 0]
     return float(np.median(forward)) if len(forward) else 1.0
 
 
 def _neighbours_median(rate: np.ndarray, reach: int = 4) -> np.ndarray:
-    """Median of the finite rates up to `reach` steps away on either side, the step itself left out; 1 where there are
-    none."""
+    """Compute the median of the finite rates up to `reach` steps away on either side, the step itself left out.
+
+    1 where there are none.
+    """
     padded = np.pad(rate, reach, constant_values=np.nan)
     around = np.stack([padded[reach + k : reach + k + len(rate)] for k in range(-reach, reach + 1) if k])
+    # sorted, NaN come last: the median is the mean of the two middle ones of the `count` finite values
     around[~np.isfinite(around)] = np.nan
     around.sort(axis=0)
     count = np.sum(np.isfinite(around), axis=0)

@@ -1,5 +1,4 @@
-"""What each figure of the report aims for (`../shared/metrics.md`, far column): a fixed limit, or what the recordings
-score."""
+"""Targets of the report's figures (`../shared/metrics.md`, last column): fixed limits, or the recordings' own."""
 
 from __future__ import annotations
 
@@ -8,12 +7,19 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-_SLACK = 1e-9
+_SLACK = 1e-9  # of a comparison, for rounding
 
 
 @dataclass(frozen=True)
 class Target:
-    """A figure lies between `least` and `most`; or is at most the figure `own` (dotted name) plus `beyond`."""
+    """The target of a figure: between `least` and `most`, or at most another figure plus a margin.
+
+    Attributes:
+        least: lower limit, None without one.
+        most: upper limit, None without one.
+        own: dotted name of the figure of the recordings that is the upper limit, None for a fixed one.
+        beyond: margin added to it.
+    """
 
     least: float | None = None
     most: float | None = None
@@ -21,15 +27,20 @@ class Target:
     beyond: float = 0.0
 
     def bounds(self, flat: Mapping[str, Any]) -> tuple[float | None, float | None]:
-        """Least and most for one report, flat as by `report.flat`; None where there is no such bound or it is
-        unknown."""
+        """Return least and most for one report.
+
+        Args:
+            flat: the report, flat as by `report.flatten_report`.
+        Returns:
+            None where there is no such bound or it is unknown.
+        """
         if self.own is None:
             return self.least, self.most
         score = flat.get(self.own)
         return self.least, None if score is None else float(score) + self.beyond
 
     def text(self, flat: Mapping[str, object]) -> str:
-        """The target in words, such as "≤ 0.005"."""
+        """Describe the target, such as "≤ 0.005"."""
         least, most = self.bounds(flat)
         if least is not None and most is not None:
             return f"± {most:.3g}" if least == -most else f"{least:g} .. {most:g}"
@@ -39,7 +50,7 @@ class Target:
         return "" if least is None else f"≥ {least:g}"
 
     def met(self, value: float, flat: Mapping[str, object]) -> bool | None:
-        """Whether a value meets it; None where the bound is not known."""
+        """Return whether a value meets the target; None where the bound is not known."""
         least, most = self.bounds(flat)
         if least is None and most is None:
             return None
@@ -71,7 +82,7 @@ TARGETS = {
     "annotation_similarity.all": Target(most=-0.9),
     "annotation_similarity.had_keys": Target(most=-1.0),
 }
-"""Dotted name of a figure -> its target. Key moments' are in `KEY_TARGETS`."""
+"""Dotted name of a figure -> its target. Those of key moments are in `KEY_TARGETS`."""
 
 KEY_TARGETS = {
     "position_error_m": Target(most=0.05),
@@ -81,8 +92,14 @@ KEY_TARGETS = {
 
 
 def target_of(name: str, fps: float) -> Target | None:
-    """The target of a figure by its dotted name ("keys 2.contact_gap_m"), None where it has none; fps: the output's
-    rate."""
+    """Find the target of a figure.
+
+    Args:
+        name: dotted name, such as "keys 2.contact_gap_m".
+        fps: output frames per second.
+    Returns:
+        None where it has no target.
+    """
     key = re.fullmatch(r"keys \d+\.(\w+)", name)
     if key and key[1] == "time_error_s":
         half = round(0.5 / fps, 6)

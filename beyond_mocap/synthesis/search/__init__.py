@@ -1,1 +1,1 @@
-"""Which clip frame is shown when: the searches `path`, `blocks` and `distance`, and their costs."""
+"""Searches for the clip frame that each output frame shows (`path`, `blocks` and `distance`), and their costs."""

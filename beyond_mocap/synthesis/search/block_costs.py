@@ -1,4 +1,4 @@
-"""What blocks cost: words other than asked (Faustino §3.2.2 eq. 18), and poses that are apart (§3.2.1 eq. 16, 17)."""
+"""Costs of blocks: other labels (Faustino 2024, §3.2.2, eq. 18), and distance of poses (§3.2.1, eq. 16, 17)."""
 
 from __future__ import annotations
 
@@ -12,29 +12,46 @@ Words = frozenset[str] | None
 
 
 class AnnotationCost:
-    """Eq. 18 for every block of the library at once.
+    """Evaluate eq. 18 for every block of the library at once.
 
-    Per frame, with a the asked and m the clip's words: the words both have count +1, those only one has -1, and the sum
-    is divided by the number of words in either; over a block sums and counts are added before dividing. D is that with
-    the sign turned: -1 where all agree, 1 where none does. Frames without asked words (transitions) count neither way.
+    Per frame, with a the requested and m the clip's labels: the labels both have count +1, those only one has -1, and
+    the sum is divided by the number of labels in either; over a block, sums and counts are added before dividing. D is
+    that
+    with the sign inverted: -1 where all agree, 1 where none does. Frames without requested labels (transitions) have no
+    effect.
+
+    Attributes:
+        frames: the library's N frames.
     """
 
     def __init__(self, frames: Frames):
-        """`frames`: the library's, N frames."""
+        """Prepare running sums over the frames.
+
+        Args:
+            frames: the library's, N frames.
+        """
         self.frames = frames
         self._column = {word: i for i, word in enumerate(frames.vocabulary)}
         self._sums: dict[frozenset[str], np.ndarray] = {}
         self._present = _running_sum(frames.words.sum(axis=1))
 
     def of_blocks(self, start: np.ndarray, asked: Sequence[Words]) -> np.ndarray:
-        """(M,) D of blocks that start at frames `start` (M,) for the asked words of each of their frames. A block that
-        reaches beyond the library's frames counts as its last frame there."""
+        """Compute D of blocks.
+
+        Args:
+            start: (M,) first library frame of each block; a block that reaches beyond the library's frames counts as
+                its last frame there.
+            requested: requested labels of each of the block's frames, None where any will do.
+        Returns:
+            (M,) D, -1 to 1.
+        """
         common = np.zeros(len(start))
         either = np.zeros(len(start))
         for low, high, words in _runs(asked):
             if words is None:
                 continue
             a, b = self._clamped(start + low), self._clamped(start + high)
+            # differences of running sums: count over the library frames a .. b of each block
             shared = self._shared(words)
             inside = shared[b] - shared[a]
             common += inside
@@ -43,11 +60,11 @@ class AnnotationCost:
         return np.where(either > 0, -(2.0 * common - either) / np.maximum(either, 1.0), 0.0)
 
     def showing(self, words: frozenset[str]) -> np.ndarray:
-        """(N,) bool: frames that carry any of the words."""
+        """Return (N,) bool: frames that carry any of the labels."""
         return np.diff(self._shared(words)) > 0
 
     def missing_share(self, words: frozenset[str]) -> np.ndarray:
-        """(N,) share of the asked words that each frame lacks."""
+        """Compute the share (N,) of the requested labels that each frame lacks."""
         shared = np.diff(self._shared(words))
         return 1.0 - shared / max(len(words), 1)
 
@@ -55,7 +72,7 @@ class AnnotationCost:
         return np.clip(frame, 0, len(self.frames))
 
     def _shared(self, words: frozenset[str]) -> np.ndarray:
-        """(N + 1,) running count of asked words that frames carry."""
+        """Return the running count (N + 1,) of requested labels that frames carry, cached per set of labels."""
         if words not in self._sums:
             columns = [self._column[word] for word in sorted(words) if word in self._column]
             self._sums[words] = _running_sum(self.frames.words[:, columns].sum(axis=1))
@@ -63,23 +80,33 @@ class AnnotationCost:
 
 
 def _running_sum(values: np.ndarray) -> np.ndarray:
+    """Return the running sum (N + 1,) of values (N,), from 0."""
     return np.concatenate([[0], np.cumsum(values, dtype=np.int64)])
 
 
 def _runs(asked: Sequence[Words]) -> list[tuple[int, int, Words]]:
-    """(first, end, words) of stretches with the same words."""
+    """List (first, end, labels) of the stretches with the same requested labels."""
     edges = [0] + [i for i in range(1, len(asked)) if asked[i] != asked[i - 1]] + [len(asked)]
     return [(low, high, asked[low]) for low, high in zip(edges, edges[1:])]
 
 
 def windows(frames: Frames, clip: np.ndarray, centre: np.ndarray, size: int) -> np.ndarray:
-    """Augmented features (M, size * D) of windows of `size` frames of clips `clip` (M,), centred on frames `centre`
-    (M,).
+    """Collect augmented features of windows around frames.
 
-    A window that would leave its clip is moved inwards (Faustino fig. 7b); a clip shorter than the window repeats its
-    last frame. Eq. 17 compares the window around a block's last frame with the one around the next block's first, which
-    are one frame apart even in an uncut clip; callers centre the first one frame later, as eq. 16 does, so that going
-    on costs nothing."""
+    A window that would leave its clip is moved inwards (fig. 7b); a clip shorter than the window repeats its last
+    frame. Eq. 17 compares the window around a block's last frame with the one around the next block's first, which are
+    one frame apart even in an uncut clip; callers centre the first one frame later, as eq. 16 does, so that continuing
+    costs nothing.
+
+    Args:
+        frames: the library's.
+        clip: (M,) clips.
+        centre: (M,) library frames.
+        size: frames in a window.
+    Returns:
+        (M, size * D) features.
+    Source: Faustino 2024, §3.2.1, eq. 16, 17, fig. 7b.
+    """
     first, last = frames.first[clip], frames.first[clip] + frames.count[clip] - 1
     start = np.clip(centre - size // 2, first, np.maximum(last - size + 1, first))
     index = np.minimum(start[:, None] + np.arange(size), last[:, None])
@@ -87,13 +114,16 @@ def windows(frames: Frames, clip: np.ndarray, centre: np.ndarray, size: int) -> 
 
 
 def distances(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """(A, B) Euclidean distances between rows (A, K) and (B, K)."""
+    """Compute the Euclidean distances (A, B) between rows (A, K) and (B, K)."""
+    # |a - b|^2 = |a|^2 + |b|^2 - 2 a b, as one matrix product
     square = (a * a).sum(1)[:, None] + (b * b).sum(1)[None, :] - 2.0 * (a @ b.T)
     return np.sqrt(np.maximum(square, 0.0))
 
 
 def typical_distance(frames: Frames) -> float:
-    """Root mean square distance of two frames taken at random: the length that makes continuity costs about one for
-    poses that have nothing to do with each other, in any library. Eq. 13 weighs continuity against annotation, which
-    lies within +-1; without a common scale alpha = 0.2 would mean something else in every library."""
+    """Compute the root mean square distance of two frames drawn at random.
+
+    This length makes continuity costs about one for unrelated poses, in any library. Eq. 13 weighs continuity against
+    annotation, which lies within +-1; without a common scale alpha = 0.2 would mean something else in every library.
+    """
     return float(np.sqrt(2.0 * frames.features.var(axis=0, dtype=float).sum())) or 1.0

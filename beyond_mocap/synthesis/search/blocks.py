@@ -1,17 +1,17 @@
-"""Block search, coarse to fine: blocks of 32, 16 and 8 frames by dynamic programming (Faustino §3.2).
+"""Block search, coarse to fine: blocks of 32, 16 and 8 frames by dynamic programming (Faustino 2024, §3.2).
 
 The first pass chooses a cluster for every slot of 32 frames, the second a block from each chosen cluster; the slots are
-then halved twice, and each half is searched anew among the cluster that the parent's half belongs to. Cost per slot is
-alpha times the annotation cost D (eq. 18, 19) and between slots 1 - alpha times the continuity cost C (eq. 17), taken
-in units of `block_costs.typical_distance`.
+then halved twice, and each half is searched again among the cluster that the parent's half belongs to. Cost per slot is
+alpha times the annotation cost D (eq. 18, 19), and between slots 1 - alpha times the continuity cost C (eq. 17), in
+units of `block_costs.measure_typical_distance`.
 
 Decisions where the paper is silent or misprinted:
-- A slot that holds a key moment offers only blocks that show a serving clip's key frame at exactly that frame. Eq. 20
-  as printed multiplies D by zero there, which throws away the reward of the right block; with the right place enforced
-  by the choice of start no multiplier is needed, at any block length. At the coarse levels, where a clip may be too
-  short to reach the slot's edges, its end is held for the cost.
-- Slots beside a key moment also offer the same clip's neighbouring frames, as far as its annotated row goes, so that
-  entry and exit can be played whole.
+- A slot with a key moment has as candidates only blocks that show a serving clip's key frame at exactly that frame.
+  Eq. 20 as printed multiplies D by zero there, which discards the reward of the right block; with the right place
+  enforced by the choice of start no multiplier is needed, at any block length. At the coarse levels, where a clip may
+  be too short to reach the slot's edges, its end is held for the cost.
+- Slots beside a key moment also have the same clip's neighbouring frames as candidates, for the length of its annotated
+  row, so that entry and exit can be played whole.
 - A parent's own half is always among the candidates, so that refining never makes a sequence worse.
 """
 
@@ -30,35 +30,40 @@ from .block_costs import AnnotationCost, distances, typical_distance, windows
 from .preferences import weak_foot_cost
 from .wanted import Wanted, needed, pool_frame
 
-MOST_CANDIDATES = 600
+MOST_CANDIDATES = 600  # blocks per slot, besides those next to key moments
 AVOIDED = 1000.0
-"""What a block costs that shows a word which it must not: more than a whole track of anything else."""
-FINEST = BLOCK_LENGTHS[-1]
+"""Cost of a block that shows an avoided label: more than a whole track of anything else."""
+FINEST = BLOCK_LENGTHS[-1]  # frames
 
 
-# The cheapest sequence through slots by dynamic programming (Faustino eq. 14, 15). It takes costs and knows no
-# motion.
+# The sequence through slots with the lowest cost, by dynamic programming (Faustino eq. 14, 15), on costs alone.
 
 
 def cheapest_path(
     unary: Sequence[np.ndarray], transition: Callable[[int], np.ndarray]
 ) -> tuple[np.ndarray, float]:
-    """One choice per slot so that unary plus transition costs are least.
+    """Choose one candidate per slot so that the sum of unary and transition costs is lowest.
 
-    unary: S arrays (K_s,), the cost of each choice of a slot; np.inf forbids. transition(s): (K_s, K_{s+1}), the cost
-    of each choice of slot s + 1 after each of slot s. Returns the choices (S,) and the total cost. Ties go to the
-    first.
+        find_cheapest_path([np.array([0, 1.0]), np.array([5.0, 0])], lambda s: np.zeros((2, 2)))   # -> [0, 1], 0.0
 
-        cheapest_path([np.array([0, 1.0]), np.array([5.0, 0])], lambda s: np.zeros((2, 2)))   # -> [0, 1], 0.0"""
+    Args:
+        unary: S arrays (K_s,), cost of each candidate of a slot; np.inf forbids.
+        transition: returns for slot s the costs (K_s, K_{s+1}) of each candidate of slot s + 1 after each of slot s.
+    Returns:
+        The choices (S,) and the total cost; ties go to the first.
+    Source: Faustino 2024, eq. 14, 15.
+    """
     total = np.asarray(unary[0], dtype=float)
     back: list[np.ndarray] = []
     for slot in range(1, len(unary)):
+        # through[i, j]: lowest cost of ending at candidate i, plus going on to candidate j
         through = total[:, None] + transition(slot - 1)
         before = np.argmin(through, axis=0)
         back.append(before)
         total = through[before, np.arange(through.shape[1])] + unary[slot]
     choice = np.empty(len(unary), dtype=int)
     choice[-1] = int(np.argmin(total))
+    # trace back: back[slot - 1][j] is the best predecessor of candidate j of `slot`
     for slot in range(len(unary) - 1, 0, -1):
         choice[slot - 1] = back[slot - 1][choice[slot]]
     return choice, float(total[choice[-1]])
@@ -66,8 +71,12 @@ def cheapest_path(
 
 @dataclass(frozen=True, eq=False)
 class Candidates:
-    """Blocks on offer for a slot: clip (K,), start (K,) library frame (it may lie outside the clip beside a key
-    moment)."""
+    """Candidate blocks of a slot.
+
+    Attributes:
+        clip: (K,) clip index.
+        start: (K,) library frame; it may lie outside the clip beside a key moment.
+    """
 
     clip: np.ndarray
     start: np.ndarray
@@ -76,12 +85,20 @@ class Candidates:
         return len(self.clip)
 
     def at(self, choice) -> "Candidates":
-        """The chosen ones."""
+        """Select candidates by index."""
         return Candidates(self.clip[choice], self.start[choice])
 
 
 class BlockSearch:
-    """One search: `run()` gives a block of 8 frames per slot, with the key moment that each slot shows, if any."""
+    """Search for one block of 8 frames per slot.
+
+    Attributes:
+        library: the clips.
+        request: the request.
+        alpha: weight of labels against continuity, eq. 13.
+        scale: length that makes continuity costs comparable.
+        key_in_slot: slot -> (number of the key moment, library key) that its block shows, after `run`.
+    """
 
     def __init__(
         self,
@@ -91,6 +108,15 @@ class BlockSearch:
         progress: Callable[[float, str], None] | None = None,
         cancelled: Callable[[], bool] | None = None,
     ):
+        """Prepare the costs.
+
+        Args:
+            library: the clips.
+            request: the request.
+            alpha: weight of labels against continuity.
+            progress: called as progress(fraction, text).
+            cancelled: returns whether to stop.
+        """
         self.library, self.wanted, self.alpha = library, wanted, alpha
         self.frames = library.frames
         self.annotation = AnnotationCost(library.frames)
@@ -100,7 +126,13 @@ class BlockSearch:
         self.key_in_slot: dict[int, tuple[int, Key]] = {}
 
     def run(self) -> Candidates:
-        """The finest blocks, one per slot of 8 frames."""
+        """Run the search.
+
+        Returns:
+            The finest blocks, one per slot of 8 frames.
+        Raises:
+            Cancelled: when `cancelled` returns true.
+        """
         coarse = self._choose_clusters()
         blocks = self._choose_blocks(BLOCK_LENGTHS[0], coarse)
         for number, length in enumerate(BLOCK_LENGTHS[1:]):
@@ -109,16 +141,17 @@ class BlockSearch:
         return blocks
 
     def slots(self, length: int) -> int:
-        """Slots of `length` frames that cover the motion; all levels cover a whole number of the longest."""
+        """Return the number of slots of `length` frames; all levels cover a whole number of the longest."""
+        # -(-n // m): division rounded up
         return -(-len(self.wanted) // BLOCK_LENGTHS[0]) * (BLOCK_LENGTHS[0] // length)
 
     def asked_words(self, slot: int, length: int):
-        """The asked words of a slot's frames; beyond the end nothing is asked."""
+        """Return the requested labels of a slot's frames, None beyond the end."""
         words = self.wanted.asked[slot * length : (slot + 1) * length]
         return [*words, *[None] * (length - len(words))]
 
     def keys_at(self, slot: int, length: int) -> list[tuple[int, int]]:
-        """(number of the key moment, offset in the slot) of the first served key moment in a slot."""
+        """List (number, offset in the slot) of the first key moment in a slot that a clip can serve."""
         low = slot * length
         found = [
             (number, int(round(key.frame)) - low)
@@ -128,7 +161,7 @@ class BlockSearch:
         return found[:1]
 
     def _key_blocks(self, slot: int, length: int) -> tuple[Candidates, list[tuple[int, Key]]]:
-        """Blocks that show a key moment of this slot at its frame, and which key each shows."""
+        """Build the blocks that show a key moment of this slot at its frame, and which key each shows."""
         which, clip, start = [], [], []
         for number, offset in self.keys_at(slot, length):
             for choice in self.wanted.keys[number].choices:
@@ -138,7 +171,7 @@ class BlockSearch:
         return Candidates(np.array(clip, int), np.array(start, int)), which
 
     def _beside_keys(self, slot: int, length: int) -> Candidates:
-        """Blocks that continue a serving clip into this slot, as far as its entry or exit needs."""
+        """Build the blocks that continue a serving clip into this slot, where its entry or exit needs it."""
         clip, start = [], []
         middle = (slot + 0.5) * length
         for key in self.wanted.keys:
@@ -150,14 +183,16 @@ class BlockSearch:
         return self._inside(Candidates(np.array(clip, int), np.array(start, int)), length)
 
     def _inside(self, blocks: Candidates, length: int) -> Candidates:
-        """Those that lie wholly within their clip."""
+        """Select those that lie wholly within their clip."""
         first = self.frames.first[blocks.clip]
         fits = (blocks.start >= first) & (blocks.start + length <= first + self.frames.count[blocks.clip])
         return blocks.at(fits)
 
     def _choose_clusters(self) -> list[Candidates]:
-        """One cluster per slot of 32 frames, by the same costs (Faustino: "DP is actually performed twice"); as
-        candidates."""
+        """Choose one cluster per slot of 32 frames by the same costs, and return its members as candidates.
+
+        Source: Faustino 2024: "DP is actually performed twice".
+        """
         length = BLOCK_LENGTHS[0]
         clusters = self.library.clusters[length]
         count = len(clusters.medoid)
@@ -167,6 +202,7 @@ class BlockSearch:
         size = length // 2
         medoid = clusters.start[clusters.medoid]
         clip = self.frames.clip[medoid]
+        # the end of each cluster's medoid block against the start of every other one
         ends = windows(self.frames, clip, medoid + length - size + size // 2, size)
         starts = windows(self.frames, clip, medoid + size // 2, size)
         between = (1.0 - self.alpha) * distances(ends, starts) / (self.scale * np.sqrt(size))
@@ -178,35 +214,36 @@ class BlockSearch:
         return [self._members(clusters, usable, label) for label in choice]
 
     def _cluster_costs(self, clusters, usable: np.ndarray, slot: int) -> np.ndarray:
-        """alpha times D of each cluster: the mean over its blocks (eq. 19); a key moment forbids clusters without
-        it."""
+        """Compute alpha D of each cluster, a mean over its blocks (eq. 19); a key moment forbids others."""
         count = len(clusters.medoid)
         cost = self.annotation.of_blocks(clusters.start, self.asked_words(slot, clusters.length))
         blocks, which = self._key_blocks(slot, clusters.length)
         cost = cost + self._off_style(clusters.start)
+        # leave out blocks with avoided labels, unless none would remain or a key moment decides
         fine = usable & ~self._shows_avoided(clusters.start, slot, clusters.length)
         usable = fine if fine.any() and not len(blocks) else usable
         members = np.bincount(clusters.label[usable], minlength=count)
         total = np.bincount(clusters.label[usable], cost[usable], minlength=count)
         out = np.where(members > 0, self.alpha * total / np.maximum(members, 1), np.inf)
         weak = np.concatenate([np.zeros(0), *(self._weak_foot(*served) for served in which)])
+        # clusters of the blocks that serve the key moment with the preferred foot
         labels = {clusters.label_at(start) for start in blocks.start[weak == weak.min(initial=np.inf)]} - {-1}
         if labels:
             out[[label for label in range(count) if label not in labels]] = np.inf
         return out
 
     def _members(self, clusters, usable: np.ndarray, label: int) -> Candidates:
+        """Select the usable blocks of a cluster."""
         start = clusters.start[usable & (clusters.label == label)]
         return Candidates(self.frames.clip[start], start)
 
     def _anything(self) -> Candidates:
-        """Candidates of a library whose clips are all shorter than the longest block: the start of every usable
-        clip."""
+        """Build candidates where all clips are shorter than the longest block: the start of every usable one."""
         clip = np.flatnonzero(self.wanted.allowed)
         return Candidates(clip, self.frames.first[clip])
 
     def _halves(self, blocks: Candidates, length: int) -> list[Candidates]:
-        """For each half of each block: the blocks of the cluster that it belongs to, and the half itself."""
+        """Collect for each half of each block the blocks of the cluster that it belongs to, and the half itself."""
         clusters = self.library.clusters[length]
         usable = self.wanted.allowed[self.frames.clip[clusters.start]]
         out = []
@@ -217,7 +254,12 @@ class BlockSearch:
         return out
 
     def _choose_blocks(self, length: int, offered: list[Candidates]) -> Candidates:
-        """One block per slot by dynamic programming."""
+        """Choose one block per slot by dynamic programming.
+
+        Args:
+            length: frames of a block.
+            candidate_lists: candidates of each slot.
+        """
         slots, unary, keys = [], [], []
         for slot, candidates in enumerate(offered):
             self._step(None, "")
@@ -239,7 +281,7 @@ class BlockSearch:
         return Candidates(np.concatenate([p.clip for p in picked]), np.concatenate([p.start for p in picked]))
 
     def _thinned(self, slot: int, length: int, offered: Candidates) -> Candidates:
-        """At most MOST_CANDIDATES blocks, those with the best words first, plus the ones beside key moments."""
+        """Select at most MAX_CANDIDATES blocks, those with the best labels first, plus the ones beside key moments."""
         if len(offered) > MOST_CANDIDATES:
             cost = self.annotation.of_blocks(offered.start, self.asked_words(slot, length))
             cost += AVOIDED * self._shows_avoided(offered.start, slot, length) + self._off_style(offered.start)
@@ -248,31 +290,32 @@ class BlockSearch:
         return Candidates(np.append(offered.clip, beside.clip), np.append(offered.start, beside.start))
 
     def _off_style(self, start: np.ndarray) -> np.ndarray:
-        """(M,) what blocks from frames `start` (M,) on cost for not being of the style that is asked."""
+        """Compute the cost (M,) of blocks from frames `start` (M,) on that are not of the requested style."""
         off = self.wanted.off_style
         return np.zeros(len(start)) if off is None else off[np.clip(start, 0, len(off) - 1)].astype(float)
 
     def _weak_foot(self, number: int, key: Key) -> np.ndarray:
-        """(1,) what it costs to serve a key moment by `key`."""
+        """Compute the cost (1,) of serving a key moment by `key` with the weak foot."""
         return weak_foot_cost(self.wanted.keys[number].asked.words, (key,), self.wanted.weak_foot)
 
     def _shows_avoided(self, start: np.ndarray, slot: int, length: int) -> np.ndarray:
-        """(M,) bool: whether a block that starts at frame `start` (M,) and fills a slot shows a word that it must
-        not."""
+        """Return (M,) bool: whether blocks from frames `start` (M,) on show a label that the slot avoids."""
         avoid = self.wanted.avoided_in(slot * length, (slot + 1) * length)
         if not avoid:
             return np.zeros(len(start), bool)
+        # running count: the block shows one if the count grows between its ends
         shown = np.append(0, np.cumsum(self.annotation.showing(avoid)))
         low, high = np.clip(start, 0, len(self.frames)), np.clip(start + length, 0, len(self.frames))
         return shown[high] > shown[low]
 
     def _ends(self, blocks: Candidates, length: int) -> tuple[np.ndarray, np.ndarray]:
-        """Windows around the frame after each block's last and around its first (eq. 17)."""
+        """Collect the windows around the frame after each block's last one and around its first (eq. 17)."""
         size = length // 2
         after = windows(self.frames, blocks.clip, blocks.start + length, size)
         return after, windows(self.frames, blocks.clip, blocks.start, size)
 
     def _step(self, fraction: float | None, text: str) -> None:
+        """Report progress, and raise Cancelled if requested."""
         if self._cancelled():
             raise Cancelled("synthesis: cancelled")
         if fraction is not None:

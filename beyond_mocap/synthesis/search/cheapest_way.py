@@ -1,8 +1,8 @@
-"""The cheapest way from the states of one slot to the frames that the next one is offered.
+"""The transitions with the lowest cost from the states of one slot to the candidates of the next.
 
-A beam keeps a few dozen of the hundred thousand pairs of a state and an offered frame. The change of pose, which bounds
-what a pair costs from below, is worked out for all of them at once; feet, replayed stretches and rates only for pairs
-that may still be kept. What is kept is what weighing every pair would keep.
+A beam keeps a few dozen of the hundred thousand pairs of a state and a candidate. The change of pose, which bounds the
+cost of a pair from below, is computed for all of them at once; feet, replayed stretches and playback rates only for
+pairs that may still be kept. The result is the same as if every pair were evaluated.
 """
 
 from __future__ import annotations
@@ -11,13 +11,20 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-_SAME = 0.05  # library frames between two that are one but for rounding
+_SAME = 0.05  # library frames: places closer than this are the same, apart from rounding
 
 
 @dataclass(frozen=True, eq=False)
 class Offered:
-    """K frames to come to: clip (K,), fractional library frame start (K,), rate (K,) and cost (K,) of what is shown
-    from there on; piece (K,) of a key moment that begins there, or -1."""
+    """K candidates of a slot.
+
+    Attributes:
+        clip: (K,) clip index.
+        start: (K,) fractional library frame.
+        rate: (K,) playback rate.
+        cost: (K,) of what is shown from there on.
+        piece: (K,) piece of a key moment that begins there, or -1.
+    """
 
     clip: np.ndarray
     start: np.ndarray
@@ -26,16 +33,24 @@ class Offered:
     piece: np.ndarray
 
     def only(self, which: np.ndarray) -> "Offered":
-        """The frames `which`, by index."""
+        """Select candidates by index."""
         return Offered(*(getattr(self, field.name)[which] for field in fields(self)))
 
 
 class Ways:
-    """All ways on from B states: clip (B,) that each shows, library frame end (B,) at which it ends, rate (B,), cost
-    (B,) so far, seen (B, buckets) bool what it has lately shown.
+    """All transitions from B states to the candidates of the next slot.
 
-    A way costs a cut, unless the clip shows that frame next anyway, and the change of rate; `costs` are a search's
-    `PathCosts`. Costs are float32 above `base`, that of the cheapest state, so that they stay exact in long searches.
+    A transition costs a cut, unless the clip shows that frame next anyway, and the change of playback rate. Costs are
+    float32 above `base`, the cost of the cheapest state, so that they stay exact in long searches.
+
+    Attributes:
+        costs: the search's `PathCosts`.
+        clip: (B,) clip that each state shows.
+        end: (B,) library frame at which it ends.
+        rate: (B,) playback rate.
+        seen: (B, buckets) bool, what it has shown lately.
+        base: cost of the cheapest state.
+        above: (B,) float32, cost above the base.
     """
 
     def __init__(self, costs, clip: np.ndarray, end: np.ndarray, rate: np.ndarray, cost: np.ndarray, seen: np.ndarray):
@@ -45,37 +60,51 @@ class Ways:
         self.above = (cost - self.base).astype(np.float32)
 
     def every(self, to: Offered) -> np.ndarray:
-        """(B, K) cost of each way, that of what is shown behind it counted."""
+        """Compute the cost (B, K) of each transition, including what the candidate shows."""
         least = self._least(to)
         pairs = np.arange(least.size)
         return self.base + self._whole(to, least, pairs).reshape(least.shape).T.astype(float)
 
     def cheapest(self, to: Offered, known: np.ndarray, most: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The cheapest way to each frame: numbers of the frames (k,), costs (k,), states by which one comes (k,).
+        """Find the cheapest transition to each candidate that may be kept.
 
-        Of frames that begin no piece those are left out that cannot be among the `most` cheapest of them and of `known`
-        (L,) costs of other ways to fill the slot."""
+        Of candidates that begin no piece, those are left out that cannot be among the `kept_count` cheapest of them and
+        of `known`.
+
+        Args:
+            to: K candidates.
+            known: (L,) costs of other ways to fill the slot.
+            kept_count: how many the beam keeps.
+        Returns:
+            Numbers of the candidates (k,), costs (k,), and the states (k,) before them.
+        """
         most_above = np.partition(known, most - 1)[most - 1] - self.base if len(known) >= most else np.inf
+        # drop candidates whose own cost already exceeds the limit set by `known`
         near = np.flatnonzero((to.piece >= 0) | (to.cost <= most_above))
         to = to.only(near)
         least = self._least(to)
         count = least.shape[1]
+        # bound[k]: full cost of the pair with the lowest lower bound, so an upper bound of the candidate's cost
         first = np.arange(len(least)) * count + np.argmin(least, axis=1)
         bound = self._whole(to, least, first)
         free = to.piece < 0
+        # no free candidate above the `kept_count`-th best of all upper bounds can be kept
         rivals = np.concatenate([bound[free], known - self.base])
         if len(rivals) > most:
             bound[free] = np.minimum(bound[free], np.partition(rivals, most - 1)[most - 1])
+        # only pairs whose lower bound is within the upper bound are evaluated in full; flat index = candidate * B +
+        # state
         pairs = np.flatnonzero(least <= bound[:, None])
         offer = pairs // count
         cost = self._whole(to, least, pairs)
+        # `pairs` is sorted by candidate, so each candidate is one run
         begins = np.flatnonzero(np.diff(offer, prepend=-1))
         at = _cheapest_of_each(cost, begins)
         at = at[cost[at] <= bound[offer[at]]]
         return near[offer[at]], self.base + cost[at].astype(float), pairs[at] % count
 
     def _least(self, to: Offered) -> np.ndarray:
-        """(K, B) float32 above the base: what each way costs at least."""
+        """Compute the lower bounds (K, B) float32, above the base, of all transitions."""
         costs = self.costs
         end, start = costs.inside(self.end), costs.inside(to.start)
         least = costs.apart(start, end)
@@ -83,12 +112,21 @@ class Ways:
         cost = to.cost.astype(np.float32)
         least += (enter + cost)[:, None]
         least += leave + self.above
+        # without a cut nothing but the costs of state and candidate remains
         offer, state = self._meeting(to)
         least[offer, state] = self.above[state] + cost[offer]
         return least
 
     def _whole(self, to: Offered, least: np.ndarray, pairs: np.ndarray) -> np.ndarray:
-        """(P,) float32 above the base: the whole cost of `pairs` (P,), flat indices into `least`."""
+        """Compute the full costs of some pairs.
+
+        Args:
+            to: K candidates.
+            lower_bound: (K, B) lower bounds.
+            pairs: (P,) flat indices into `lower_bound`.
+        Returns:
+            (P,) float32, above the base.
+        """
         costs, weights = self.costs, self.costs.weights
         offer, state = np.divmod(pairs, least.shape[1])
         start, end = to.start[offer], self.end[state]
@@ -100,11 +138,17 @@ class Ways:
         return least.ravel()[pairs] + cut + rate
 
     def _meeting(self, to: Offered) -> tuple[np.ndarray, np.ndarray]:
-        """Numbers of the frames (M,) and states (M,) of all pairs that go on without a cut."""
+        """Find all pairs that continue without a cut.
+
+        Returns:
+            Candidates (M,) and states (M,).
+        """
+        # states sorted by their end; for each candidate the range low .. high of ends within _SAME
         order = np.argsort(self.end, kind="stable")
         low, high = (np.searchsorted(self.end[order], to.start + off) for off in (-_SAME, _SAME))
         offer = np.flatnonzero(high > low)
         many = high[offer] - low[offer]
+        # enumerate all ranges in one array: position in the run of repeats plus the run's own `low`
         at = np.arange(many.sum()) - np.repeat(np.cumsum(many) - many - low[offer], many)
         offer, state = np.repeat(offer, many), order[at]
         meets = _same(to.start[offer], self.end[state]) & (to.clip[offer] == self.clip[state])
@@ -112,15 +156,23 @@ class Ways:
 
 
 def _same(start: np.ndarray, end: np.ndarray) -> np.ndarray:
-    """(P,) bool: whether library frames are one but for rounding."""
+    """Return (P,) bool: whether library frames are the same, apart from rounding."""
     return np.abs(start - end) < _SAME
 
 
 def _cheapest_of_each(cost: np.ndarray, begins: np.ndarray) -> np.ndarray:
-    """(k,) index of the first cheapest of each run of `cost` (P,), where runs begin at `begins` (k,)."""
+    """Find the first cheapest entry of each run.
+
+    Args:
+        cost: (P,), runs one after the other.
+        begins: (k,) where the runs begin.
+    Returns:
+        (k,) indices.
+    """
     if not len(begins):
         return begins
     best = np.minimum.reduceat(cost, begins)
     equal = np.flatnonzero(cost == np.repeat(best, np.diff(np.append(begins, len(cost)))))
+    # number of the run of each minimum; where it grows is the first minimum of a run
     run = np.searchsorted(begins, equal, side="right")
     return equal[np.diff(run, prepend=0) > 0]

@@ -1,8 +1,8 @@
-"""Entries and exits of key moments' clips that stand while the track runs: what may be left out of them, and is told.
+"""Entries and exits of key moments' clips that stand still while the track moves: what may be left out, and its report.
 
-Who arrives at a run does not stand before he heads a ball. Laid on his track, a clip that stands there would be pulled
-along with both feet on the ground, and no step is taken around a touch. Feet that slide give way later than seams
-(../shared/metrics.md), so the search is offered such a clip without that part too.
+A player who arrives at a run does not stand still before a header. On that track, a clip that stands still there would
+be dragged with both feet on the ground, and no step is added around a touch. Sliding feet yield later than transitions
+(../shared/metrics.md), so the search also has such a clip without that part as a candidate.
 """
 
 from __future__ import annotations
@@ -17,14 +17,24 @@ from .offer import USUAL_STANCE
 from .wanted import Wanted, needed, pool_frame
 
 DRAGGED = 1.0
-"""m/s by which a clip with both feet on the ground is slower or faster than the track, above which they are dragged."""
+"""m/s between a clip with both feet on the ground and the track, above which the feet are dragged."""
 
-_TOLD = 4.0  # frames left out from which on it is told
+_TOLD = 4.0  # frames left out from which on it is reported
 
 
 def drags(library: Library, wanted: Wanted, at: float, key: Key, rate: float, low: int, high: int) -> bool:
-    """Whether a key's clip, its key frame at output frame `at`, drags its feet for most of the frames low .. high: both
-    stand for longer than in a walk, and the track goes DRAGGED faster or slower than the clip."""
+    """Return whether a key's clip drags its feet for most of the frames low .. high.
+
+    Both feet are in contact for longer than in a walk, and the track is faster or slower than the clip by DRAG_SPEED.
+
+    Args:
+        library: the clips.
+        request: the request.
+        at: output frame of the key frame.
+        key: the clip's key moment.
+        rate: playback rate.
+        low, high: output frames.
+    """
     frames, out = library.frames, np.arange(max(low, 0), min(high, len(wanted)))
     first = frames.first[key.clip]
     shown = np.round(pool_frame(library, key) + rate * (out - at)).astype(int)
@@ -38,12 +48,22 @@ def undragged(
     library: Library, wanted: Wanted, edges: np.ndarray, at: float, key: Key, rate: float, slots: tuple[int, int],
     around: float,
 ) -> list[tuple[int, int]]:  # fmt: skip
-    """The slots (first, end) that a key's clip is to fill, and with them those that are left without the slots at
-    either end, one by one, that drag its feet; `around` frames on either side of `at` stay.
+    """List the slot ranges that a key's clip may fill: the given one, and those without end slots that drag its feet.
 
-    edges (S + 1,) output frames of all slots."""
+    Args:
+        library: the clips.
+        request: the request.
+        edges: (S + 1,) output frames of all slots.
+        at: output frame of the key frame.
+        key: the clip's key moment.
+        rate: playback rate.
+        slots: (first, end) that the clip would fill.
+        around: frames on either side of `at` that stay.
+    Returns:
+        (first, end) of each range, without repeats.
+    """
     first, end = slots
-    a, b = first, end
+    a, b = first, end  # shrink from both ends, slot by slot
     while at - edges[a + 1] >= around and drags(
         library, wanted, at, key=key, rate=rate, low=edges[a], high=edges[a + 1],
     ):
@@ -56,8 +76,13 @@ def undragged(
 
 
 def left_out(library: Library, wanted: Wanted, edit: EditList) -> list[TimedLine]:
-    """A line for each recorded key moment whose clip is shown without some of its entry or exit that drags its feet.
-    edit: at the library's rate."""
+    """Report each recorded key moment whose clip is shown without a part of its entry or exit that drags its feet.
+
+    Args:
+        library: the recordings.
+        request: the request.
+        edit: the edit list, at the library's rate.
+    """
     told = []
     for placed in edit.keys:
         if placed.key.clip < len(library.clips):
@@ -66,10 +91,12 @@ def left_out(library: Library, wanted: Wanted, edit: EditList) -> list[TimedLine
 
 
 def _left_out_of(library: Library, wanted: Wanted, edit: EditList, key: Key, asked) -> list[TimedLine]:
+    """Report what one key moment's clip lacks, for its entry and its exit."""
     at = int(np.clip(round(asked.frame), 0, len(edit) - 1))
     low, high = next(piece for piece in edit.pieces if piece[0] <= at < piece[1])
     entry, leave = needed(library, key)
     rate = (edit.frame[high - 1] - edit.frame[low]) / max(high - 1 - low, 1)
+    # the whole clip would run from whole[0] to whole[1]; it is shown from low to high
     whole = round(asked.frame - entry / rate), round(asked.frame + leave / rate)
     start, words = float(wanted.track.times[0]), " ".join(asked.asked.words)
     told = []
@@ -77,6 +104,6 @@ def _left_out_of(library: Library, wanted: Wanted, edit: EditList, key: Key, ask
         if inside and end - first >= _TOLD and drags(library, wanted, asked.frame, key=key, rate=rate, low=first,
                                                      high=end):
             when = start + first / library.fps, start + end / library.fps
-            lacks = f"the {name} of the clip for '{words}' is left out, since it stands while the track does not"
+            lacks = f"the {name} of the clip for '{words}' is left out: the clip stands still while the track moves"
             told.append(TimedLine(f"{when[0]:.1f}-{when[1]:.1f} s: {lacks}", when))
     return told

@@ -1,4 +1,4 @@
-"""Which clip frame each output frame shows: what every search ends in, and all that has to be kept of a take."""
+"""Edit list: which clip frame each output frame shows. Every search returns one; a take stores nothing else of it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,12 @@ from ...library.keys import Key
 
 @dataclass(frozen=True)
 class PlacedKey:
-    """Key moment number `wanted` of the order is served by `key` of the library."""
+    """A key moment of the request with the library key that serves it.
+
+    Attributes:
+        number: number of the key moment in the request.
+        key: the library's key moment.
+    """
 
     wanted: int
     key: Key
@@ -19,8 +24,15 @@ class PlacedKey:
 
 @dataclass(frozen=True, eq=False)
 class EditList:
-    """At the library's rate: clip (T,) index, frame (T,) fractional place among the library's frames (it may lie a few
-    frames outside its clip at a seam, where the clip's end is held), seams: frames that begin another piece."""
+    """Which clip frame each output frame shows, at the library's rate.
+
+    Attributes:
+        clip: (T,) clip index.
+        frame: (T,) fractional library frame; it may lie a few frames outside its clip at a transition, where the clip's
+            end is held.
+        transitions: (S,) frames that begin another piece.
+        keys: the key moments that are shown.
+    """
 
     clip: np.ndarray
     frame: np.ndarray
@@ -38,7 +50,13 @@ class EditList:
 
 
 def find_seams(clip: np.ndarray, frame: np.ndarray, step: float = 1.5) -> np.ndarray:
-    """Frames at which the clip changes or the frame jumps by more than `step` library frames or backwards."""
+    """Find the frames at which the clip changes, or the frame jumps by more than `step` library frames or backwards.
+
+    Args:
+        clip: (T,) clip index.
+        frame: (T,) library frame.
+        step: largest step within a piece.
+    """
     jump = np.diff(frame)
     return np.flatnonzero((np.diff(clip) != 0) | (jump > step) | (jump < 0.0)) + 1
 
@@ -46,12 +64,22 @@ def find_seams(clip: np.ndarray, frame: np.ndarray, step: float = 1.5) -> np.nda
 def replaced(
     edit: EditList, first: int, end: int, clip: np.ndarray, frame: np.ndarray, keys: tuple[PlacedKey, ...]
 ) -> EditList:
-    """The edit list with frames first .. end of clip (T,) and frame (T,) in their place, and `keys` beside its own.
+    """Replace a stretch of an edit list.
 
-    Seams outside stay as they are; those inside and at both ends of the stretch are found anew."""
+    Transitions outside stay as they are; those inside and at both ends of the stretch are found again.
+
+    Args:
+        edit: T frames.
+        first: first frame of the stretch.
+        end: frame after its last one.
+        clip: (T,) clip index, used inside the stretch.
+        frame: (T,) library frame, used inside the stretch.
+        keys: added to those of the edit list.
+    """
     inside = slice(first, end)
     new_clip, new_frame = edit.clip.copy(), edit.frame.copy()
     new_clip[inside], new_frame[inside] = clip[inside], frame[inside]
+    # one frame more on either side, so that a jump at an end of the stretch is found
     low, high = max(first - 1, 0), min(end + 1, len(edit))
     found = find_seams(new_clip[low:high], new_frame[low:high]) + low
     seams = np.concatenate([edit.seams[edit.seams < first], found, edit.seams[edit.seams > end]])
@@ -59,7 +87,14 @@ def replaced(
 
 
 def at_times(edit: EditList, index: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Clip (N,), frame (N,) and piece (N,) at fractional output frames `index` (N,), never mixing two pieces."""
+    """Interpolate an edit list at fractional frames, never mixing two pieces.
+
+    Args:
+        edit: the edit list.
+        index: (N,) fractional output frames at the library's rate.
+    Returns:
+        clip (N,), frame (N,) and piece (N,).
+    """
     starts = np.array([low for low, _ in edit.pieces])
     piece = np.clip(np.searchsorted(starts, index + 1e-9, side="right") - 1, 0, len(starts) - 1)
     clip, frame = np.empty(len(index), int), np.empty(len(index))
@@ -72,7 +107,7 @@ def at_times(edit: EditList, index: np.ndarray) -> tuple[np.ndarray, np.ndarray,
 
 
 def _extended(values: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """Linear interpolation that goes on with the last slope beyond the end."""
+    """Interpolate linearly; beyond the end continue with the last slope."""
     if len(values) == 1:
         return values[0] + at
     low = np.clip(np.floor(at).astype(int), 0, len(values) - 2)

@@ -1,7 +1,7 @@
-"""The frames of an edit list, fetched from their clips and taken off the ground: poses in their own facing frame.
+"""Source frames of an edit list, fetched from their clips as poses in their own facing frame.
 
-What is left of a clip's place in the world are differences: how the body sways about its path, how fast it goes in
-which direction as seen from its facing, and how it turns. Whoever lays the motion on the ground decides the rest.
+What is left of a clip's place in the world are differences: how the body sways about its path, how fast it moves in
+which direction as seen from its facing, and how it turns. The construction decides the rest.
 """
 
 from __future__ import annotations
@@ -15,13 +15,19 @@ from ...motion import quaternion
 from ...motion.motion import at_frames
 from .edit_list import EditList, at_times
 
-_HELD = 2  # frames for which a clip's end may be held in a fade
+_HELD = 2  # frames for which a clip's end may be held in a blend
 
 
 @dataclass(frozen=True, eq=False)
 class Shown:
-    """What T output frames show: clip (T,), frame (T,) place among the library's frames, clip_frame (T,) in the clip's
-    own rate, piece (T,) of the edit list."""
+    """What T output frames show.
+
+    Attributes:
+        clip: (T,) clip index.
+        frame: (T,) fractional library frame.
+        clip_frame: (T,) fractional frame in the clip's own rate.
+        piece: (T,) number of the piece of the edit list.
+    """
 
     clip: np.ndarray
     frame: np.ndarray
@@ -30,18 +36,25 @@ class Shown:
 
     @property
     def seams(self) -> np.ndarray:
-        """Output frames (S,) that begin another piece."""
+        """(S,) output frames that begin another piece."""
         return np.flatnonzero(np.diff(self.piece)) + 1
 
 
 @dataclass(frozen=True, eq=False)
 class Footage(Shown):
-    """T output frames with what they show.
+    """T output frames with the motion that they show.
 
-    pose (T, J, 4) local rotations, the root's relative to its facing; height (T,) m of the root; sway (T, 2) m from the
-    clip's path to the root, in the facing frame; velocity (T, 2) m/s of the path as played, in the facing frame; turn
-    (T,) radians of facing since the frame before, 0 at a seam; standing (T, 2, 2) bool of heels and toes. ahead_*: the
-    same for the frame that the piece before would have shown at each seam, (S, ...)."""
+    Attributes:
+        pose: (T, J, 4) local rotations, the root's relative to its facing.
+        height: (T,) m of the root.
+        sway: (T, 2) m from the clip's path to the root, facing frame.
+        velocity: (T, 2) m/s of the path as played, facing frame.
+        turn: (T,) rad of facing since the frame before, 0 at a transition.
+        heel_toe_contacts: (T, 2, 2) bool, heel and toe contacts.
+        ahead_pose: (S, J, 4), the same for the frame that the piece before would have shown at each transition.
+        ahead_height: (S,) m of it.
+        ahead_sway: (S, 2) m of it.
+    """
 
     pose: np.ndarray
     height: np.ndarray
@@ -55,23 +68,46 @@ class Footage(Shown):
 
 
 def output_index(frames: int, library: Library, fps: float, count: int) -> np.ndarray:
-    """(frames,) output frames at `fps` as fractional frames of the library's rate, of which there are `count`."""
+    """Convert output frames to fractional frames at the library's rate.
+
+    Args:
+        frames: number of output frames.
+        library: the clips.
+        fps: output frames per second.
+        count: number of frames at the library's rate.
+    Returns:
+        (frames,) fractional frames.
+    """
     return np.minimum(np.arange(frames) * (library.fps / fps), count - 1)
 
 
 def shown(library: Library, edit: EditList, index: np.ndarray) -> Shown:
-    """What fractional output frames `index` (T,) of the library's rate show."""
+    """Look up what output frames show.
+
+    Args:
+        library: the clips.
+        edit: the edit list.
+        index: (T,) fractional frames at the library's rate.
+    """
     clip, frame, piece = at_times(edit, index)
     return Shown(clip, frame, _clip_frames(library, clip, frame), piece)
 
 
 def fetch(library: Library, edit: EditList, index: np.ndarray, rate: float) -> Footage:
-    """Footage at fractional output frames `index` (T,) of the library's rate; `rate`: output frames per second."""
+    """Fetch source frames with their motion.
+
+    Args:
+        library: the clips.
+        edit: the edit list.
+        index: (T,) fractional frames at the library's rate.
+        fps: output frames per second.
+    """
     what = shown(library, edit, index)
     clip, frame, seams = what.clip, what.frame, what.seams
     pose, height, sway, heading = _poses(library, clip, frame)
     played = np.gradient(frame) if len(frame) > 1 else np.ones(len(frame))
-    for edge in seams:  # the difference across a seam says nothing about speed
+    # library frames per output frame; a difference across a transition says nothing, so it is taken from one side
+    for edge in seams:
         played[edge - 1] = frame[edge - 1] - frame[edge - 2] if edge > 1 and edge - 1 not in seams else 1.0
         played[edge] = frame[edge + 1] - frame[edge] if edge + 1 < len(frame) and edge + 1 not in seams else 1.0
     velocity = _interpolated(library, clip, frame, library.frames.velocity) * (played * rate / library.fps)[:, None]
@@ -88,11 +124,16 @@ def fetch(library: Library, edit: EditList, index: np.ndarray, rate: float) -> F
 
 @dataclass(frozen=True, eq=False)
 class Overlap:
-    """What the pieces on both sides of a seam show beyond it, R frames in all.
+    """What the pieces on both sides of each transition show beyond it, R frames in all.
 
-    at (R,) output frame, no frame twice; through (R,) how far the window around the seam has come there, between 0 and
-    1; after (R,) bool: behind the seam, where the other piece is the one that ends. pose (R, J, 4), height (R,) m, sway
-    (R, 2) m of the other piece."""
+    Attributes:
+        at: (R,) output frame, no frame twice.
+        through: (R,) progress of the window around the transition there, between 0 and 1.
+        after: (R,) bool, behind the transition, where the other piece is the one that ends.
+        pose: (R, J, 4) of the other piece.
+        height: (R,) m of the other piece.
+        sway: (R, 2) m of the other piece.
+    """
 
     at: np.ndarray
     through: np.ndarray
@@ -103,9 +144,11 @@ class Overlap:
 
 
 def overlap(library: Library, footage: Footage, reach: float) -> Overlap:
-    """At most `reach` frames on either side of each seam, and half of the shorter neighbouring piece.
+    """Fetch the overlap of neighbouring pieces.
 
-    A clip that ends sooner shortens its side, but for a frame or two in which its end is held."""
+    It reaches `reach` frames to either side of each transition, at most half of the shorter piece. A clip that ends
+    sooner shortens its side, except for a frame or two in which its end is held.
+    """
     edges = np.concatenate([[0], footage.seams, [len(footage.clip)]])
     none = np.zeros(0)
     rows = [_around(library, footage, edges[n : n + 3], reach) for n in range(len(footage.seams))]
@@ -115,33 +158,40 @@ def overlap(library: Library, footage: Footage, reach: float) -> Overlap:
 
 
 def _around(library: Library, footage: Footage, edges: np.ndarray, reach: float):
-    """Output frames around the seam between two pieces, edges (3,), how far through, whether behind it, and clip and
-    frame that the other piece shows there."""
+    """Compute the overlap around one transition.
+
+    Args:
+        edges: (3,) output frames: start of the piece before, transition, end of the piece after.
+    Returns:
+        Output frames, progress, whether behind the transition, and clip and frame that the other piece shows there.
+    """
     low, seam, high = (int(edge) for edge in edges)
     clip, frame, frames = footage.clip, footage.frame, library.frames
     ends, begins = clip[seam - 1], clip[seam]
     out = frame[seam - 1] - frame[seam - 2] if seam - low > 1 else 1.0
     into = frame[seam + 1] - frame[seam] if high - seam > 1 else 1.0
+    # output frames until the piece before runs out of its clip, and before the piece after begins in its clip
     left = (frames.first[ends] + frames.count[ends] - 1 - frame[seam - 1]) / max(out, 1e-3)
     room = (frame[seam] - frames.first[begins]) / max(into, 1e-3)
     before = int(min(reach, (seam - low) // 2, max(room, _HELD)))
     behind = int(min(reach, (high - seam) // 2, max(left, _HELD)))
     at = np.arange(seam - before, seam + behind)
     after = at >= seam
+    # each piece continued beyond the transition at its own playback rate
     other = np.where(after, frame[seam - 1] + out * (at - seam + 1), frame[seam] + into * (at - seam))
     through = np.arange(1, len(at) + 1) / (len(at) + 1.0)
     return at, through, after, np.where(after, ends, begins), other
 
 
 def _clip_frames(library: Library, clip: np.ndarray, frame: np.ndarray) -> np.ndarray:
-    """Fractional frames in the clips' own rates, held at the clips' ends."""
+    """Convert library frames to fractional frames in the clips' own rates, held at the clips' ends."""
     rates = np.array([c.motion.fps for c in library.clips]) / library.fps
     lengths = np.array([len(c.motion) for c in library.clips])
     return np.clip((frame - library.frames.first[clip]) * rates[clip], 0, lengths[clip] - 1)
 
 
 def _poses(library: Library, clip: np.ndarray, frame: np.ndarray):
-    """Pose, height, sway and heading at library frames; each clip is read once."""
+    """Fetch pose, height, sway and heading at library frames; each clip is read once."""
     count, joints = len(clip), len(library.skeleton)
     pose, root = np.empty((count, joints, 4)), np.empty((count, 3))
     own = _clip_frames(library, clip, frame)
@@ -157,7 +207,7 @@ def _poses(library: Library, clip: np.ndarray, frame: np.ndarray):
 
 
 def _interpolated(library: Library, clip: np.ndarray, frame: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Linear interpolation of per-frame `values` (N, ...) within clips, held at their ends."""
+    """Interpolate per-frame values (N, ...) linearly within clips, held at their ends."""
     first = library.frames.first[clip]
     at = np.clip(frame, first, first + library.frames.count[clip] - 1)
     low = np.minimum(np.floor(at).astype(int), np.maximum(first + library.frames.count[clip] - 2, first))
@@ -167,7 +217,7 @@ def _interpolated(library: Library, clip: np.ndarray, frame: np.ndarray, values:
 
 
 def _standing(library: Library, clip: np.ndarray, frame: np.ndarray) -> np.ndarray:
-    """(T, 2, 2) bool, from the nearest frame of each clip."""
+    """Look up heel and toe contacts (T, 2, 2) at the nearest frame of each clip."""
     own = np.round(_clip_frames(library, clip, frame)).astype(int)
     out = np.zeros((len(clip), 2, 2), bool)
     for number in np.unique(clip):

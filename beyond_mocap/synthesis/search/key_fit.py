@@ -1,7 +1,7 @@
-"""Which of several clips that carry the asked words fits a key moment best: where, how high and which way it strikes.
+"""How well clips with the requested labels fit a key moment: where, how high and in which direction they strike.
 
-All is compared in the frame of travel: x along the player's way at the key moment, y to his left. Speed and turning are
-weighed by the search itself.
+Everything is compared in the frame of travel: x along the player's direction of travel at the key moment, y to the
+left. Speed and turning are weighed by the search itself.
 """
 
 from __future__ import annotations
@@ -21,20 +21,26 @@ from ...motion.motion import at_frames, pose_kinematics
 from ...motion.track import SampledTrack
 from .wanted import pool_frame
 
-HEIGHT_COST = 0.8
-PLACE_COST = 0.3
-ANGLE_COST = 0.2
+HEIGHT_COST = 0.8  # per metre of height beyond the noise
+PLACE_COST = 0.3  # per metre on the ground beyond the noise
+ANGLE_COST = 0.2  # per radian between the part's velocity and the leaving ball
 _NOISE = 0.15  # m by which a tracked ball may be off without saying anything about the clip
-_FARTHEST = 1.0
-_FAST_BALL, _FAST_PART = 3.0, 1.5
-_MOMENT = 1.0 / 60.0
-_LEAVING = (0.06, 0.3)
+_FARTHEST = 1.0  # m on the ground beyond which the cost does not grow
+_FAST_BALL, _FAST_PART = 3.0, 1.5  # m/s from which on the directions of ball and part count
+_MOMENT = 1.0 / 60.0  # s before and after a key frame between which velocities are measured
+_LEAVING = (0.06, 0.3)  # s after a key moment between which the ball's velocity is measured
 
 
 @dataclass(frozen=True, eq=False)
 class Ball:
-    """What the track says about the ball at a key moment, in the frame of travel: place (2,) m from the player; height
-    m, NaN where it is not measured; leaving (2,) m/s just after. NaN throughout where there is no ball."""
+    """What the track says about the ball at a key moment, in the frame of travel; NaN throughout where there is no
+    ball.
+
+    Attributes:
+        place: (2,) m from the player.
+        height: m, NaN where it is not measured.
+        exit_velocity: (2,) m/s just after.
+    """
 
     place: np.ndarray
     height: float
@@ -43,8 +49,13 @@ class Ball:
 
 @dataclass(frozen=True, eq=False)
 class Strikes:
-    """How K key moments of clips strike: place (K, 2) m of the part's middle from the hips, height (K,) m, velocity
-    (K, 2) m/s, in the frame of travel; NaN for what touches no ball."""
+    """How the key moments of K clips strike, in the frame of travel; NaN for what touches no ball.
+
+    Attributes:
+        place: (K, 2) m of the part's middle from the hips.
+        height: (K,) m.
+        velocity: (K, 2) m/s.
+    """
 
     place: np.ndarray
     height: np.ndarray
@@ -52,7 +63,13 @@ class Strikes:
 
 
 def ball_at(track: SampledTrack, frame: float, height_known: bool) -> Ball:
-    """The ball of a sampled track at a fractional frame."""
+    """Measure the ball of a sampled track at a key moment.
+
+    Args:
+        track: the sampled track.
+        frame: fractional frame.
+        is_height_known: whether its height is measured.
+    """
     def at(second: float) -> np.ndarray:
         where = np.clip(frame + second * track.fps, 0, len(track.times) - 1)
         return np.array([np.interp(where, np.arange(len(track.times)), column) for column in track.ball.T])
@@ -67,7 +84,12 @@ def ball_at(track: SampledTrack, frame: float, height_known: bool) -> Ball:
 
 
 def strikes(library: Library, keys: Sequence[Key]) -> Strikes:
-    """Traits of clips' key moments; of two parts that may strike, the faster one's."""
+    """Measure how clips' key moments strike; of two parts that may strike, the faster one counts.
+
+    Args:
+        library: the clips.
+        keys: K key moments.
+    """
     roots, poses = zip(*(_around(library, key) for key in keys))
     places, rotations = pose_kinematics(library.skeleton, np.concatenate(roots), np.concatenate(poses))
     places, rotations = (values.reshape(len(keys), 3, *values.shape[1:]) for values in (places, rotations))
@@ -79,21 +101,21 @@ def strikes(library: Library, keys: Sequence[Key]) -> Strikes:
 
 
 def _around(library: Library, key: Key):
-    """Root and pose a moment before, at, and a moment after a key frame."""
+    """Fetch root and pose a moment before, at, and a moment after a key frame."""
     motion = library.clips[key.clip].motion
     own = np.clip(key.frame + np.array([-1.0, 0.0, 1.0]) * _MOMENT * motion.fps, 0, len(motion) - 1)
     return at_frames(motion, own)
 
 
 def _travel(library: Library, frame: np.ndarray) -> np.ndarray:
-    """(K,) radians in the clips' own world: the way they go at library frames (K,), or face where they stand."""
+    """Compute the direction of travel (K,) rad in the clips' own world, or the facing where they stand still."""
     velocity = library.frames.velocity[frame]
     aside = arctan2(velocity[:, 1], velocity[:, 0])
     return library.frames.heading[frame] + np.where(np.linalg.norm(velocity, axis=1) > 0.5, aside, 0.0)
 
 
 def _strike(library: Library, key: Key, places: np.ndarray, rotations: np.ndarray, back: float):
-    """place (2,), height and velocity (2,) of the part that strikes; places (3, J, 3), rotations (3, J, 4)."""
+    """Measure place (2,), height and velocity (2,) of the striking part; places (3, J, 3), rotations (3, J, 4)."""
     found = surfaces(library.skeleton, key.words)
     if not found:
         return np.full(2, np.nan), np.nan, np.full(2, np.nan)
@@ -104,8 +126,7 @@ def _strike(library: Library, key: Key, places: np.ndarray, rotations: np.ndarra
 
 
 def misfit(found: Strikes, ball: Ball) -> np.ndarray:
-    """(K,) cost of serving a key moment with that ball by each of the clips' strikes; what is not known costs
-    nothing."""
+    """Compute the cost (K,) of serving a key moment with that ball by each clip; what is not known costs nothing."""
     apart = np.linalg.norm(found.place - ball.place, axis=1)
     cost = PLACE_COST * np.clip(apart - _NOISE, 0.0, _FARTHEST)
     cost = np.nan_to_num(cost)

@@ -1,4 +1,4 @@
-"""What a library offers to the path search, whatever is asked: worked out once, kept as long as the library."""
+"""Candidates of the path search that depend only on the library: computed once and cached with it."""
 
 from __future__ import annotations
 
@@ -13,21 +13,28 @@ from ...base.vectors import arctan2
 from ...library.library import Library
 from .block_costs import AnnotationCost
 
-SLOT = 8
-RATES = np.array([0.875, 0.9375, 1.0, 1.0625, 1.125])
-BUCKET = 40
-REACH = 8
-_SPEED_CLASSES = (1.0, 2.0, 3.0, 4.5)
+SLOT = 8  # output frames of a usual slot
+RATES = np.array([0.875, 0.9375, 1.0, 1.0625, 1.125])  # playback rates that are tried
+BUCKET = 40  # library frames that count as one for replayed stretches
+REACH = 8  # frames to either side over which the jerk of a transition is measured
+_SPEED_CLASSES = (1.0, 2.0, 3.0, 4.5)  # m/s between the classes in which jerk is compared
 USUAL_STANCE = 0.3  # s with both feet on the ground, in a walk
-_LONGEST_STANCE = 2.0
-_SHOWN = 14  # library frames that a long slot shows at the fastest rate
+_LONGEST_STANCE = 2.0  # s beyond the usual stance at which its cost stops growing
+_SHOWN = 14  # library frames that a long slot shows at the fastest playback rate
 
 
 @dataclass(frozen=True, eq=False)
 class Pairs:
-    """K pairs of a rate and a library frame at which a slot may begin. number (K,) of the rate; frame (K,); speed (K,)
-    m/s and turn (K,) radians over the slot; offset (K,) radians from the direction of travel to the body's; long_stance
-    (K,) s that both feet stand longer than in a walk."""
+    """K pairs of a playback rate and a library frame at which a slot may begin.
+
+    Attributes:
+        number: (K,) index of the playback rate.
+        frame: (K,) library frame.
+        speed: (K,) m/s over the slot.
+        turn: (K,) rad over the slot.
+        offset: (K,) rad from the direction of travel to the facing.
+        long_stance: (K,) s of contact of both feet beyond that of a walk.
+    """
 
     number: np.ndarray
     frame: np.ndarray
@@ -37,28 +44,39 @@ class Pairs:
     long_stance: np.ndarray
 
     def part(self, which: slice) -> "Pairs":
-        """Some of the pairs."""
+        """Select a slice of the pairs."""
         return Pairs(*(getattr(self, field.name)[which] for field in fields(self)))
 
 
 class Offer:
-    """N library frames at R rates. speed (R, N) m/s, turn (R, N) radians and valid (R, N) of a slot that begins there;
-    by_speed (K,) the valid pairs (rate, frame), flat, in the order of their speeds; offset, long_stance (N,): see
-    `Pairs`; made (N,) bool; wild_before, wild_after (N,): see `wildness`; bucket (N,) int: frames of one bucket look
-    alike to whoever sees them twice."""
+    """What N library frames at R playback rates have for a slot that begins there.
+
+    Attributes:
+        frames: the library's frames.
+        annotation: their annotation costs.
+        speed: (R, N) m/s over a slot.
+        turn: (R, N) rad over a slot.
+        valid: (R, N) bool, whether the clip lasts that long and is allowed.
+        by_speed: (K,) the valid pairs, flat indices into (R, N), in order of their speeds.
+        offset, long_stance: (N,), see `RatePairs`.
+        is_synthetic: (N,) bool, frames of synthetic clips.
+        is_in_contact: (N, 2) bool, feet in contact.
+        wild_before, wild_after: (N,), see `measure_wildness`.
+        bucket: (N,) int; frames of one bucket look alike when they are shown twice.
+    """
 
     _kept: weakref.WeakKeyDictionary[Library, dict[bytes, "Offer"]] = weakref.WeakKeyDictionary()
 
     @classmethod
     def of(cls, library: Library, allowed: np.ndarray) -> "Offer":
-        """The library's offer with the clips of `allowed` (C,) bool."""
+        """Return the cached index of a library for the clips of `allowed` (C,) bool, built on first use."""
         kept = cls._kept.setdefault(library, {})
         if allowed.tobytes() not in kept:
             kept[allowed.tobytes()] = cls(library, allowed)
         return kept[allowed.tobytes()]
 
     def __init__(self, library: Library, allowed: np.ndarray):
-        """Works it all out; `of` does so only once."""
+        """Build the index; `for_library` does so only once."""
         self.frames = library.frames
         self.annotation = AnnotationCost(library.frames)
         self.made = np.array([clip.made for clip in library.clips])[library.frames.clip]
@@ -77,13 +95,14 @@ class Offer:
         self._showing: dict[frozenset[str], np.ndarray] = {}
 
     def pairs(self, number: np.ndarray, frame: np.ndarray) -> Pairs:
-        """The pairs of RATES[number (K,)] and frame (K,)."""
+        """Build the pairs of PLAYBACK_RATES[number (K,)] and library frame (K,)."""
         played = self.speed[number, frame], self.turn[number, frame]
         return Pairs(number, frame, *played, self.offset[frame], self.long_stance[frame])
 
     def in_speed(self, avoid: frozenset[str] = frozenset()) -> Pairs:
-        """All valid pairs in the order of their speeds, none that shows a word of `avoid` unless all do."""
+        """Return all valid pairs in order of their speeds, without those that show a label of `avoid` unless all do."""
         if avoid not in self._sorted:
+            # flat index = rate * N + frame, so `% N` is the frame
             fine = ~self.showing(avoid)[self.by_speed % len(self.frames)]
             kept = self.by_speed[fine] if avoid and fine.any() else self.by_speed
             number, frame = np.divmod(kept, len(self.frames))
@@ -91,15 +110,22 @@ class Offer:
         return self._sorted[avoid]
 
     def showing(self, words: frozenset[str]) -> np.ndarray:
-        """(N,) bool: a slot from there on shows one of the words."""
+        """Return (N,) bool: a slot from there on shows one of the labels."""
         if words not in self._showing:
             carried = self.annotation.showing(words)
+            # the filter looks at the frames ahead only, by its origin
             self._showing[words] = maximum_filter1d(carried, _SHOWN, origin=-(_SHOWN // 2), mode="nearest")
         return self._showing[words]
 
     def lacking(self, words: frozenset[str]) -> tuple[np.ndarray, np.ndarray]:
-        """Where `words` are asked (none: all will do): (N,) share of them that each frame lacks; (N,) bool: a slot from
-        there on shows an action (a kick, a jump) that nobody asked for, or nothing that is annotated."""
+        """Compute what frames lack of requested labels (none: all will do).
+
+        Args:
+            words: the labels.
+        Returns:
+            (N,) share of them that each frame lacks; (N,) bool, whether a slot from there on shows an action (a kick, a
+            jump) that is not requested, or nothing that is annotated.
+        """
         if words not in self._by_words:
             names, frames = self.frames.vocabulary, self.frames
             missing = self.annotation.missing_share(words) if words else np.zeros(len(frames))
@@ -110,25 +136,37 @@ class Offer:
 
 
 def wildness(library: Library) -> tuple[np.ndarray, np.ndarray]:
-    """(N,) and (N,): by how much the largest jerk within REACH frames before and after each frame exceeds what is usual
-    at its speed, as a share; 0 where it does not. A seam's jerk is measured over such windows
-    (../shared/metrics.md)."""
+    """Compute by how much the largest jerk around each frame exceeds what is usual at its speed.
+
+    The jerk of a transition is measured over such windows (../shared/metrics.md).
+
+    Returns:
+        (N,) and (N,) for the JERK_REACH frames before and after each frame, as a share; 0 where it does not exceed it.
+    """
     frames = library.frames
     kind = np.digitize(frames.speed, _SPEED_CLASSES)
     around = maximum_filter1d(frames.jerk, 2 * REACH + 1, mode="nearest")
+    # 90th percentile in the speed class; inf where the library has no frame of the class
     usual = np.array([np.percentile(around[kind == k], 90) if np.any(kind == k) else np.inf for k in range(5)])
     windows = (maximum_filter1d(frames.jerk, REACH + 1, mode="nearest", origin=o * (REACH // 2)) for o in (1, -1))
     return tuple(np.maximum(window / usual[kind] - 1.0, 0.0).astype(np.float32) for window in windows)
 
 
 def played_speed_and_turn(library: Library, rate: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Per library frame, if a slot starts there at `rate`: (N,) mean speed in m/s, (N,) turn of the body in radians,
-    (N,) whether the clip lasts that long."""
+    """Compute what a slot plays if it starts at each library frame.
+
+    Args:
+        library: the clips, N frames.
+        rate: playback rate.
+    Returns:
+        (N,) mean speed m/s, (N,) turn of the body rad, (N,) whether the clip lasts that long.
+    """
     frames = library.frames
     after = np.arange(len(frames)) + SLOT * rate
     valid = frames.left_in_clip >= SLOT * rate
     low = np.minimum(np.floor(after).astype(int), len(frames) - 2)
     weight = after - low
+    # keep indices inside the library where the clip ends too soon; `valid` excludes them
     weight[~valid] = 0.0
     low[~valid] = np.minimum(np.arange(len(frames))[~valid], len(frames) - 2)
     path = frames.path[low] * (1 - weight)[:, None] + frames.path[low + 1] * weight[:, None]

@@ -1,7 +1,7 @@
-"""What a stretch of a clip costs in a place of the track, and what a cut from one frame to another costs.
+"""Costs of the path search: of a stretch of a clip at a place of the track, and of a cut from one frame to another.
 
-All that `path_search` weighs stands here: how far speed, turn, facing and words are from what is asked, and how far two
-poses are apart. Costs are per slot, about a metre per second of missed speed each.
+Everything that `path_search` weighs is here: how far speed, turning, facing and labels are from what is requested, and
+how far two poses are apart. Costs are per slot, about 1 per metre per second of missed speed.
 """
 
 from __future__ import annotations
@@ -18,16 +18,16 @@ from .offer import RATES, SLOT, Offer, Pairs
 from .preferences import Used, price
 from .wanted import Wanted
 
-# The cheapest of many pairs of a rate and a library frame, without weighing them all.
+# Finding the cheapest of many pairs of a playback rate and a library frame without evaluating all.
 #
-# Pairs lie in the order of their speeds, and each costs at least the speed that it misses. What every eighth of them
-# costs tells how dear the cheapest are at most, and so how far from the asked speed they can lie.
+# Pairs are in order of their speeds, and each costs at least the speed that it misses. The costs of every eighth pair
+# give an upper bound for the cheapest ones, and so a limit of how far from the requested speed they can lie.
 
 
-_SAMPLED = 8
-# as many pairs as are wanted lie below the cost below which this many times their share of the sample lies
+_SAMPLED = 8  # every eighth pair is sampled
+# safety factor on the rank in the sample: so many pairs very likely lie below the cost found there
 _ABOVE = 1.25
-_ROUNDING = 1e-3
+_ROUNDING = 1e-3  # m/s, for float32 speeds
 
 _CONTINUITY = ("switch", "pose", "rate_change")
 
@@ -35,11 +35,18 @@ _CONTINUITY = ("switch", "pose", "rate_change")
 def cheapest(
     cost_of: Callable[[slice], np.ndarray], speeds: np.ndarray, speed: float, weight: float, looked_at: int, count: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The `count` cheapest of the `looked_at` pairs nearest to a speed in m/s: their numbers (k,), ascending, and costs
-    (k,).
+    """Find the `count` cheapest of the `considered` pairs nearest to a speed.
 
-    speeds (K,) m/s of the pairs, ascending; weight: what a metre per second of missed speed costs each pair at least;
-    cost_of: (n,) costs of a part of the pairs."""
+    Args:
+        cost_of: returns the costs (n,) of a slice of the pairs.
+        speeds: (K,) m/s of the pairs, ascending.
+        speed: m/s that is requested.
+        weight: least cost of a metre per second of missed speed.
+        considered: how many pairs are considered.
+        count: how many are returned.
+    Returns:
+        Their numbers (k,), ascending, and costs (k,).
+    """
     near = _nearest(speeds, speed, looked_at)
     part, cost = _promising(cost_of, speeds, speed, weight=weight, near=near, count=count)
     best = np.sort(np.argpartition(cost, count)[:count]) if len(cost) > count else np.arange(len(cost))
@@ -47,16 +54,20 @@ def cheapest(
 
 
 def _nearest(speeds: np.ndarray, speed: float, count: int) -> slice:
+    """Return the slice of the `count` speeds nearest to `speed`, by rank."""
     middle = int(np.searchsorted(speeds, speed))
     low = int(np.clip(middle - count // 2, 0, max(0, len(speeds) - count)))
     return slice(low, min(low + count, len(speeds)))
 
 
 def _promising(cost_of, speeds: np.ndarray, speed: float, weight: float, near: slice, count: int):
-    """The part of `near` that holds the `count` cheapest pairs, and what its pairs cost; all of `near` where it is
-    small or the sample deceives."""
+    """Return the part of `near` that holds the `count` cheapest pairs, and their costs.
+
+    All of `near` where it is small, or where the sample gave too low a bound.
+    """
     rank = int(_ABOVE * count / _SAMPLED)
     if near.stop - near.start > 4 * _SAMPLED * rank and weight > 0.0:
+        # cost / weight bounds the missed speed, so the cheapest pairs lie within `reach` of the requested speed
         most = np.partition(cost_of(slice(near.start, near.stop, _SAMPLED)), rank)[rank]
         reach = float(most) / weight + _ROUNDING
         low, high = np.searchsorted(speeds, [speed - reach, speed + reach])
@@ -68,37 +79,50 @@ def _promising(cost_of, speeds: np.ndarray, speed: float, weight: float, near: s
 
 
 TERMS = {
-    "speed": "speed other than the track's",
-    "turn": "turning other than the track's",
-    "facing": "facing elsewhere than wanted",
-    "words": "asked words that the clip lacks",
-    "unasked": "an action that nobody asked for, or no words at all",
-    "made": "made clip, not recorded",
+    "speed": "speed differs from the track",
+    "turn": "turning differs from the track",
+    "facing": "faces another direction",
+    "words": "requested labels that the clip lacks",
+    "unasked": "an action not requested, or no labels at all",
+    "made": "synthetic clip, not recorded",
     "rate": "played faster or slower than recorded",
-    "strike": "strikes the ball otherwise than it comes",
+    "strike": "does not fit the ball at the strike",
     "pose": "change of pose at the cut",
-    "feet": "standing feet that jump at the cut",
-    "left": "wild motion left at the cut",
-    "cut": "the cut itself, and wild motion entered",
+    "feet": "planted feet that jump at the cut",
+    "left": "abrupt motion before the cut",
+    "cut": "the cut itself, and abrupt motion after it",
     "replay": "shown a moment ago",
-    "rate_change": "change of playing speed",
-    "avoided": "a word that must not be",
-    "style": "no clip of the style",
-    "variety": "out of step with this player's own lag",
+    "rate_change": "change of playback rate",
+    "avoided": "an avoided label",
+    "style": "not a clip of the style",
+    "variety": "does not match this player's own lag",
 }
-"""Name of a part of the costs -> what it is about, as "Why this clip?" says it."""
+"""Name of a cost term -> its description in "Why This Clip?"."""
 
 
 @dataclass(frozen=True)
 class Weights:
-    """What a unit of each misfit costs. speed per m/s; drag per m/s and second that both feet stand longer than in a
-    walk; turn per radian and slot; facing per radian between the body and where it should face; words for lacking all
-    of the asked ones; unasked for frames of an action that nobody asked for, or that carry no word; made for a made
-    clip, which steps in only where recordings miss the speed by more, made_key at key moments, where a recording is
-    worth more; rate per unit of warp; stretch per unit of warp beyond 0.85 to 1.15; switch for any cut; pose per metre
-    of joint distance; feet per metre that a foot which stands before and after a cut would jump; wild for cutting where
-    the clips jerk by as much again as is usual; rate_change per unit; replay for a stretch shown less than 4 s ago;
-    held per frame beyond a clip's end."""
+    """Cost of one unit of each misfit.
+
+    Attributes:
+        speed: per m/s of missed speed.
+        drag: per m/s, and per second of contact of both feet beyond that of a walk.
+        turn: per radian and slot.
+        facing: per radian between the body and where it should face.
+        words: for lacking all requested labels.
+        unasked: for frames of an action that is not requested, or that carry no label.
+        synthetic: for a synthetic clip; it is used only where recordings miss the speed by more.
+        synthetic_key: the same at key moments, where a recording is worth more.
+        rate: per unit of time warp.
+        stretch: per unit of time warp beyond 0.85 to 1.15.
+        switch: for any cut.
+        pose: per metre of joint distance.
+        feet: per metre that a foot in contact before and after a cut would jump.
+        wild: for cutting where the clips jerk by as much again as is usual.
+        rate_change: per unit of change of the playback rate.
+        replay: for a stretch shown less than 4 s ago.
+        held: per frame beyond a clip's end.
+    """
 
     speed: float = 1.0
     drag: float = 1.0
@@ -119,33 +143,44 @@ class Weights:
     held: float = 0.1
 
 
-_NEAR_KEY = 45  # frames around a key moment in which its own words may be shown
+_NEAR_KEY = 45  # frames around a key moment in which its own labels may be shown
 
 AVOIDED = 1000.0
-"""What a slot costs that shows a word which it must not: more than a whole track of anything else."""
+"""Cost of a slot that shows an avoided label: more than a whole track of anything else."""
 
 Term = tuple[str, np.ndarray]
-"""A part of a cost, by name."""
+"""Name and values of a cost term."""
 
 
 @dataclass(frozen=True, eq=False)
 class Alike:
-    """How far two poses are apart: the sum of the distances of their bones (N, P, 3), weighted, of the library's
-    frames; the mean over `offsets` in frames from the cut, so that what follows and went before counts too."""
+    """Another distance of poses: the sum of the distances of weighted bones, averaged over frames around the cut.
+
+    Attributes:
+        bones: (N, P, 3), weighted, of the library's frames.
+        offsets: frames from the cut that are compared, so that what follows and went before counts too.
+    """
 
     bones: np.ndarray
     offsets: tuple[int, ...] = (0,)
 
 
 class PathCosts:
-    """The costs of one order on one library of N frames."""
+    """The costs of one request on one library of N frames."""
 
     def __init__(
         self, library: Library, wanted: Wanted, weights: Weights = Weights(), used: tuple[Used, ...] = (),
         alike: Alike | None = None,
     ):
-        """used: footage that another solution is to do without where it can. alike: another measure of how far two
-        poses are apart than that of the features."""
+        """Prepare the costs.
+
+        Args:
+            library: the clips.
+            request: the request.
+            weights: cost of each misfit.
+            used: source frames that another solution avoids where it can.
+            bone_distance: another distance of poses than that of the features.
+        """
         self.library, self.wanted, self.weights = library, wanted, weights
         self.price = price(library, used) if used else None
         self.alike = alike
@@ -156,35 +191,51 @@ class PathCosts:
         self._asked: dict[tuple[int, int], tuple[float, float]] = {}
 
     def inside(self, frame: np.ndarray) -> np.ndarray:
-        """Nearest whole library frames."""
+        """Round to the nearest whole library frames."""
         return np.clip(np.round(frame).astype(int), 0, len(self.frames) - 1)
 
     def asked(self, first: int, end: int) -> tuple[float, float]:
-        """Mean speed in m/s and change of direction in radians that the track asks from frame first to end."""
+        """Return the track's mean speed, m/s, and change of direction, rad, from frame first to end; cached."""
         if (first, end) not in self._asked:
             track = self.wanted.track
             last = min(end, len(track.times) - 1)
             speed = float(track.speed[first : last + 1].mean())
+            # a slow body turns on the spot: its direction counts less
             turn = float(track.direction[last] - track.direction[first]) * min(1.0, speed)
             self._asked[first, end] = speed, turn
         return self._asked[first, end]
 
     def misfit(self, first: int, end: int, number: np.ndarray, frame: np.ndarray) -> np.ndarray:
-        """(K,) what library frames (K,), played from there on at RATES[number (K,)], cost in the output's first .. end;
-        inf where the clip ends before or may not be used."""
+        """Compute the cost of playing library frames in a slot.
+
+        Args:
+            first, end: output frames of the slot.
+            number: (K,) index of the playback rate.
+            frame: (K,) library frame where it begins.
+        Returns:
+            (K,); inf where the clip ends before or may not be used.
+        """
         cost = _added(self._played_terms(first, end, self.offer.pairs(number, frame)))
         cost += self._still(self._words(first, end), self.wanted.avoided_in(first, end))[frame]
         return np.where(self.offer.valid[number, frame], cost, np.inf)
 
     def misfit_terms(self, first: int, end: int, number: np.ndarray, frame: np.ndarray) -> Iterator[Term]:
-        """What `misfit` is the sum of, by name, each (K,)."""
+        """Generate the terms of `compute_misfit`, by name, each (K,)."""
         yield from self._played_terms(first, end, self.offer.pairs(number, frame))
         yield from self._still_terms(frame, self._words(first, end), self.wanted.avoided_in(first, end))
 
     def cheapest(self, first: int, end: int, looked_at: int, count: int):
-        """The `count` pairs of rate and library frame that cost least of the `looked_at` nearest in speed: number (K,),
-        frame (K,), misfit (K,). The others' misfit in speed alone would put them behind, and a large library is
-        searched as fast as a small one."""
+        """Find the pairs of playback rate and library frame with the lowest cost among those nearest in speed.
+
+        The missed speed alone would put the others behind, so a large library is searched as fast as a small one.
+
+        Args:
+            first, end: output frames of the slot.
+            considered: how many pairs are considered.
+            count: how many are returned.
+        Returns:
+            number (K,), frame (K,), misfit (K,).
+        """
         words, avoid = self._words(first, end), self.wanted.avoided_in(first, end)
         pairs, still, (speed, _) = self.offer.in_speed(avoid), self._still(words, avoid), self.asked(first, end)
 
@@ -196,10 +247,12 @@ class PathCosts:
         return pairs.number[best], pairs.frame[best], cost
 
     def _words(self, first: int, end: int) -> frozenset[str]:
+        """Return the labels requested in the middle of a slot."""
         return self.wanted.asked[(first + end) // 2] or frozenset()
 
     def _played_terms(self, first: int, end: int, pairs: Pairs) -> Iterator[Term]:
-        """How far pairs (K,) are from what the track asks, the rate, and the player's taste."""
+        """Generate the terms that depend on the track: motion of pairs (K,), playback rate, and the player's lag."""
+        # pairs hold the turn over SLOT frames, this slot may be longer or shorter
         turn = pairs.turn * np.float32((end - first) / SLOT)
         yield from self._motion_terms(first, end, pairs.speed, turn=turn, offset=pairs.offset,
                                       long_stance=pairs.long_stance)
@@ -208,14 +261,14 @@ class PathCosts:
             yield "variety", self.wanted.taste.cost(first, pairs.frame)
 
     def _still(self, words: frozenset[str], avoid: frozenset[str]) -> np.ndarray:
-        """(N,) what the library's frames cost wherever these words are asked and avoided."""
+        """Return the cost (N,) of the library's frames wherever these labels are requested and avoided; cached."""
         if (words, avoid) not in self._kept:
             terms = self._still_terms(np.arange(len(self.frames)), words, avoid)
             self._kept[words, avoid] = _added(terms).astype(np.float32)
         return self._kept[words, avoid]
 
     def _still_terms(self, frame: np.ndarray, words: frozenset[str], avoid: frozenset[str]) -> Iterator[Term]:
-        """What it is the sum of, by name, each (K,) of frames (K,)."""
+        """Generate the terms of it, by name, each (K,) of frames (K,)."""
         w, (missing, unasked) = self.weights, self.offer.lacking(words)
         yield "words", w.words * missing[frame]
         yield "unasked", np.float32(w.unasked) * unasked[frame]
@@ -228,20 +281,31 @@ class PathCosts:
             yield "avoided", AVOIDED * self.offer.showing(avoid)[frame]
 
     def key_misfit(self, first: int, end: int, clip: np.ndarray, start: np.ndarray, rate: np.ndarray) -> np.ndarray:
-        """(K,) the same for pieces of key moments: clips (K,) from library frames start (K,) on at any rate (K,), held
-        at their ends. Words do not count here but for those that must not be. A kick that was recorded slower than the
-        player runs is played faster, within the limits of what may give way (../shared/metrics.md)."""
+        """Compute the cost of pieces of key moments in a slot.
+
+        Labels have no weight here except avoided ones. A kick that was recorded slower than the player runs is played
+        faster, within the limits of what may yield (../shared/metrics.md).
+
+        Args:
+            first, end: output frames of the slot.
+            clip: (K,) clip index.
+            start: (K,) fractional library frame where each begins.
+            rate: (K,) any playback rate; clips are held at their ends.
+        Returns:
+            (K,) cost.
+        """
         return _added(self._key_terms(first, end, clip, start, rate)) * ((end - first) / SLOT)
 
     def key_terms(self, first: int, end: int, clip: np.ndarray, start: np.ndarray, rate: np.ndarray) -> Iterator[Term]:
-        """What `key_misfit` is the sum of, by name, each (K,)."""
+        """Generate the terms of `compute_key_misfit`, by name, each (K,)."""
         for name, values in self._key_terms(first, end, clip, start, rate):
             yield name, values * ((end - first) / SLOT)
 
     def _key_terms(self, first: int, end: int, clip: np.ndarray, start: np.ndarray, rate: np.ndarray) -> Iterator[Term]:
-        """The same per SLOT frames."""
+        """Generate the same per SLOT frames."""
         low, high = self.frames.first[clip], self.frames.first[clip] + self.frames.count[clip] - 1
         length = end - first
+        # first and last library frame that is played, held inside the clip
         a, b = (np.clip(at, low, high) for at in (start, start + rate * length))
         path = [_between(self.frames.path, at, high) for at in (a, b)]
         turn = _between(self.frames.heading, b, high) - _between(self.frames.heading, a, high)
@@ -250,6 +314,7 @@ class PathCosts:
         yield from self._motion_terms(
             first, end, speed, turn=turn, offset=self.offer.offset[middle], long_stance=self.offer.long_stance[middle]
         )
+        # library frames that lie beyond either end of the clip
         held = np.maximum(low - start, 0) + np.maximum(start + rate * length - high, 0)
         off = np.abs(rate - 1.0)
         far = self.weights.stretch * np.maximum(off - 0.15, 0.0)
@@ -263,14 +328,17 @@ class PathCosts:
             yield "avoided", AVOIDED * SLOT / length * self._avoided_between(first, end, a, b)
 
     def _avoided_between(self, first: int, end: int, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-        """(K,) bool: whether library frames a .. b (K,) show a word that the output's first .. end must not, but for
-        those that a key moment close by asks for."""
+        """Return (K,) bool: whether library frames a .. b (K,) show a label that the output's first .. end avoids.
+
+        Labels that a key moment close by requests do not count.
+        """
         avoid = self.wanted.avoided_in(first, end)
         near = (key.asked.words for key in self.wanted.keys if first - _NEAR_KEY <= key.frame < end + _NEAR_KEY)
         shown = np.append(0, np.cumsum(self.offer.annotation.showing(avoid.difference(*near))))
         return shown[self.inside(b) + 1] > shown[self.inside(a)]
 
     def _motion_terms(self, first: int, end: int, speed, turn, offset, long_stance) -> Iterator[Term]:
+        """Generate the terms of speed, turning and facing against the track."""
         wanted_speed, wanted_turn = self.asked(first, end)
         w, moving = self.weights, min(1.0, wanted_speed)
         yield "speed", np.abs(speed - wanted_speed) * (w.speed + w.drag * long_stance)
@@ -279,9 +347,15 @@ class PathCosts:
         yield "facing", w.facing * moving * np.minimum(aside, 2.0 * np.pi - aside)
 
     def cut_terms(self, ends: np.ndarray, start: np.ndarray) -> Iterator[Term]:
-        """What a cut from library frames ends (B,) to start (K,) costs, by name, each (B, K) or broadcast to it: how
-        far their poses are apart ("pose", first), and how wild the motion is that is left or entered (nobody can blend
-        out of a kick half way)."""
+        """Generate the terms of cuts between library frames, by name, each (B, K) or broadcast to it.
+
+        "pose" is the distance of the poses (and comes first); "left" and "cut" grow with the jerk that is left or
+        entered, since a transition cannot blend out of the middle of a kick.
+
+        Args:
+            ends: (B,) last frame before the cut.
+            start: (K,) first frame after it.
+        """
         ends, start = self.inside(ends), self.inside(start)
         yield "pose", self.apart(ends, start)
         yield "feet", np.float32(self.weights.feet) * self.feet_apart(ends[:, None], start)
@@ -290,13 +364,13 @@ class PathCosts:
         yield "cut", entered
 
     def left_and_entered(self, ends: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(B,) what it costs to leave library frames ends (B,), (K,) what to cut to start (K,), whatever the other."""
+        """Compute the cost (B,) of leaving library frames ends (B,), and (K,) of cutting to start (K,)."""
         left = self.weights.wild * self.offer.wild_before[ends]
         entered = self.weights.switch + self.weights.wild * self.offer.wild_after[start]
         return left.astype(np.float32), entered.astype(np.float32)
 
     def apart(self, ends: np.ndarray, start: np.ndarray) -> np.ndarray:
-        """(B, K) what the change of pose between library frames ends (B,) and start (K,) costs."""
+        """Compute the cost (B, K) of the change of pose between library frames ends (B,) and start (K,)."""
         weight = np.float32(self.weights.pose)
         if self.alike is None:
             return distances(weight * self.frames.features[ends], weight * self.frames.features[start])
@@ -308,14 +382,20 @@ class PathCosts:
         return total / np.float32(len(self.alike.offsets))
 
     def _beside(self, frames: np.ndarray, offset: int) -> np.ndarray:
-        """(K,) library frames so many frames from others (K,), held at the ends of their clips."""
+        """Return the library frames (K,) an offset away from others (K,), held at the ends of their clips."""
         clip = self.frames.clip[frames]
         first = self.frames.first[clip]
         return np.clip(frames + offset, first, first + self.frames.count[clip] - 1)
 
     def feet_apart(self, ends: np.ndarray, start: np.ndarray) -> np.ndarray:
-        """m between the feet that stand before and after cuts from library frames `ends` to `start`, of shapes that go
-        together."""
+        """Measure how far feet in contact before and after cuts would jump.
+
+        Args:
+            ends: library frames before the cuts, any shape.
+            start: library frames after them, of a shape that broadcasts with it.
+        Returns:
+            m, summed over both feet.
+        """
         feet, stands = self.frames.feet, self.offer.stands
         apart = np.zeros(np.broadcast_shapes(ends.shape, start.shape), np.float32)
         for foot in (0, 1):
@@ -325,14 +405,21 @@ class PathCosts:
 
 
 def distances(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """(B, K) distances between points (B, D) and (K, D)."""
+    """Compute the distances (B, K) between points (B, D) and (K, D)."""
     square = _with_square(a, -2.0 * a, 1) @ _with_square(b, b, 0).T
     return np.sqrt(np.maximum(square, 0.0, out=square), out=square)
 
 
 def _with_square(points: np.ndarray, scaled: np.ndarray, place: int) -> np.ndarray:
-    """(K, D + 2) `scaled` (K, D) points with their squared lengths and ones behind, or the other way round, so that one
-    product is |a|^2 + |b|^2 - 2 a b."""
+    """Append squared lengths and ones to scaled points, so that one product is |a|^2 + |b|^2 - 2 a b.
+
+    Args:
+        points: (K, D).
+        scaled: (K, D).
+        place: which of the two last columns holds the squares.
+    Returns:
+        (K, D + 2).
+    """
     out = np.ones((len(points), points.shape[1] + 2), points.dtype)
     out[:, :-2] = scaled
     np.einsum("kd,kd->k", points, points, out=out[:, -2 + place])
@@ -340,7 +427,7 @@ def _with_square(points: np.ndarray, scaled: np.ndarray, place: int) -> np.ndarr
 
 
 def _added(terms: Iterator[Term]) -> np.ndarray:
-    """The sum of named parts, in their order; the first one is overwritten."""
+    """Return the sum of terms, in their order; the first one is overwritten."""
     _, total = next(terms)
     for _, values in terms:
         total += values
@@ -348,18 +435,19 @@ def _added(terms: Iterator[Term]) -> np.ndarray:
 
 
 def _between(values: np.ndarray, at: np.ndarray, last: np.ndarray) -> np.ndarray:
-    """`values` (N, ...) at fractional frames `at` (K,) that lie no later than `last` (K,)."""
+    """Interpolate values (N, ...) at fractional frames `at` (K,) that lie no later than `last` (K,)."""
     low = np.floor(at).astype(int)
     weight = (at - low).reshape(-1, *[1] * (values.ndim - 1))
     return values[low] * (1.0 - weight) + values[np.minimum(low + 1, last)] * weight
 
 
 def balanced(alpha: float, weights: Weights = Weights()) -> Weights:
-    """`weights` with words times alpha / 0.2 and continuity (what a cut and its change of pose and rate cost) times
-    (1 - alpha) / 0.8, so that alpha = 0.2, the paper's and the default, leaves them as they are.
+    """Balance labels against continuity by alpha.
 
-    Speed, turn and facing keep their weights: they hold the body on its track, which is nothing to be traded. So do
-    actions that nobody asked for, and replayed stretches."""
+    Labels are scaled by alpha / 0.2, continuity (cut, change of pose and of playback rate) by (1 - alpha) / 0.8, so
+    that alpha = 0.2, the default and the thesis' value, changes nothing. Speed, turning and facing keep their weights,
+    since they hold the body on its track; so do actions that are not requested, and replayed stretches.
+    """
     words, continuity = alpha / Plan.alpha, (1.0 - alpha) / (1.0 - Plan.alpha)
     return replace(
         weights, words=weights.words * words, **{name: getattr(weights, name) * continuity for name in _CONTINUITY}

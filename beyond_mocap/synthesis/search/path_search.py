@@ -1,11 +1,11 @@
-"""A search that looks at speed, turning, facing and words together with continuity, over the whole track.
+"""Path search: weighs speed, turning, facing and labels together with continuity, over the whole track.
 
-Faustino searches for words first and repairs distance afterwards; his §6.1 and §6.2 wish for position, distance and
-orientation inside the main search. Here every slot of about eight frames offers every frame of the library at five
-rates; its cost is how far speed, turn, facing and words are from what the track asks, plus what the change of pose
-costs. A beam keeps the best states of every slot. Whoever begins a piece of a key moment is bound to it as long as that
-clip's own entry and exit ask; the slot of the key frame itself is open to nobody else, so the beam has to pass through
-one of these clips at exactly the asked time, and begins its run-up as early as it must.
+Faustino searches for labels first and repairs distance afterwards; §6.1 and §6.2 of the thesis propose position,
+distance and orientation inside the main search. Here the candidates of every slot of about eight frames are all frames
+of the library at five playback rates; their cost is how far speed, turning, facing and labels are from the request,
+plus the change of pose. A beam keeps the best states of every slot. A state that begins a piece of a key moment is
+bound to it for that clip's own entry and exit; the slot of the key frame itself is closed to all others, so the beam
+has to pass through one of these clips at exactly the requested time, and begins its run-up as early as it must.
 """
 
 from __future__ import annotations
@@ -26,14 +26,19 @@ from .preferences import Used, weak_foot_cost
 from .slots import key_pieces, slot_edges, slot_of
 from .wanted import Wanted
 
-MEMORY_SLOTS = 15
-_LEAD_IN = 2
+MEMORY_SLOTS = 15  # slots whose buckets a state remembers (4 s at 30 frames per second)
+_LEAD_IN = 2  # slots ahead of a piece in which frames that lead into it are candidates
 
 
 @dataclass(frozen=True)
 class Width:
-    """How much a search looks at: `beam` states are kept of every slot; `candidates` pairs of library frame and rate
-    are weighed against them, the cheapest of the `looked_at` pairs nearest to the asked speed."""
+    """How much a search evaluates.
+
+    Attributes:
+        beam_width: states that are kept of every slot.
+        candidates: pairs of library frame and playback rate that are weighed against them.
+        considered: pairs nearest to the requested speed among which these are the cheapest.
+    """
 
     beam: int = 64
     candidates: int = 1500
@@ -41,13 +46,21 @@ class Width:
 
 
 NARROW = Width(beam=4, candidates=100, looked_at=2000)
-"""What is left when somebody waits for the end."""
+"""Width of a search that is cut short, or quick from the start."""
 
 
 @dataclass(frozen=True, eq=False)
 class Between:
-    """A stretch to be searched anew, frames first .. end of `edit` at the library's rate. What `edit` shows before and
-    behind stays: the search sets out from the one and pays for the way to the other."""
+    """A stretch to be searched again.
+
+    What the edit list shows before and behind stays: the search starts from the one and pays for the transition to the
+    other.
+
+    Attributes:
+        edit: the edit list, at the library's rate.
+        first: first frame of the stretch.
+        end: frame after its last one.
+    """
 
     edit: EditList
     first: int
@@ -56,8 +69,17 @@ class Between:
 
 @dataclass(frozen=True, eq=False)
 class States:
-    """B ways to fill a slot: clip (B,), start (B,) library frame, rate (B,), cost (B,) of the best way here, back (B,)
-    state of the slot before, piece (B,) of a key moment or -1, recent (B, M) buckets shown lately."""
+    """B ways to fill a slot.
+
+    Attributes:
+        clip: (B,) clip index.
+        start: (B,) fractional library frame.
+        rate: (B,) playback rate.
+        cost: (B,) of the best sequence that ends here.
+        back: (B,) state of the slot before.
+        piece: (B,) of a key moment, or -1.
+        recent: (B, M) buckets shown lately.
+    """
 
     clip: np.ndarray
     start: np.ndarray
@@ -68,18 +90,20 @@ class States:
     recent: np.ndarray
 
     def only(self, which: np.ndarray) -> "States":
-        """The states `which`, by index."""
+        """Select states by index."""
         return States(*(getattr(self, field.name)[which] for field in fields(self)))
 
 
 class PathSearch:
-    """One search; `run()` gives the edit list.
+    """One search; `run` returns the edit list.
 
-    between: search this stretch only and keep the rest. used: footage to do without where that can be. alike: another
-    measure of how far poses are apart. on_grid: slots lie as in other searches of the same frames (`slot_edges`).
-    hurry: when it says so the rest is searched by a narrow beam, and `hurried` is the frame from which on, else None;
-    before the first slot is filled it ends the search as `cancelled` does. narrow: the beam is narrow from the second
-    slot on."""
+    Attributes:
+        width: how much it evaluates.
+        hurried_from: output frame from which on a narrow beam searched, None if none did.
+        edges: (S + 1,) output frames of the slots.
+        pieces: ways to serve the key moments.
+        costs: the costs of the request.
+    """
 
     def __init__(
         self,
@@ -96,6 +120,22 @@ class PathSearch:
         on_grid: bool = False,
         narrow: bool = False,
     ):
+        """Prepare slots, pieces and costs.
+
+        Args:
+            library: the clips.
+            request: the request.
+            weights: cost of each misfit.
+            progress: called as progress(fraction, text).
+            cancelled: returns whether to stop.
+            hurry: returns whether to finish early: the rest is searched by a narrow beam; before the first slot
+                is filled it ends the search as `cancelled` does.
+            stretch: search this stretch only and keep the rest.
+            used: source frames to avoid where that is possible.
+            bone_distance: another distance of poses.
+            on_grid: whether slots lie as in other searches of the same frames (`build_slot_edges`).
+            narrow: whether the beam is narrow from the second slot on.
+        """
         self.library, self.wanted, self.weights, self.between = library, wanted, weights, between
         self.frames = library.frames
         self.costs = PathCosts(library, wanted, weights, used, alike)
@@ -111,7 +151,12 @@ class PathSearch:
         self._hurry, self._narrow = hurry or (lambda: False), narrow
 
     def run(self) -> EditList:
-        """The cheapest way through all slots that the beam finds; InputError where no clip is as long as a slot."""
+        """Find the sequence with the lowest cost that the beam reaches.
+
+        Raises:
+            InputError: where no clip is as long as a slot.
+            Cancelled: when `cancelled` returns true.
+        """
         if not len(self.offer.by_speed):
             raise InputError(
                 self.library.folder or "library",
@@ -120,6 +165,7 @@ class PathSearch:
             )
         layers: list[States] = []
         count = len(self.edges) - 1
+        # a stretch in the middle starts from the frame before it, whose one state shows one frame
         before, shown = self._arriving() if self.edges[0] > 0 else (None, 0)
         for slot in range(count):
             self._stop_or_hurry(slot)
@@ -132,13 +178,14 @@ class PathSearch:
         return self._read(layers)
 
     def _stop_or_hurry(self, slot: int) -> None:
+        """Raise Cancelled, or narrow the beam, if that is requested."""
         if self._cancelled() or slot == 0 and self._hurry():
             raise Cancelled("synthesis: cancelled")
         if self.hurried is None and (self._hurry() or self._narrow and slot > 0):
             self.width, self.hurried = NARROW, int(self.edges[slot])
 
     def _choice_costs(self) -> np.ndarray:
-        """(P,) how badly each piece's clip strikes the ball that the track has at its key moment."""
+        """Compute (P,) how badly each piece's clip strikes the ball that the track has at its key moment."""
         costs = np.zeros(len(self.pieces.wanted))
         for number in np.unique(self.pieces.wanted):
             key, at = self.wanted.keys[number], self.pieces.wanted == number
@@ -148,14 +195,14 @@ class PathSearch:
         return costs
 
     def _first(self) -> States:
+        """Build the states of the first slot."""
         to = self.offered(0)
         recent = np.full((len(to.clip), MEMORY_SLOTS), -1)
         return self._kept(States(to.clip, to.start, to.rate, cost=to.cost, back=np.zeros(len(to.clip), int),
                                  piece=to.piece, recent=recent))
 
     def _arriving(self) -> tuple[States, int]:
-        """The one state from which a stretch sets out, the frame before, with what was shown up to there; and its
-        length."""
+        """Build the state from which a stretch starts, the frame before it; and that state's length, 1."""
         first, edit = self.between.first, self.between.edit
         at = np.array([first - 1])
         shown = edit.frame[np.maximum(first - SLOT * np.arange(MEMORY_SLOTS, 0, -1), 0)]
@@ -165,15 +212,27 @@ class PathSearch:
                       piece=nothing - 1, recent=recent), 1
 
     def _leaving(self, states: States, shown: int) -> States:
-        """The last states, of `shown` frames, with what it costs to come to the frame that stays behind the stretch."""
+        """Add to the last states the cost of the transition to the frame that stays behind the stretch.
+
+        Args:
+            states: of the last slot.
+            frames_shown: frames of the last slot.
+        """
         edit, at = self.between.edit, np.array([self.between.end])
         goal = Offered(edit.clip[at], edit.frame[at], _steps(edit, at), np.zeros(1), np.array([-1]))
         ways = self.ways(states, np.arange(len(states.cost)), states.start + states.rate * shown)
         return replace(states, cost=ways.every(goal)[:, 0])
 
     def _layer(self, slot: int, before: States, shown: int) -> States:
-        """The best states of one slot, given those of the slot before, of `shown` frames."""
+        """Compute the best states of one slot.
+
+        Args:
+            slot: its number.
+            before: the states of the slot before.
+            frames_shown: frames of the slot before.
+        """
         ends = before.start + before.rate * shown
+        # a state inside a piece that has not ended can only continue it; piece -1 reads the appended 0 and is masked
         bound = (before.piece >= 0) & (np.append(self.pieces.end, 0)[before.piece] > slot)
         options = [self._bound(slot, before, ends, np.flatnonzero(bound))] if bound.any() else []
         free = np.flatnonzero(~bound)
@@ -186,8 +245,7 @@ class PathSearch:
                                  recent=np.roll(before.recent[back], -1, axis=1)))
 
     def _kept(self, states: States) -> States:
-        """The cheapest of those that are free and of those bound to a key moment, as many of each as the beam keeps,
-        with their memory moved on."""
+        """Keep the cheapest free and the cheapest bound states, a beam of each, and update their memory."""
         order = np.argsort(states.cost, kind="stable")
         free = states.piece[order] < 0
         kept = states.only(np.concatenate([order[free][: self.width.beam], order[~free][: self.width.beam]]))
@@ -195,8 +253,11 @@ class PathSearch:
         return kept
 
     def offered(self, slot: int) -> Offered:
-        """What can begin in a slot: pieces of key moments, and, unless a key frame lies in it, library frames at any
-        rate: the cheapest candidates, those that lead into a piece, and what was shown before an edit."""
+        """Collect the candidates that can begin in a slot.
+
+        These are pieces of key moments, and, unless a key frame lies in the slot, library frames at any playback rate:
+        the cheapest ones, those that lead into a piece, and what was shown before an edit.
+        """
         low, high = self.edges[slot : slot + 2]
         closed, here = slot in self._closed, np.flatnonzero(self.pieces.first == slot)
         offers = [self._beginning(low, high, here)] if closed or len(here) else []
@@ -206,17 +267,18 @@ class PathSearch:
         return Offered(*(np.concatenate(parts) for parts in zip(*offers)))
 
     def _beginning(self, low: int, high: int, here: np.ndarray):
-        """Pieces `here` of key moments."""
+        """Build the candidates of pieces `here` that begin in a slot."""
         clip, start, rate = self.pieces.clip[here], self.pieces.start[here], self.pieces.rate[here]
         cost = self.costs.key_misfit(low, high, clip, start, rate) + self.choice_cost[here]
         return clip, start, rate, cost, here
 
     def _candidates(self, low: int, high: int):
+        """Build the candidates of the cheapest library frames."""
         number, start, cost = self.costs.cheapest(low, high, self.width.looked_at, self.width.candidates)
         return self.frames.clip[start], start.astype(float), RATES[number], cost, np.full(len(cost), -1)
 
     def _leading_in(self, slot: int):
-        """Frames from which a piece that begins soon is reached without a cut: one offer of them all, or none."""
+        """Generate the candidates from which a piece that begins soon is reached without a cut, if there are any."""
         soon = np.flatnonzero((self.pieces.first > slot) & (self.pieces.first <= slot + _LEAD_IN))
         if not len(soon):
             return
@@ -227,8 +289,7 @@ class PathSearch:
         yield clip, start, rate, cost, np.full(len(soon), -1)
 
     def _as_before(self, low: int, high: int):
-        """What the edit list shows in a slot of a stretch that is searched anew, so that the search may come back to
-        it; nothing where it is cut there."""
+        """Build the candidate of what the edit list shows in a slot, none if it is cut there."""
         edit = self.between.edit
         at = np.array([] if np.any((edit.seams > low) & (edit.seams < high)) else [low], int)
         start, rate = edit.frame[at], _steps(edit, at)
@@ -237,25 +298,30 @@ class PathSearch:
         return edit.clip[at], start, rate, cost, np.full(len(at), -1)
 
     def _misfit_inside(self, slot: int, clip: np.ndarray, start: np.ndarray, number: np.ndarray) -> np.ndarray:
-        """(K,) misfit of going through clips from fractional frames on, inf where they do not last."""
+        """Compute the misfit (K,) of playing clips from fractional frames on, inf where they do not last."""
         low, high = self.edges[slot : slot + 2]
         first, last = self.frames.first[clip], self.frames.first[clip] + self.frames.count[clip] - 1
         lasts = (start >= first) & (start + RATES[number] * (high - low) <= last)
         return np.where(lasts, self.costs.misfit(low, high, number, self.costs.inside(start)), np.inf)
 
     def _entered(self, slot: int, before: States, ends: np.ndarray, free: np.ndarray, known: np.ndarray):
-        """Whatever is offered and may be kept beside ways of `known` (L,) costs, each by the cheapest way."""
+        """Find the candidates that may be kept, each by the cheapest transition.
+
+        Args:
+            known: (L,) costs of other ways to fill the slot.
+        """
         to = self.offered(slot)
         which, cost, state = self.ways(before, free, ends[free]).cheapest(to, known, self.width.beam)
         return to.clip[which], to.start[which], to.rate[which], cost, free[state], to.piece[which]
 
     def ways(self, before: States, free: np.ndarray, ends: np.ndarray) -> Ways:
-        """The ways on from the states `free` (B,), which end at library frames `ends` (B,)."""
+        """Build the transitions from the states `free` (B,), which end at library frames `ends` (B,)."""
         seen = self._seen(before.recent[free])
         return Ways(self.costs, before.clip[free], ends, rate=before.rate[free], cost=before.cost[free], seen=seen)
 
     def _seen(self, recent: np.ndarray) -> np.ndarray:
-        """(B, buckets) whether a state has lately shown a bucket of frames or its neighbours; recent (B, M)."""
+        """Return (B, buckets) whether a state has lately shown a bucket of frames or its neighbours; recent (B, M)."""
+        # one bucket more on either side, cut off in the end; -1 (nothing shown) falls into the first of these
         seen = np.zeros((len(recent), self.offer.bucket[-1] + 3), bool)
         row = np.arange(len(recent))[:, None]
         for shift in (0, 1, 2):
@@ -263,13 +329,13 @@ class PathSearch:
         return seen[:, 1:-1]
 
     def _bound(self, slot: int, before: States, ends: np.ndarray, bound: np.ndarray):
-        """Pieces of key moments that go on."""
+        """Continue the pieces of key moments."""
         clip, start, rate = before.clip[bound], ends[bound], before.rate[bound]
         cost = before.cost[bound] + self.costs.key_misfit(self.edges[slot], self.edges[slot + 1], clip, start, rate)
         return clip, start, rate, cost, bound, before.piece[bound]
 
     def _continued(self, slot: int, before: States, ends: np.ndarray, free: np.ndarray):
-        """Going on without a cut, at each rate; a slot a little longer than SLOT must still end inside the clip."""
+        """Continue without a cut, at each playback rate, where the slot still ends inside the clip."""
         back = np.repeat(free, len(RATES))
         number = np.tile(np.arange(len(RATES)), len(free))
         clip, start, rate = before.clip[back], ends[back], RATES[number]
@@ -278,7 +344,7 @@ class PathSearch:
         return clip, start, rate, cost, back, np.full(len(back), -1)
 
     def _read(self, layers: list[States]) -> EditList:
-        """Follows the cheapest last state back to the first."""
+        """Trace the cheapest last state back to the first, as an edit list."""
         state = int(np.argmin(layers[-1].cost))
         clip, frame = np.empty(len(self.wanted), int), np.empty(len(self.wanted))
         placed: dict[int, PlacedKey] = {}
@@ -299,7 +365,7 @@ class PathSearch:
 
 
 def _steps(edit: EditList, at: np.ndarray) -> np.ndarray:
-    """(K,) library frames that an edit list goes on by at its frames `at` (K,), as played within their pieces."""
+    """Compute the step (K,) in library frames of an edit list at frames `at` (K,), as played within their pieces."""
     starts = np.array([low for low, _ in edit.pieces])
     piece = np.searchsorted(starts, at, side="right") - 1
     low, high = starts[piece], np.append(starts[1:], len(edit))[piece]

@@ -1,12 +1,12 @@
-"""What the search prefers besides the order: clips of a style, the strong foot, players out of step, other footage.
+"""Preferences of the search besides the request: clips of a style, the strong foot, players out of step, other clips.
 
-Players out of step: players whose tracks are alike are given the same clips, and where they begin them at the same time
-they move as one. A clip that is played goes along with the clock: a player that shows its second s at time t of the
-match is s - t ahead of it, and this is the lag. Every player likes lags that are PERIOD apart, and players who come
-near each other are given other ones (`match.crowd.variety.lags`).
+Players out of step: players with similar tracks get the same clips, and where they begin them at the same time they
+move in unison. A clip that is played runs along with the clock: a player that shows its second s at time t of the match
+is s - t ahead of it, and this is the lag. Every player prefers lags that are PERIOD apart, and players who come near
+each other get different ones (`match.crowd.variety.choose_lags`).
 
-Other footage: a search for another solution pays for frames that an earlier one has shown, and a little for other
-frames of the same clips. It is a price, not a ban: where nothing else comes near what is asked, they are shown again.
+Other clips: a search for another solution pays for frames that an earlier one has shown, and a little for other frames
+of the same clips. It is a cost, not a ban: where nothing else comes near the request, they are shown again.
 """
 
 from __future__ import annotations
@@ -24,31 +24,43 @@ from ...library.keys import Key
 from ...library.library import Library
 
 WEAK_FOOT_COST = 1.5
-"""What serving a key moment by the weak foot costs, in metres per second of missed speed."""
+"""Cost of serving a key moment with the weak foot, in metres per second of missed speed."""
 
 _SIDES = frozenset(SIDES)
 
 PERIOD = 3.6
-"""Seconds from one liked lag to the next."""
+"""Seconds from one preferred lag to the next."""
 
 SPREAD = 0.6180339887
-"""Of a period by which a clip's places in it are ahead of those of the clip before: a clip that is shorter than a
-period has room for some lags only, and others have room for the rest. Multiples of the golden section lie evenly."""
+"""Share of a period by which each clip's places in it are ahead of those of the clip before: a clip that is shorter
+than a period has room for some lags only, and others have room for the rest. Multiples of the golden section are spread
+evenly."""
 
 LIKED, DISLIKED = 0.05, 0.45
-"""Seconds from a liked lag within which all is well, and from which on it is as bad as it gets."""
+"""Seconds from a preferred lag up to which there is no cost, and from which on there is the full cost."""
 
 AGAIN = 1.0
-"""Price per slot of the very footage, that of a metre per second of missed speed."""
+"""Cost per slot of the same source frames, that of a metre per second of missed speed."""
 SAME_CLIP = 0.25
-"""Price per slot of other frames of the same clip, or of its mirror image."""
+"""Cost per slot of other frames of the same clip, or of its mirror image."""
 AROUND = 0.25
-"""Seconds around shown footage that count as shown."""
+"""Seconds around shown source frames that count as shown."""
 
 
 def off_style_cost(library: Library, style: Sequence[str], weight: float, warnings: list[str]) -> np.ndarray | None:
-    """(N,) float32: `weight` for library frames that neither carry a word of `style` nor belong to a clip that one of
-    its patterns names; None where there is no style. A pattern that names nothing is told in `warnings`."""
+    """Compute the cost of library frames that are not of a style.
+
+    A frame is of the style if it carries one of its labels, or belongs to a clip that one of its patterns
+    names.
+
+    Args:
+        library: the clips, N frames.
+        style: labels, or patterns of folders and clips.
+        weight: cost per slot.
+        warnings: gets a line for a pattern that matches nothing.
+    Returns:
+        (N,) float32, None where there is no style.
+    """
     if not style or not weight:
         return None
     frames = library.frames
@@ -57,14 +69,17 @@ def off_style_cost(library: Library, style: Sequence[str], weight: float, warnin
         word, clips = entry.lower(), np.array([named_by(clip.path, entry) for clip in library.clips])
         carries = frames.words[:, [i for i, known in enumerate(frames.vocabulary) if known == word]].any(axis=1)
         if not carries.any() and not clips.any():
-            warnings.append(f"style '{entry}': the library has no such word, folder or clip")
+            warnings.append(f"style '{entry}': the library has no such label, folder or clip")
         matches |= carries | clips[frames.clip]
     return np.where(matches, 0.0, weight).astype(np.float32)
 
 
 def named_by(path: str, pattern: str) -> bool:
-    """Whether a clip's path below the library is meant by a pattern: the path itself with * and ?, one of its folders,
-    or its file's name with or without ending; letter case does not count."""
+    """Return whether a pattern names a clip's path below the library.
+
+    It may be the path itself with * and ?, one of its folders, or its file name with or without ending; letter case
+    does not count.
+    """
     path, pattern = path.lower(), pattern.lower().replace("\\", "/").rstrip("/")
     whole = PurePosixPath(path)
     names = (path, whole.name, whole.stem, *map(str, whole.parents), *whole.parts[:-1])
@@ -72,8 +87,17 @@ def named_by(path: str, pattern: str) -> bool:
 
 
 def weak_foot_cost(asked: Iterable[str], choices: Sequence[Key], weak_foot: str) -> np.ndarray:
-    """(K,) what it costs to serve a key moment of the `asked` words by each of the choices: nothing where a side is
-    asked for, where no foot meets the ball, or where nobody minds."""
+    """Compute the cost of serving a key moment with the weak foot.
+
+    Nothing where the request names a side, where no foot meets the ball, or where no foot is preferred.
+
+    Args:
+        requested: requested labels.
+        choices: K key moments of the library.
+        weak_foot: "left", "right" or "".
+    Returns:
+        (K,).
+    """
     if not weak_foot or _SIDES.intersection(asked):
         return np.zeros(len(choices))
     weak = [weak_foot in key.words and may_use_foot(key.words) for key in choices]
@@ -82,21 +106,36 @@ def weak_foot_cost(asked: Iterable[str], choices: Sequence[Key], weak_foot: str)
 
 @dataclass(frozen=True, eq=False)
 class Taste:
-    """place (N,) int: where each library frame lies in the period; table (2 P,) float32: what a lag costs per slot, two
-    periods of P frames; start: frames of the track's first frame on the match's clock."""
+    """A player's preference for a lag.
+
+    Attributes:
+        place: (N,) int, place of each library frame in the period.
+        table: (2 P,) float32, cost of a lag per slot, two periods of P frames.
+        start: frame of the track's first frame on the match's clock.
+    """
 
     place: np.ndarray
     table: np.ndarray
     start: int
 
     def cost(self, first: int, frame: np.ndarray) -> np.ndarray:
-        """(K,) what it costs to show library frames (K,) from the track's frame `first` on."""
+        """Compute the cost (K,) of showing library frames (K,) from the track's frame `first` on."""
+        # place - time modulo the period; the table holds two periods, so the sum of two remainders needs no further
+        # modulo
         return self.table[self.place[frame] + (-first - self.start) % (len(self.table) // 2)]
 
 
 def taste(library: Library, lag: float, variety: float, start: float) -> Taste | None:
-    """The taste of a player who likes this lag, s: 0 to `variety` (m/s of missed speed) per slot; None where that is 0.
-    start: seconds of the track's first frame on the match's clock."""
+    """Build the preference of a player.
+
+    Args:
+        library: the clips.
+        lag: s that the player prefers.
+        variety: m/s of missed speed per slot that it is worth; 0 for no preference.
+        start: s of the track's first frame on the match's clock.
+    Returns:
+        The preference, None without one.
+    """
     if not variety:
         return None
     frames = library.frames
@@ -111,8 +150,14 @@ def taste(library: Library, lag: float, variety: float, start: float) -> Taste |
 
 @dataclass(frozen=True)
 class Used:
-    """A piece of a clip that has been shown. clip: path below the library; first, last: frames of the clip at the
-    library's rate."""
+    """A piece of a clip that has been shown.
+
+    Attributes:
+        clip: path below the library.
+        mirrored: whether its mirror image was shown.
+        first: first frame of the clip, at the library's rate.
+        last: last one.
+    """
 
     clip: str
     mirrored: bool
@@ -121,7 +166,7 @@ class Used:
 
 
 def used_in(library: Library, edit, first: int, end: int) -> tuple[Used, ...]:
-    """The footage that frames first .. end of an `EditList` show."""
+    """List the source frames that frames first .. end of an edit list show."""
     found = []
     for low, high in edit.pieces:
         low, high = max(low, first), min(high, end)
@@ -134,7 +179,7 @@ def used_in(library: Library, edit, first: int, end: int) -> tuple[Used, ...]:
 
 
 def price(library: Library, used: tuple[Used, ...]) -> np.ndarray:
-    """(N,) float32: what every library frame costs more per slot; clips that the library does not have are left out."""
+    """Compute the extra cost (N,) float32 per slot of every library frame; unknown clips are left out."""
     cost = np.zeros(len(library.frames), np.float32)
     frames, around = library.frames, AROUND * library.fps
     place = {(clip.path, clip.mirrored): number for number, clip in enumerate(library.clips)}

@@ -1,9 +1,9 @@
 """The output cut into slots of about eight frames, and the pieces that clips of key moments fill among them.
 
-A key moment's clip is played as long as its own entry and exit ask (Faustino §3.2.2): from the last slot edge before
-the entry to the first one after the exit, at one rate, so that the key frame is on time; where its feet would be
-dragged along there, also without that part (`dragged`). Between two key moments that crowd each other lies an edge half
-way, which neither crosses.
+A key moment's clip is played for its own entry and exit (Faustino 2024, §3.2.2): from the last slot edge before the
+entry to the first one after the exit, at one playback rate, so that the key frame is on time; where its feet would be
+dragged, also without that part (`foot_drag`). Midway between two key moments that are close together lies an edge
+that neither crosses.
 """
 
 from __future__ import annotations
@@ -18,21 +18,29 @@ from .dragged import undragged
 from .offer import SLOT
 from .wanted import Wanted, needed, pool_frame
 
-KEY_RATES = np.array([0.7, 0.85, 1.0, 1.15, 1.3])
-SHORTEST = 6
+KEY_RATES = np.array([0.7, 0.85, 1.0, 1.15, 1.3])  # playback rates at which a key moment's clip may be played
+SHORTEST = 6  # frames of the shortest slot beside an extra edge
 AROUND = 12
-"""Frames before and behind a key frame that its clip is played at least, however short its annotated row: who cuts
-nearer cuts into the swing itself."""
+"""Least frames before and after a key frame that its clip is played, however short its annotated row: a nearer cut
+would be inside the swing itself."""
 
-_CROWDED = 3 * SLOT
-_TRIMMED = 2.5  # frames of an entry or exit that may go, so that a slot more is not bound for them
+_CROWDED = 3 * SLOT  # frames between key moments below which they are close together
+_TRIMMED = 2.5  # frames of an entry or exit that may be cut off, so that they do not bind one more slot
 
 
 @dataclass(frozen=True, eq=False)
 class Pieces:
-    """P ways to serve key moments, every choice at every rate: wanted (P,) number of the key moment; choice (P,) which
-    of its choices; clip (P,); rate (P,); first, end (P,) slots; start (P,) fractional library frame at the first slot's
-    edge."""
+    """P ways to serve key moments, every choice at every playback rate.
+
+    Attributes:
+        number: (P,) number of the key moment.
+        choice: (P,) which of its choices.
+        clip: (P,) clip index.
+        rate: (P,) playback rate.
+        first: (P,) first slot.
+        end: (P,) slot after the last one.
+        start: (P,) fractional library frame at the first slot's edge.
+    """
 
     wanted: np.ndarray
     choice: np.ndarray
@@ -43,19 +51,29 @@ class Pieces:
     start: np.ndarray
 
     def key(self, wanted: Wanted, piece: int) -> Key:
-        """The library's key moment that a piece plays."""
+        """Return the library's key moment that a piece plays."""
         return wanted.keys[self.wanted[piece]].choices[self.choice[piece]]
 
 
 def slot_edges(
     library: Library, wanted: Wanted, first: int = 0, end: int | None = None, on_grid: bool = False
 ) -> np.ndarray:
-    """(S + 1,) output frames from first to end (all of them); slots of about SLOT frames. on_grid: edges lie at
-    multiples of SLOT wherever key moments let them, so that searches of overlapping stretches share them.
+    """Cut the output into slots of about SLOT frames.
 
-    There is an edge half way between key moments that crowd each other, and one before and after each where the
-    shortest of its clips begins and ends, so that a clip which does not fit its surroundings need not be played longer
-    than it must; none of these leaves a slot shorter than SHORTEST beside it."""
+    There is an edge midway between key moments that are close together, and one before and after each where the
+    shortest of its clips begins and ends, so that a clip which does not fit its surroundings is not played longer than
+    it must be; none of these leaves a slot shorter than MIN_SLOT beside it.
+
+    Args:
+        library: the clips.
+        request: the request.
+        first: first output frame.
+        end: frame after the last one; None for all.
+        on_grid: whether edges lie at multiples of SLOT wherever key moments permit, so that searches of overlapping
+            stretches share them.
+    Returns:
+        (S + 1,) output frames.
+    """
     end = len(wanted) if end is None else end
     served = [key for key in wanted.keys if key.choices and first <= round(key.frame) < end]
     at = [key.frame for key in served]
@@ -72,21 +90,25 @@ def slot_edges(
 
 
 def _with_grid(fixed: np.ndarray) -> np.ndarray:
-    """Edges with the first and the last multiple of SLOT between each two that leaves no short slot beside them."""
+    """Add the first and the last multiple of SLOT between each two edges that leaves no short slot beside them."""
     out = [fixed]
     for low, high in zip(fixed, fixed[1:]):
+        # the first multiple rounded up, the last rounded down
         first, last = -(-(low + SHORTEST) // SLOT) * SLOT, (high - SHORTEST) // SLOT * SLOT
         out.append(np.array([first, last] if first <= last else [], int))
     return np.unique(np.concatenate(out))
 
 
 def key_pieces(library: Library, wanted: Wanted, edges: np.ndarray) -> Pieces:
-    """All pieces of all key moments between the first edge and the last that find room; one between two others in the
-    same slot finds none."""
+    """Build all pieces of all key moments between the first edge and the last.
+
+    A key moment between two others in the same slot has no room and gets none.
+    """
     served = [n for n, key in enumerate(wanted.keys) if key.choices and edges[0] <= round(key.frame) < edges[-1]]
     inside = {number: slot_of(edges, wanted.keys[number].frame) for number in served}
     rows: list[tuple] = []
     for before, number, after in zip([None, *served], served, [*served[1:], None]):
+        # slots low .. high are free for this key moment: up to the edges midway to its neighbours
         low = 0 if before is None else _edge_between(edges, wanted, before, number)
         high = len(edges) - 1 if after is None else _edge_between(edges, wanted, number, after)
         if low <= inside[number] < high:
@@ -97,29 +119,35 @@ def key_pieces(library: Library, wanted: Wanted, edges: np.ndarray) -> Pieces:
 
 
 def _pieces_of(library: Library, wanted: Wanted, edges: np.ndarray, number: int, low: int, high: int) -> list[tuple]:
-    """The pieces of one key moment, between the edges numbered low and high."""
+    """Build the pieces of one key moment, between the edges numbered low and high.
+
+    Returns:
+        Rows in the order of the fields of `KeyPieces`.
+    """
     key = wanted.keys[number]
     here = slot_of(edges, key.frame)
     rows = []
     for choice, option in enumerate(key.choices):
         entry, leave = np.maximum(needed(library, option), AROUND)
         for rate in key.rates or KEY_RATES:
+            # the last edge before the entry and the first one after the exit, both a little trimmed
             first = int(np.searchsorted(edges, key.frame - entry / rate + _TRIMMED, side="right")) - 1
             end = int(np.searchsorted(edges, key.frame + leave / rate - _TRIMMED))
             first, end = int(np.clip(first, low, here)), int(np.clip(end, here + 1, high))
             around = AROUND / rate - _TRIMMED
             for a, b in undragged(library, wanted, edges, at=key.frame, key=option, rate=rate, slots=(first, end),
                                   around=around):
+                # so that the key frame is played at exactly key.frame
                 start = pool_frame(library, option) - rate * (key.frame - edges[a])
                 rows.append((number, choice, option.clip, rate, a, b, start))
     return rows
 
 
 def slot_of(edges: np.ndarray, frame: float) -> int:
-    """The slot in which an output frame lies."""
+    """Return the slot in which an output frame lies."""
     return int(np.clip(np.searchsorted(edges, frame, side="right") - 1, 0, len(edges) - 2))
 
 
 def _edge_between(edges: np.ndarray, wanted: Wanted, a: int, b: int) -> int:
-    """The number of the edge nearest to half way between two key moments."""
+    """Return the number of the edge nearest to the middle between two key moments."""
     return int(np.argmin(np.abs(edges - (wanted.keys[a].frame + wanted.keys[b].frame) / 2)))

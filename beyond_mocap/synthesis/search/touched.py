@@ -1,11 +1,11 @@
-"""What an edit touches: where the new order differs from the old one, and what of it has to be searched anew.
+"""Frames that an edit affects: where the new request differs from the old one, and what of it has to be searched again.
 
-Touched is what is asked otherwise: other words, also such that must not be, another speed (by more than 5 cm/s),
-turning (by more than 0.05 rad over a slot) or facing (by more than 0.3 rad), and key moments that moved, changed their
-words, came, went, or whose ball has moved (by more than 15 cm), with the entry and exit of their clips. Around it a
-run-up of a second is searched too, so that the new motion finds into the old one; key moments that stay are gone round
-where they do not lie within. Where only the track or the ball lies elsewhere (by more than a millimetre), what is shown
-stays and is laid out anew.
+Affected are frames with another request: other labels, also avoided ones, another speed (by more than 5 cm/s), turning
+(by more than 0.05 rad over a slot) or facing (by more than 0.3 rad), and key moments that moved, changed their labels,
+were added or removed, or whose ball has moved (by more than 15 cm), with the entry and exit of their clips. A run-up of
+a second around them is searched too, so that the new motion leads into the old one; key moments that stay are avoided
+where they are not inside. Where only the track or the ball has moved (by more than a millimetre), the source frames
+stay and the motion is constructed again.
 """
 
 from __future__ import annotations
@@ -21,16 +21,16 @@ from ...motion import quaternion
 from .edit_list import EditList, PlacedKey
 from .wanted import Wanted, WantedKey, needed
 
-RUN_UP = 1.0
-SHORTEST = 0.8  # s
-SPEED, TURN, FACING, PLACE, BALL = 0.05, 0.05, 0.3, 0.001, 0.15
-NEAR = 6
+RUN_UP = 1.0  # s around affected frames that are searched too
+SHORTEST = 0.8  # s of the shortest stretch that is searched for another solution
+SPEED, TURN, FACING, PLACE, BALL = 0.05, 0.05, 0.3, 0.001, 0.15  # m/s, rad, rad, m, m: smaller changes do not count
+NEAR = 6  # frames to a transition within which a stretch ends at it
 
 Stretch = tuple[int, int]
 
 
 def lies_elsewhere(before: Wanted, after: Wanted) -> np.ndarray:
-    """(T,) bool: frames at which the track, its direction or the ball is not where it was."""
+    """Return (T,) bool: frames at which the track, its direction or the ball has moved."""
     old, new = before.track, after.track
     off = np.linalg.norm(old.positions - new.positions, axis=1) > PLACE
     off |= np.linalg.norm(old.raw - new.raw, axis=1) > PLACE
@@ -40,7 +40,7 @@ def lies_elsewhere(before: Wanted, after: Wanted) -> np.ndarray:
 
 
 def asked_otherwise(before: Wanted, after: Wanted, slot: int) -> np.ndarray:
-    """(T,) bool: frames of which other words, another speed or another turning over `slot` frames is asked."""
+    """Return (T,) bool: frames with other requested labels, speed, turning over `slot` frames, or facing."""
     old, new = before.track, after.track
     words = np.array([a != b for a, b in zip(before.asked, after.asked)])
     if before.avoided != after.avoided:
@@ -53,14 +53,17 @@ def asked_otherwise(before: Wanted, after: Wanted, slot: int) -> np.ndarray:
 
 
 def kept_keys(edit: EditList, before: Wanted, after: Wanted) -> tuple[PlacedKey, ...]:
-    """Placed keys whose key moment is asked as it was, under its number in the new order."""
+    """List placed keys whose key moment is requested as before, under its number in the new request."""
     number = _same_keys(before, after)
     return tuple(PlacedKey(number[key.wanted], key.key) for key in edit.keys if key.wanted in number)
 
 
 def _same_keys(before: Wanted, after: Wanted) -> dict[int, int]:
-    """Number in the old order -> number in the new one of the key moments that are asked as they were; of those asked
-    twice, the first answers to the first."""
+    """Match the key moments that are requested as before; of those requested twice, the first matches the first.
+
+    Returns:
+        Number in the old request -> number in the new one.
+    """
     found: dict[int, int] = {}
     for number, key in enumerate(after.keys):
         at = int(np.clip(round(key.frame), 0, len(after) - 1))
@@ -73,15 +76,24 @@ def _same_keys(before: Wanted, after: Wanted) -> dict[int, int]:
 
 
 def _played_alike(one: WantedKey, other: WantedKey) -> bool:
-    """Whether two key moments are the same but for the second at which they were asked for, where both are at a solved
-    one."""
+    """Return whether two key moments are equal, except for the requested second where both are at a solved touch."""
     if one.asked.solved is not None and one.asked.solved == other.asked.solved:
         other = replace(other, asked=replace(other.asked, time=one.asked.time))
     return one == other
 
 
 def to_search(library: Library, edit: EditList, before: Wanted, after: Wanted, slot: int) -> list[Stretch]:
-    """Stretches (first, end) that have to be searched anew, in the order of time, apart from each other."""
+    """Find the stretches that have to be searched again.
+
+    Args:
+        library: the clips.
+        edit: the old edit list.
+        before: the old request.
+        after: the new request.
+        slot: frames of a slot.
+    Returns:
+        (first, end) of each, in order of time, not overlapping.
+    """
     touched = asked_otherwise(before, after, slot)
     same = _same_keys(before, after)
     for placed in edit.keys:
@@ -97,8 +109,13 @@ def to_search(library: Library, edit: EditList, before: Wanted, after: Wanted, s
 
 
 def asked_anew(library: Library, edit: EditList, after: Wanted, first: int, end: int) -> Stretch:
-    """The stretch (first, end) that has to be searched where just these frames are to be another solution: no shorter
-    than it takes to leave and come back, ending neither within a key moment nor just beside a seam."""
+    """Find the stretch that has to be searched for another solution of some frames.
+
+    It is long enough to leave and come back, and ends neither within a key moment nor just beside a transition.
+
+    Returns:
+        (first, end).
+    """
     missing = max(0, int(round(SHORTEST * library.fps)) - (end - first))
     first, end = max(0, first - missing // 2), min(len(edit), end + missing - missing // 2)
     same = kept_keys(edit, after, after)
@@ -106,13 +123,12 @@ def asked_anew(library: Library, edit: EditList, after: Wanted, first: int, end:
 
 
 def stretches(touched: np.ndarray, gap: int) -> list[Stretch]:
-    """(first, end) of the stretches in which `touched` (T,) is true, those less than `gap` frames apart taken
-    together."""
+    """List (first, end) of the runs in which `affected` (T,) is true, merged where less than `gap` frames apart."""
     return joined(runs(touched), gap)
 
 
 def joined(found: list[Stretch], gap: int) -> list[Stretch]:
-    """Stretches in the order of time, those less than `gap` frames apart taken together."""
+    """Sort stretches by time and merge those less than `gap` frames apart."""
     out: list[Stretch] = []
     for first, end in sorted(found):
         if out and first - out[-1][1] < gap:
@@ -123,22 +139,24 @@ def joined(found: list[Stretch], gap: int) -> list[Stretch]:
 
 
 def _played(library: Library, key: WantedKey, placed: PlacedKey) -> Stretch:
-    """Frames that the clip of a placed key needs."""
+    """Return the frames that the clip of a placed key needs."""
     entry, leave = needed(library, placed.key)
     return max(0, int(np.floor(key.frame - entry))), int(np.ceil(key.frame + leave)) + 1
 
 
 def _asked_for(library: Library, key: WantedKey, count: int) -> Stretch:
-    """Frames that the clips which may serve a key moment need on the average."""
+    """Return the frames that the clips which may serve a key moment need on average."""
     entry, leave = np.mean([needed(library, choice) for choice in key.choices], axis=0)
     return max(0, int(np.floor(key.frame - entry))), min(count, int(np.ceil(key.frame + leave)) + 1)
 
 
 def _widened(core: Stretch, run_up: int, stays: list[Stretch], edit: EditList) -> Stretch:
-    """A stretch with its run-up, which ends neither within a key moment that stays nor just beside a seam."""
+    """Extend a stretch by its run-up; it ends neither within a key moment that stays nor just beside a transition."""
     first, end = max(0, core[0] - run_up), min(len(edit), core[1] + run_up)
+    # end at a transition that is near, since a cut is there already
     first = max((s for s in edit.seams if first - NEAR < s <= first), default=first)
     end = min((s for s in edit.seams if end <= s < end + NEAR), default=end)
+    # include a key moment that overlaps the core, keep out of the others
     for low, high in sorted(stays, reverse=True):
         if low < first < high:
             first = high if high <= core[0] else low
@@ -149,5 +167,6 @@ def _widened(core: Stretch, run_up: int, stays: list[Stretch], edit: EditList) -
 
 
 def _turn(direction: np.ndarray, slot: int) -> np.ndarray:
+    """Compute the change of direction over `slot` frames centred on each frame."""
     padded = np.pad(direction, slot // 2, mode="edge")
     return padded[2 * (slot // 2) :] - padded[: len(direction)]

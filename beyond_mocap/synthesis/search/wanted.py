@@ -1,5 +1,4 @@
-"""The order in frames of the library's rate: what is asked of every frame, and which clips can serve each key
-moment."""
+"""The request at the library's rate: what every frame has to show, and which clips can serve each key moment."""
 
 from __future__ import annotations
 
@@ -28,16 +27,23 @@ from ...motion.track import SampledTrack
 from ..plan import Plan, ResolvedPlan
 from .preferences import Taste, off_style_cost, taste
 
-PAPERS_OMEGA = 4.0
+PAPERS_OMEGA = 4.0  # Faustino 2024, §3.1.1
 
 Words = frozenset[str] | None
 
 
 @dataclass(frozen=True, kw_only=True)
 class WantedKey:
-    """A key moment: what was asked, its frame (fractional, at the library's rate), the clips' key moments that may
-    serve it (empty: locomotion stands in), the words used where the asked ones are lacking, whether the feed measured
-    the ball's height then, and the rates at which its clip may be played (none: `slots.KEY_RATES`)."""
+    """A key moment of a request.
+
+    Attributes:
+        requested: the key moment of the timeline.
+        frame: fractional frame at the library's rate.
+        choices: key moments of clips that may serve it; empty: locomotion is shown instead.
+        used_instead: the labels used where the library lacks the requested ones, else None.
+        is_ball_height_known: whether the feed measured the ball's height then.
+        rates: playback rates of its clip; none: `slots.KEY_PLAYBACK_RATES`.
+    """
 
     asked: KeyMoment
     frame: float
@@ -49,13 +55,23 @@ class WantedKey:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Wanted:
-    """plan: what was asked, with the settings of the costs. track: the player at the library's rate. asked: per frame
-    the wanted words, None where continuity alone counts. avoided: per frame the words that what is shown may not carry;
-    empty where all may be shown throughout. off_style: (N,) float32 cost per slot of library frames without the style
-    that is asked, None where none is. weak_foot: side of the foot that key moments without a side rather leave, or "".
-    taste: at which times this player rather shows which frames, None where that is all the same. gait: per frame index
-    into the library's gaits. timeline: filled. keys: in time order. allowed: (C,) clips to use. warnings: what the
-    library lacks of what is asked."""
+    """A request of T frames at the library's rate.
+
+    Attributes:
+        plan: the plan, with the settings of the costs.
+        track: the player at the library's rate.
+        requested_labels: requested labels per frame, None where continuity alone counts.
+        gait: (T,) index into the library's gaits.
+        timeline: the timeline, filled.
+        keys: the key moments, in order of time.
+        allowed: (C,) bool, clips to use.
+        warnings: what the library lacks of the request.
+        avoided: per frame the labels that must not be shown; empty where all may be shown throughout.
+        style_cost: (N,) float32, cost per slot of library frames without the requested style, None where none is
+            requested.
+        weak_foot: side of the foot that key moments without a side avoid, or "".
+        lag_preference: the player's preference for a lag, None for none.
+    """
 
     plan: Plan
     track: SampledTrack
@@ -74,13 +90,19 @@ class Wanted:
         return len(self.track.times)
 
     def avoided_in(self, first: int, end: int) -> frozenset[str]:
-        """All words that are avoided in any of the frames first .. end."""
+        """Return all labels that are avoided in any of the frames first .. end."""
         return frozenset().union(*self.avoided[max(first, 0) : end])
 
 
 def build_order(library: Library, plan: ResolvedPlan) -> Wanted:
-    """Put a plan into frames. Raises NotInLibrary for a key moment whose words no clip carries (unless asked to go on
-    with the nearest)."""
+    """Convert a plan to frames at the library's rate.
+
+    Args:
+        library: the clips.
+        plan: the resolved plan.
+    Raises:
+        NotInLibrary: for a key moment whose labels no clip carries, unless the plan continues with the nearest.
+    """
     asked_for = plan.asked
     track = plan.sampled(library.fps)
     gaits = library.gaits
@@ -113,8 +135,10 @@ def build_order(library: Library, plan: ResolvedPlan) -> Wanted:
 
 
 def _other_gaits(library: Library, gait: np.ndarray, speed: np.ndarray, avoided: list[frozenset[str]]) -> np.ndarray:
-    """The gaits (T,) with the one nearest to the `speed` (T,) m/s in place of one whose word is avoided, where there is
-    one; near by ratio, since who walks may rather jog than stand."""
+    """Replace gaits (T,) with an avoided label by the gait nearest in speed, if there is one.
+
+    Near by ratio, since a walking player rather jogs than stands still; speed (T,) m/s.
+    """
     out = gait.copy()
     for frame in [frame for frame, avoid in enumerate(avoided) if library.gaits[gait[frame]].word in avoid]:
         others = [n for n, other in enumerate(library.gaits) if other.word not in avoided[frame]]
@@ -126,11 +150,13 @@ def _other_gaits(library: Library, gait: np.ndarray, speed: np.ndarray, avoided:
 
 
 def _key(library, moment: KeyMoment, track, gait, allowed, go_on: bool, warnings: list[str]) -> WantedKey:
+    """Build one key moment: its frame and the clips that may serve it."""
     frame = float(np.clip((moment.in_force - track.times[0]) * library.fps, 0, len(track.times) - 1))
     usable = tuple(key for key in library.keys if allowed[key.clip] and not library.clips[key.clip].made)
     made = tuple(key for key in library.keys if allowed[key.clip] and library.clips[key.clip].made)
     if moment.avoid:
         usable, made = _without(moment, usable, made, warnings)
+    # recordings that carry the labels first, then synthetic clips
     choices = serving(usable, moment.words)
     if choices:
         return WantedKey(asked=moment, frame=frame, choices=(*choices, *standing_in(choices, made, moment.words)),
@@ -140,44 +166,51 @@ def _key(library, moment: KeyMoment, track, gait, allowed, go_on: bool, warnings
     lacks = f"the library has no clip for '{' '.join(moment.words)}'"
     text = f"{line}{told_time(moment.time)} s: {lacks}; nearest: {_listed(offered)}"
     if not go_on:
-        way_out = "add such a clip, or go on with the nearest (--nearest, in Blender Nearest Words)"
-        raise NotInLibrary(f"{text}; ask for one of these, {way_out}", offered)
+        way_out = "add such a clip, or turn on Nearest Labels"
+        raise NotInLibrary(f"{text}; use one of these, {way_out}", offered)
     choices = nearest_serving(usable, moment.words)
     gait_words = library.gaits[int(gait[int(round(frame))])].words
     used = spoken(choices[0].words) if choices else gait_words
-    instead = " ".join(used) if choices else "locomotion goes on there"
+    instead = " ".join(used) if choices else "locomotion continues there"
     warnings.append(TimedLine(f"{text}; used instead: {instead}", (moment.time, moment.time)))
     return WantedKey(asked=moment, frame=frame, choices=(*choices, *standing_in(choices, made, moment.words)),
                      used_instead=used)
 
 
 def _without(moment: KeyMoment, usable: tuple[Key, ...], made: tuple[Key, ...], warnings: list[str]):
-    """Of recorded and made keys those that carry none of the words which the moment avoids; all of them, and a warning,
-    where no recorded one would be left that carries its words."""
+    """Remove recorded and synthetic keys with labels that the moment avoids.
+
+    Where no recorded one with its labels would be left, all stay and a warning is added.
+    """
     kept = tuple(tuple(key for key in keys if not key.words.intersection(moment.avoid)) for keys in (usable, made))
     if serving(usable, moment.words) and not serving(kept[0], moment.words):
         avoided = " ".join(MUST_NOT + word for word in moment.avoid)
         lacks = f"no clip for '{' '.join(moment.words)}' is {avoided}"
-        text = f"{told_time(moment.time)} s: {lacks}: one is shown all the same"
+        text = f"{told_time(moment.time)} s: {lacks}; a clip with an avoided label is used"
         warnings.append(TimedLine(text, (moment.time, moment.time)))
         return usable, made
     return kept
 
 
 def _listed(offered: tuple[str, ...]) -> str:
-    return " | ".join(offered) if offered else "no key moment at all"
+    """Join labels for a message."""
+    return " | ".join(offered) if offered else "the library has no key moments"
 
 
 def _lacking(library: Library, timeline: Timeline) -> list[str]:
-    """One warning per word of a span that no clip carries."""
+    """Report each label of a span that no clip carries."""
     asked = {word for span in timeline.spans for word in span.words} - {TRANSITION}
     lacking = sorted(asked - library.words)
-    return [f"no clip carries the word '{word}': spans that ask for it follow the rest" for word in lacking]
+    return [f"no clip carries the label '{word}': spans with it follow their other labels" for word in lacking]
 
 
 def _with_transitions(asked: list[Words], keys: tuple[WantedKey, ...], library: Library) -> list[Words]:
-    """Around each key moment only continuity counts, for as long as the clips that may serve it need (Faustino §3.2.2,
-    where elements of the annotation vector are zero in transitions); with several clips, the mean of their needs."""
+    """Clear the requested labels around each key moment, for as long as the clips that may serve it need.
+
+    With several clips, the mean of their needs counts.
+
+    Source: Faustino 2024, §3.2.2, where elements of the annotation vector are zero in transitions.
+    """
     asked = list(asked)
     for key in keys:
         if key.choices:
@@ -189,11 +222,15 @@ def _with_transitions(asked: list[Words], keys: tuple[WantedKey, ...], library: 
 
 
 def needed(library: Library, key: Key) -> tuple[float, float]:
-    """Frames at the library's rate that a key's clip needs before and after its key frame."""
+    """Compute how long a key's clip is needed before and after its key frame.
+
+    Returns:
+        Two numbers of frames at the library's rate.
+    """
     rate = library.fps / library.clips[key.clip].motion.fps
     return (key.frame - key.start) * rate, (key.end - key.frame) * rate
 
 
 def pool_frame(library: Library, key: Key) -> float:
-    """A key's place among the library's frames (fractional)."""
+    """Return a key's place among the library's frames (fractional)."""
     return float(library.frames.first[key.clip] + key.frame * library.fps / library.clips[key.clip].motion.fps)

@@ -1,10 +1,10 @@
-"""Why this clip: what each piece of an edit list cost the search that chose it, by name, and what else was near.
+"""Explanation of a search: what each piece of an edit list cost, by term, and which other clips were near.
 
     for reason in explain_choices(library, resolve_plan(take.plan, library), take.edit): print(reason.costs)
 
-The costs are the search's own functions, asked again for what it chose: where every seam lies on one of its slots'
-edges (always, unless the edit list was edited) all parts of all pieces add up to what it paid. Of Faustino's block
-searches the two parts of eq. 13 are told, weighed over the blocks of eight frames as they are shown.
+The costs are the search's own functions, evaluated again for what it chose: where every transition lies on one of its
+slots' edges (always, unless the edit list was edited) the terms of all pieces add up to what it paid. For Faustino's
+block searches the two parts of eq. 13 are given, over the blocks of eight frames as they are shown.
 """
 
 from __future__ import annotations
@@ -26,14 +26,20 @@ from .path_search import MEMORY_SLOTS, PathSearch, States
 from .slots import Pieces, slot_edges
 from .wanted import Wanted, build_order
 
-NEAREST = 3
+NEAREST = 3  # other clips that are listed for each piece
 _SHIFTED = 2.0  # library frames: a key moment's piece is moved by less than this to be on time
 
 
 @dataclass(frozen=True)
 class Other:
-    """What might have been shown instead: path and mirrored of the clip, and what its best slot there would have cost
-    more than the chosen one, in all (a negative one was cheaper just there, and dearer behind)."""
+    """Another clip that might have been shown.
+
+    Attributes:
+        path: of the clip, below the library.
+        mirrored: whether it is its mirror image.
+        extra_cost: what its best slot there would have cost more than the chosen one, in all; a negative one was
+            cheaper there, and more expensive later.
+    """
 
     path: str
     mirrored: bool
@@ -42,10 +48,21 @@ class Other:
 
 @dataclass(frozen=True, kw_only=True)
 class Reason:
-    """One uncut piece. first, end: frames at the library's rate. clip: index in the library. path, mirrored; shown:
-    first and last frame in the clip's own rate; rate: played / recorded speed. costs: part -> what it cost over the
-    piece; seam: the same for the cut that begins it; both in the search's own unit, about a metre per second of missed
-    speed over a slot. others: the nearest other clips for its first slot, the cheapest first."""
+    """Why one uncut piece was chosen. Costs are in the search's unit, about 1 per metre per second of missed speed over
+    a slot.
+
+    Attributes:
+        first: first frame at the library's rate.
+        end: frame after the last one.
+        clip: index in the library.
+        path: of the clip, below the library.
+        mirrored: whether it is its mirror image.
+        clip_range: first and last frame in the clip's own rate.
+        rate: playback rate.
+        costs: term -> cost over the piece.
+        cut_costs: term -> cost of the cut that begins it.
+        others: the nearest other clips for its first slot, the cheapest first.
+    """
 
     first: int
     end: int
@@ -60,7 +77,7 @@ class Reason:
 
     @property
     def cost(self) -> float:
-        """All parts together."""
+        """Sum of all terms."""
         return sum(self.costs.values()) + sum(self.seam.values())
 
 
@@ -69,7 +86,7 @@ def explain_choices(library: Library, plan: ResolvedPlan, edit: EditList) -> lis
 
     Args:
         library: the recordings.
-        plan: what the search was asked for.
+        plan: the resolved plan of the search.
         edit: what it chose, at the library's rate.
     """
     library = search_library(library, plan, edit=edit)
@@ -80,13 +97,23 @@ def explain_choices(library: Library, plan: ResolvedPlan, edit: EditList) -> lis
 
 
 def reasons(library: Library, wanted: Wanted, edit: EditList, weights: Weights, others: int = NEAREST) -> list[Reason]:
-    """Why the path search chose each piece of an edit list. weights: the search's; others: how many other clips."""
+    """Explain why the path search chose each piece of an edit list.
+
+    Args:
+        library: the clips.
+        request: the request.
+        edit: the edit list.
+        weights: the search's.
+        others: how many other clips are listed.
+    """
     search = PathSearch(library, wanted, weights)
     way = _way_of(search, edit)
     slots = [_slot_costs(search, way, slot) for slot in range(len(way.start))]
     found = []
     for first, end in edit.pieces:
         mine = [slot for slot in range(len(way.start)) if first <= way.edges[slot] < end]
+        # the cut into the first slot of a piece is its transition; the others are changes of playback rate within
+        # the piece
         unary, ways = zip(*(slots[slot] for slot in mine))
         seam, *within = ways
         costs = _summed([*unary, *within])
@@ -98,8 +125,10 @@ def reasons(library: Library, wanted: Wanted, edit: EditList, weights: Weights, 
 
 
 def block_reasons(library: Library, wanted: Wanted, edit: EditList, alpha: float) -> list[Reason]:
-    """The same for `blocks` and `distance`: words (alpha times eq. 18) over what is shown, and the change of pose
-    (1 - alpha times eq. 17) at the cut."""
+    """Explain the choices of `blocks` and `distance`.
+
+    Terms: labels (alpha times eq. 18) over what is shown, and the change of pose (1 - alpha times eq. 17) at the cut.
+    """
     annotation, frames = AnnotationCost(library.frames), library.frames
     size = SLOT // 2
     weight = (1.0 - alpha) / (typical_distance(frames) * np.sqrt(size))
@@ -122,8 +151,12 @@ def block_reasons(library: Library, wanted: Wanted, edit: EditList, alpha: float
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class _Way:
-    """What was chosen, slot by slot: edges (S + 1,); clip, start, rate, piece (S,), as `path_search.States` has
-    them."""
+    """The search's choices, slot by slot.
+
+    Attributes:
+        edges: (S + 1,) output frames.
+        clip, start, rate, piece: (S,), as in `path_search.BeamStates`.
+    """
 
     edges: np.ndarray
     clip: np.ndarray
@@ -133,12 +166,13 @@ class _Way:
 
 
 def _way_of(search: PathSearch, edit: EditList) -> _Way:
-    """The states of the slots, cut at seams too, read off an edit list."""
+    """Read the states of the slots, cut at transitions too, off an edit list."""
     edges = np.union1d(slot_edges(search.library, search.wanted), edit.seams)
     frame, piece_at = edit.frame.copy(), np.full(len(edit), -1)
     for placed in edit.keys:
         _put_back(search, edit, placed, frame, piece_at)
     low = edges[:-1]
+    # playback rate of a slot: step of its first two frames, 1 where it has only one
     later = np.minimum(low + 1, edges[1:] - 1)
     one = frame[later] - frame[low]
     alone = later == low
@@ -147,8 +181,10 @@ def _way_of(search: PathSearch, edit: EditList) -> _Way:
 
 
 def _put_back(search: PathSearch, edit: EditList, placed, frame: np.ndarray, piece_at: np.ndarray) -> None:
-    """Write into frame (T,) where the search had the uncut piece that serves a key moment, before it was shifted by a
-    part of a frame to be on time, and into piece_at (T,) the number of the search's piece that serves it."""
+    """Restore where the search had a key moment's piece, before it was shifted by a part of a frame to be on time.
+
+    Written into frame (T,), the library frames, and into piece_at (T,), the number of the search's piece.
+    """
     pieces, wanted = search.pieces, search.wanted
     at = int(np.clip(round(wanted.keys[placed.wanted].frame), 0, len(edit) - 1))
     rows = [row for row in np.flatnonzero(pieces.wanted == placed.wanted) if pieces.key(wanted, row) == placed.key]
@@ -164,7 +200,9 @@ def _put_back(search: PathSearch, edit: EditList, placed, frame: np.ndarray, pie
 
 
 def _off(search: PathSearch, edit: EditList, pieces: Pieces, row: int) -> float | None:
-    """Library frames by which a list's key moment lies behind a piece of the search; None where that is not shown."""
+    """Measure by how many library frames a key moment lies behind a piece of the search; None where that is not
+    shown.
+    """
     first, last = search.edges[pieces.first[row]], search.edges[pieces.end[row]] - 1
     ideal = pieces.start[row] + pieces.rate[row] * (last - first)
     off = edit.frame[first] - pieces.start[row], edit.frame[last] - ideal
@@ -173,30 +211,35 @@ def _off(search: PathSearch, edit: EditList, pieces: Pieces, row: int) -> float 
 
 
 def _slot_costs(search: PathSearch, way: _Way, slot: int) -> tuple[dict[str, float], dict[str, float]]:
-    """What a slot cost, and the way into it."""
+    """Compute the costs of a slot, and of the transition into it."""
     return _unary(search, way, slot), _entry(search, way, slot) if slot else {}
 
 
 def _unary(search: PathSearch, way: _Way, slot: int) -> dict[str, float]:
+    """Compute the costs of what a slot shows, by term."""
     low, high = way.edges[slot : slot + 2]
     clip, start, rate, piece = (values[slot : slot + 1] for values in (way.clip, way.start, way.rate, way.piece))
     if piece[0] < 0:
         number = np.abs(RATES - rate[:, None]).argmin(axis=1)
         return _named(search.costs.misfit_terms(low, high, number, search.costs.inside(start)))
     costs = _named(search.costs.key_terms(low, high, clip, start, rate))
+    # how well a clip fits the ball is paid once, where its piece begins
     begins = slot == 0 or way.piece[slot - 1] != piece[0]
     return {**costs, "strike": float(search.choice_cost[piece[0]])} if begins else costs
 
 
 def _entry(search: PathSearch, way: _Way, slot: int) -> dict[str, float]:
-    """What it cost to come from the slot before: nothing within a key moment's piece, a change of rate where the clip
-    goes on, else a cut."""
+    """Compute the costs of the transition from the slot before.
+
+    Nothing within a key moment's piece, a change of playback rate where the clip continues, else a cut.
+    """
     if way.piece[slot] >= 0 and way.piece[slot] == way.piece[slot - 1]:
         return {}
     before, ends = _state_before(search, way, slot)
     here = way.clip[slot : slot + 1], way.start[slot : slot + 1], way.rate[slot : slot + 1]
     change = search.weights.rate_change * abs(float(way.rate[slot] - way.rate[slot - 1]))
     to = Offered(*here, np.zeros(1), np.array([-1]))
+    # what remains of the search's own cost after the named terms is the replay
     whole = float(search.ways(before, np.zeros(1, int), ends).every(to)[0, 0])
     if whole <= change + 1e-5:
         return {"rate_change": change}
@@ -205,7 +248,7 @@ def _entry(search: PathSearch, way: _Way, slot: int) -> dict[str, float]:
 
 
 def _state_before(search: PathSearch, way: _Way, slot: int) -> tuple[States, np.ndarray]:
-    """The state of the slot before with no cost so far, and the library frame (1,) at which it ends."""
+    """Build the state of the slot before, with no cost so far, and the library frame (1,) at its end."""
     starts = way.start[max(slot - MEMORY_SLOTS, 0) : slot]
     recent = np.full(MEMORY_SLOTS, -1)
     recent[MEMORY_SLOTS - len(starts) :] = search.offer.bucket[search.costs.inside(starts)]
@@ -216,8 +259,10 @@ def _state_before(search: PathSearch, way: _Way, slot: int) -> tuple[States, np.
 
 
 def _others(search: PathSearch, way: _Way, slot: int, paid: float, count: int) -> Iterator[Other]:
-    """The cheapest clips but the chosen one that the search was offered for a slot, each by its best frame; where a key
-    moment's piece begins, those that serve it too."""
+    """Generate the cheapest other clips among the search's candidates for a slot, each by its best frame.
+
+    Where a key moment's piece begins, these are the clips that serve it too.
+    """
     edge = int(np.searchsorted(search.edges, way.edges[slot]))
     if search.edges[min(edge, len(search.edges) - 1)] != way.edges[slot]:
         return
@@ -226,6 +271,7 @@ def _others(search: PathSearch, way: _Way, slot: int, paid: float, count: int) -
     if slot:
         before, ends = _state_before(search, way, slot)
         cost = search.ways(before, np.zeros(1, int), ends).every(to)[0]
+    # serves[-1] is -1: free candidates compare only with free ones
     serves = np.append(search.pieces.wanted, -1)
     cost = np.where(serves[to.piece] == serves[way.piece[slot]], cost, np.inf)
     names = [(clip.path, clip.mirrored) for clip in search.library.clips]
@@ -240,6 +286,7 @@ def _others(search: PathSearch, way: _Way, slot: int, paid: float, count: int) -
 
 
 def _reason(library: Library, edit: EditList, first: int, end: int, costs, seam, others=()) -> Reason:
+    """Build the reason of one piece."""
     clip = library.clips[int(edit.clip[first])]
     own = clip.motion.fps / library.fps
     shown = (edit.frame[[first, end - 1]] - library.frames.first[edit.clip[first]]) * own
@@ -251,12 +298,12 @@ def _reason(library: Library, edit: EditList, first: int, end: int, costs, seam,
 
 
 def _named(terms: Iterator[Term]) -> dict[str, float]:
-    """The parts of one thing's cost."""
+    """Convert terms to costs by name."""
     return {name: float(np.ravel(values)[0]) for name, values in terms}
 
 
 def _summed(parts: list[dict[str, float]]) -> dict[str, float]:
-    """Costs of the same name added, the dearest first; those of nothing left out."""
+    """Add costs of the same name, the highest first; those near zero are left out."""
     total: dict[str, float] = {}
     for costs in parts:
         for name, value in costs.items():

@@ -49,7 +49,7 @@ def test_the_sample_s_touches_are_found_and_become_key_moments(match, lanes):
         kicks = [moment.key.time for moment in moments if moment.key.words[0] == "kick"]
         assert kicks == pytest.approx(KICKS[player.name], abs=0.05)
     before = state()
-    assert "none is ticked" in refused(bpy.ops.beyond_mocap.accept_touches)
+    assert "none selected with labels" in refused(bpy.ops.beyond_mocap.accept_touches)
     assert state() == before
 
 

@@ -122,5 +122,5 @@ def test_missing_things_are_named(core, rooms, body):
         rooms["core.action"].read(body, bpy.context.scene, bpy.data.actions.new("Empty"))
     with rooms["rigs.armature"]._editing(bpy.context, body):
         body.data.edit_bones.remove(body.data.edit_bones["Neck"])
-    with pytest.raises(error, match="no bone Neck"):
+    with pytest.raises(error, match="bones missing: Neck"):
         rooms["core.action"].write(body, made.motion(core), bpy.context.scene)

@@ -141,7 +141,8 @@ def test_changed_meanwhile_is_made_again(hand, ready, session):  # noqa: F811
     hand.run(button, until=lambda: button.job is not None)
     ready.alpha = 0.4
     assert hand.run(button) == {"FINISHED"}
-    assert [round(order.plan.alpha, 3) for order in hand.made] == [0.2, 0.4] and "made again" in " ".join(hand.told)
+    assert [round(order.plan.alpha, 3) for order in hand.made] == [0.2, 0.4]
+    assert "generated again" in " ".join(hand.told)
     assert session.made(ready.players[0].take).plan.alpha == pytest.approx(0.4)
 
 
@@ -165,7 +166,7 @@ def test_renamed_removed_and_deleted(hand, ready):  # noqa: F811
     ready.players[0].name = "Anna"
     ready.players.remove(1)
     assert hand.run(button) in ({"FINISHED"}, {"CANCELLED"})
-    assert states() == ["PREVIEW"] and "left out" in " ".join(hand.told)
+    assert states() == ["PREVIEW"] and "skipped" in " ".join(hand.told)
     button = hand.press()
     hand.run(button, until=lambda: button.job is not None)
     bpy.data.objects.remove(ready.players[0].body)
@@ -175,14 +176,14 @@ def test_renamed_removed_and_deleted(hand, ready):  # noqa: F811
     hand.run(button, until=lambda: button.job is not None)
     ready.players.remove(0)
     assert hand.run(button) == {"CANCELLED"}
-    assert "its take is dropped" in " ".join(hand.told)
+    assert "the take is discarded" in " ".join(hand.told)
 
 
 def test_a_hand_in_the_middle_of_something_is_waited_for(hand, ready):  # noqa: F811
     ready.players[1].use = False
     button = hand.press()
     hand.context.window_manager.holding = ["TRANSFORM_OT_translate"]
-    hand.run(button, until=lambda: "waits for your hand" in hand.context.window_manager.beyond_mocap_work.text)
+    hand.run(button, until=lambda: "Finish the transform" in hand.context.window_manager.beyond_mocap_work.text)
     assert states()[0] == "NONE"
     hand.context.window_manager.holding = []
     assert hand.run(button) == {"FINISHED"} and states()[0] == "PREVIEW"

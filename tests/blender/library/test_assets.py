@@ -58,7 +58,7 @@ def test_as_a_file_of_their_own(assets, library, tmp_path):
     target = tmp_path / "clips.blend"
     assert bpy.ops.beyond_mocap.make_assets(which="SHOWN", apart=True, filepath=str(target)) == {"FINISHED"}
     assert state() == before and (tmp_path / assets.CATALOGS).is_file()
-    with pytest.raises(RuntimeError, match="is there already"):
+    with pytest.raises(RuntimeError, match="already exists"):
         bpy.ops.beyond_mocap.make_assets(which="SHOWN", apart=True, filepath=str(target))
     with bpy.data.libraries.load(str(target), assets_only=True) as (there, here):
         assert sorted(there.actions) == ["jogging_2_9", "kick_low_top"]

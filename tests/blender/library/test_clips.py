@@ -123,7 +123,7 @@ def test_nothing_given_and_nothing_selected():
     for operator, message in ((bpy.ops.beyond_mocap.import_clips, "no file given"),
                               (bpy.ops.beyond_mocap.mirror, "Select an armature"),
                               (bpy.ops.beyond_mocap.export_bvh, "Select an armature"),
-                              (bpy.ops.beyond_mocap.remove_player, "list of players is empty")):
+                              (bpy.ops.beyond_mocap.remove_player, "No players in the list")):
         with pytest.raises(RuntimeError, match=message):
             operator()
     assert state() == before

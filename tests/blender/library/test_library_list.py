@@ -43,7 +43,7 @@ def test_a_folder_is_listed_without_being_built(listed):
     assert shown(listed) == ["kicks/low.bvh", "other.bvh", "walk.bvh"]
     low, other, walk = listed.shown
     assert low.name == "low" and low.words.split()[0] == "kick" and set(low.words.split()) == {"kick", "right", "low"}
-    assert "1 moment" in low.figures and low.figures.startswith("2.0 s") and walk.seconds == pytest.approx(3.0)
+    assert "1 key moment" in low.figures and low.figures.startswith("2.0 s") and walk.seconds == pytest.approx(3.0)
     assert other.words == "" and [clip.mark for clip in listed.shown] == [3, 3, 3]
 
 
@@ -72,7 +72,7 @@ def test_a_build_lists_speeds_and_quality(listed):
     bpy.ops.beyond_mocap.build_library()
     low, other, walk = listed.shown
     assert "m/s" in walk.figures and walk.mark in (0, 1, 2) and "feet slide: " in walk.told
-    assert "no words: not used" in other.told.splitlines() and "no words" not in walk.told
+    assert "no labels: not used" in other.told.splitlines() and "no labels" not in walk.told
 
 
 def test_a_library_without_words_is_listed_all_the_same(listed, folder):
@@ -111,7 +111,7 @@ def test_clips_that_cannot_be_read_change_nothing(listed, folder):
 
 
 def test_without_a_folder_or_clips(tmp_path):
-    with pytest.raises(RuntimeError, match="No clip is listed"):
+    with pytest.raises(RuntimeError, match="No clips listed"):
         bpy.ops.beyond_mocap.import_clip()
     for operator in (bpy.ops.beyond_mocap.list_clips, bpy.ops.beyond_mocap.build_library):
         with pytest.raises(RuntimeError, match="Choose the library's folder"):
@@ -142,7 +142,7 @@ def test_news_tell_what_is_new_changed_and_gone(folder, rooms, core):
         core("files.bvh.bvh").write(folder / f"{name}.bvh", made.motion(core, 20))
     (folder / "walk.txt").write_text("0 2.5 walking front\n")
     (folder / "kicks/low.bvh").unlink()
-    assert news(before, look(str(folder))) == "3 new clips, 1 gone clip, 1 changed words file"
+    assert news(before, look(str(folder))) == "3 new clips, 1 removed clip, 1 changed label file"
     assert look(str(folder / "nowhere")) is None
 
 
@@ -177,11 +177,11 @@ def test_a_project_that_was_moved_finds_its_library(listed, folder, tmp_path):
 def test_a_library_that_is_nowhere_near_is_chosen_anew(listed, folder, tmp_path):
     settings = bpy.context.scene.beyond_mocap
     shutil.move(folder, tmp_path / "clips")
-    with pytest.raises(RuntimeError, match="no such folder, nor one like it"):
+    with pytest.raises(RuntimeError, match="no such folder, and no similar one"):
         bpy.ops.beyond_mocap.relink_library()
     (tmp_path / "empty").mkdir()
     (tmp_path / "empty" / "notes.txt").write_text("no clip")
-    with pytest.raises(RuntimeError, match="no recordings below it"):
+    with pytest.raises(RuntimeError, match="no recordings in the folder"):
         bpy.ops.beyond_mocap.relink_library(directory=str(tmp_path / "empty"))
     assert settings.library_folder == str(folder)
     assert_one_step(bpy.ops.beyond_mocap.relink_library, directory=str(tmp_path / "clips"))

@@ -65,7 +65,7 @@ def test_a_match_is_read_into_the_list(place):
     rows = [(player.name, player.number, player.team, player.use) for player in match.players]
     assert rows[0] == ("Ada Keeper", 1, "home", True) and rows[-1] == ("Ivo Fresh", 14, "away", True)
     assert len(rows) == 9 and (match.start, match.end) == (0.0, 24.0)
-    assert "away_9: there for 9 s (0.0-9.0 s)" in match.report
+    assert "away_9: present for 9 s (0.0-9.0 s)" in match.report
     assert match.read_of.endswith("small.dat")
 
 
@@ -217,7 +217,7 @@ def test_what_was_chosen_before_the_first_reading_stays(place):
 def test_ticks_of_another_file_are_not_asked_for(place):
     match = a_match(place, place / "nowhere")
     match.players[0].use, match.tracking_file = False, str(TRACKING.with_name("small_Home.csv"))
-    with pytest.raises(RuntimeError, match="the list is that of small.dat.*press Read Match"):
+    with pytest.raises(RuntimeError, match="the list belongs to small.dat.*press Read Match"):
         bpy.ops.beyond_mocap.make_match()
 
 
@@ -246,7 +246,7 @@ def test_a_damaged_state_is_told(place, made, tmp_path, missing):
     (tmp_path / "match.json").write_text(json.dumps(state))
     match = a_match(place, tmp_path)
     match.start, match.end = 2.0, 8.0
-    with pytest.raises(RuntimeError, match="match.json: no times, no pitch") as caught:
+    with pytest.raises(RuntimeError, match="match.json: times, pitch or a player") as caught:
         bpy.ops.beyond_mocap.show_match()
     assert "Traceback" not in str(caught.value)
 
@@ -288,7 +288,7 @@ def test_a_saved_file_shows_it_without_its_folder(place, made, tmp_path):
 
 
 @pytest.mark.parametrize("trouble, told", [
-    ("plain", "one player's track"), ("nobody", "nobody is ticked"), ("time", "a time within"),
+    ("plain", "one player's track"), ("nobody", "no players selected"), ("time", "a time within"),
     ("folder", "no such file"), ("gone", "[Nn]o such file"),
 ])  # fmt: skip
 def test_trouble_is_one_line_and_nothing_changes(place, made, tmp_path, trouble, told):

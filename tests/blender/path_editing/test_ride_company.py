@@ -135,7 +135,7 @@ def test_verbs_that_write_a_motion_ask_to_keep_or_leave_first(part):
     body = walker()
     ride(body, part)
     choose(body)
-    refused(bpy.ops.beyond_mocap.mirror, "press Keep or Leave")
+    refused(bpy.ops.beyond_mocap.mirror, "press Apply or Revert")
     assert body.beyond_mocap_ride.on and body.animation_data.action.get("beyond_mocap_ride")
 
 

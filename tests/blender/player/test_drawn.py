@@ -78,9 +78,9 @@ def test_set_speed_sets_the_chosen_points_in_one_step(scene, drawn):
 def test_what_cannot_be_gone_along_is_told(scene, drawn, core):
     trouble = core("base.errors").InputError
     for points, speeds, change, part in (
-        (LINE[:1], None, None, "no line"),
+        (LINE[:1], None, None, "fewer than two points"),
         ([(0, 0, 0), (0.1, 0, 0)], None, None, "0.10 m long"),
-        (LINE, [0.0, 0.0, 1.0], None, "speed 0 at points 1 and 2"),
+        (LINE, [0.0, 0.0, 1.0], None, "speed 0 at both points 1 and 2"),
         (LINE, [1.0, 13.0, 1.0], None, "13.0 m/s"),
         (LINE, None, "use_cyclic_u", "a closed curve"),
     ):
@@ -147,7 +147,7 @@ def test_what_has_to_be_played_is_left_alone_where_the_scene_must_stand_still(sc
     seen = []
     bpy.app.handlers.frame_change_post.append(lambda *_: seen.append(1))
     try:
-        with pytest.raises(core("base.errors").InputError, match="press Update, which plays it"):
+        with pytest.raises(core("base.errors").InputError, match="press Update to play it"):
             drawn.read(scene, chosen, still=True)
         assert not seen
         played = drawn.read(scene, chosen)
@@ -214,7 +214,7 @@ def test_pins_are_made_listed_and_taken_away_in_one_step_each(extension, scene, 
     pin, = plans.plan_of(scene.beyond_mocap, player)[0].pins
     assert pin == core("synthesis.plan").Pin(2.0, "left_hand", (3, 1, 1.4), 0.5)
     assert bpy.context.object == player.pins[0].target
-    with pytest.raises(RuntimeError, match="one place at a time"):
+    with pytest.raises(RuntimeError, match="one position at a time"):
         bpy.ops.beyond_mocap.add_pin(part="left_hand", at="CURSOR")
     with pytest.raises(RuntimeError, match="no body"):
         bpy.ops.beyond_mocap.add_pin(part="gaze", at="BODY")

@@ -338,7 +338,7 @@ def test_work_on_a_bake_is_kept_when_it_is_baked_again(rooms, body):
     press(bpy.ops.beyond_mocap.reduce_keys)
     actions = len(bpy.data.actions)
     press(bpy.ops.beyond_mocap.bake_to_rig)
-    assert len(bpy.data.actions) == actions and "by hand" not in settings.told
+    assert len(bpy.data.actions) == actions and "edited keys" not in settings.told
     own = rig.animation_data.action
     curve = next(iter(rooms["core.channels"].curves(own, rig.animation_data.action_slot).values()))
     curve.keyframe_points[7].co.y += 0.1
@@ -433,7 +433,7 @@ def test_maps_are_kept_by_skeleton_and_written_to_files(rooms, tmp_path):
     settings.bones["left toe"].bone = ""
     press(bpy.ops.beyond_mocap.keep_bone_map)
     settings.target = rigs.mixamo()  # another armature with the same bones
-    assert "left toe" not in rooms["rigs.rig"].table_of(settings) and "kept" in settings.told
+    assert "left toe" not in rooms["rigs.rig"].table_of(settings) and "stored" in settings.told
     assert rooms["rigs.bone_maps"].kept(rigs.unreal()) is None
     bpy.ops.beyond_mocap.save_bone_map("EXEC_DEFAULT", filepath=str(tmp_path / "map.json"))
     press(bpy.ops.beyond_mocap.map_bones)
@@ -478,14 +478,14 @@ def test_wrong_choices_are_told_in_one_line(rooms, body, tmp_path):
     rig.scale = (0.01,) * 3
     load, save = bpy.ops.beyond_mocap.load_bone_map, bpy.ops.beyond_mocap.save_bone_map
     assert "cannot be read" in complaint(load, filepath=str(tmp_path / "none.json"))
-    for text, said in (("{", "not JSON"), ("[]", "no object"), ('{"bones": {"tail": "x"}}', "no part 'tail'"),
+    for text, said in (("{", "not JSON"), ("[]", "no object"), ('{"bones": {"tail": "x"}}', "unknown part 'tail'"),
                        (json.dumps({"bones": {"hips": "mixamorig:Hips"}}), "no bone for left upper_leg")):
         (tmp_path / "map.json").write_text(text)
         assert said in complaint(load, filepath=str(tmp_path / "map.json"))
     assert complaint(save, filepath=str(tmp_path / "nowhere" / "map.json"))
     bpy.ops.object.select_all(action="DESELECT")
     assert "selected" in complaint(bake_to_rig, targets="SELECTED")
-    assert "no ticked player" in complaint(bake_to_rig, targets="PLAYERS")
+    assert "no selected player" in complaint(bake_to_rig, targets="PLAYERS")
 
 
 def test_a_rig_without_legs_is_told(body):

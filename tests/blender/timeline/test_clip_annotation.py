@@ -60,7 +60,7 @@ def test_words_are_proposed_saved_and_used_by_the_library(core, rooms, library):
     listing = bpy.context.window_manager.beyond_mocap_clips
     assert next(clip for clip in listing.shown if clip.name == "kick_low_top").words.startswith("kick right")
     bpy.ops.beyond_mocap.build_library()
-    assert "kick: 1 moment" in bpy.context.scene.beyond_mocap.library_holds
+    assert "Kick: 1 moment" in bpy.context.scene.beyond_mocap.library_holds
 
 
 def test_a_strip_that_is_moved_says_so_when_saved(core, rooms, library):
@@ -81,7 +81,7 @@ def test_words_that_are_there_stay_until_told(library):
     bpy.ops.beyond_mocap.annotate_clip(path="jogging_2_9.bvh")
     bpy.ops.beyond_mocap.propose_words()
     before = (library / "jogging_2_9.txt").read_text()
-    with pytest.raises(RuntimeError, match="has other words for this clip already"):
+    with pytest.raises(RuntimeError, match="already has other labels for this clip"):
         bpy.ops.beyond_mocap.save_words()
     assert (library / "jogging_2_9.txt").read_text() == before
     bpy.ops.beyond_mocap.save_words(overwrite=True)
@@ -111,9 +111,9 @@ def test_what_hangs_on_a_clip_stays_when_it_goes(library):
 def test_proposals_beside_what_is_there(rooms, library):
     bpy.ops.beyond_mocap.annotate_clip(path="kick_low_top.bvh")
     bpy.ops.beyond_mocap.propose_words(least=0.99)
-    with pytest.raises(Exception, match="say nothing"):
+    with pytest.raises(Exception, match="no labels in the strips"):
         rooms["library.recordings"].read_words(bpy.context.object)
-    with pytest.raises(RuntimeError, match="say nothing"):
+    with pytest.raises(RuntimeError, match="no labels in the strips"):
         bpy.ops.beyond_mocap.save_words()
     bpy.ops.beyond_mocap.propose_words()
     count = len(rooms["library.recordings"].read_words(bpy.context.object))
@@ -127,7 +127,7 @@ def test_nothing_chosen_or_something_else():
                      bpy.ops.beyond_mocap.remove_clip):
         with pytest.raises(RuntimeError, match="clip"):
             operator()
-    with pytest.raises(RuntimeError, match="No clip is listed"):
+    with pytest.raises(RuntimeError, match="No clips listed"):
         bpy.ops.beyond_mocap.annotate_clip()
 
 

@@ -144,7 +144,7 @@ def test_what_cannot_be_done_is_told(library, listed):
         bpy.ops.beyond_mocap.review_proposals()
     for name in TAUGHT:
         (library / f"{name}.txt").unlink()
-    with pytest.raises(RuntimeError, match="no clip with words"):
+    with pytest.raises(RuntimeError, match="no clip with labels"):
         bpy.ops.beyond_mocap.learn_words()
 
 

@@ -153,9 +153,9 @@ def test_any_line_of_plausible_tokens_is_read_or_refused(tokens):
     [
         ("0 5 walking\nfive 6 kick", "a.txt:2", "'five' is not a time"),
         ("5 3 walking", "a.txt:1", "not after the start"),
-        ("4 4 walking", "a.txt:1", "for a key moment write one time"),
+        ("4 4 walking", "a.txt:1", "write one time for a key moment"),
         ("1 2 3 walking", "a.txt:1", "three numbers"),
-        ("7", "a.txt:1", "one time and no words"),
+        ("7", "a.txt:1", "one time and no labels"),
         ("unit metres", "a.txt:1", "'unit seconds' or 'unit frames'"),
         ("1e300 kick", "a.txt:1", "the time 1e300"),
         ("0 1 kikc", "a.txt:1", "kick"),
@@ -163,15 +163,15 @@ def test_any_line_of_plausible_tokens_is_read_or_refused(tokens):
         ("99 kick low", "a.txt:1", "from 0 s to 20 s"),
         ("-1 2 walking", "a.txt:1", "outside the track"),
         ("0 3 walking\n2 4 running", "a.txt:2", "'0 3 walking' (line 1)"),
-        ("2 kick\n2 jump", "a.txt:2", "at one time"),
+        ("2 kick\n2 jump", "a.txt:2", "at the same time"),
         ("2 transition", "a.txt:1", "write it alone"),
         ("2 3 transition kick", "a.txt:1", "write it alone"),
         ("2 3 -transition", "a.txt:1", "'-transition'"),
         ("2 3 walking -walkin", "a.txt:1", "like walking"),
-        ("0 3 walking -walking", "a.txt:1", "'walking' is asked for and avoided"),
-        ("5 -kick", "a.txt:1", "one time and no words"),
-        ("2 3 walking -", "a.txt:1", "'' as a word"),
-        ("2 3 walking --kick", "a.txt:1", "'-kick' as a word"),
+        ("0 3 walking -walking", "a.txt:1", "'walking' is both requested and avoided"),
+        ("5 -kick", "a.txt:1", "one time and no labels"),
+        ("2 3 walking -", "a.txt:1", "'' is not a label"),
+        ("2 3 walking --kick", "a.txt:1", "'-kick' is not a label"),
     ],
 )
 def test_every_mistake_gets_its_line_and_a_way_out(text, where, part):
@@ -180,7 +180,7 @@ def test_every_mistake_gets_its_line_and_a_way_out(text, where, part):
 
 
 def test_frames_without_a_rate_are_refused():
-    with pytest.raises(InputError, match="no frame rate"):
+    with pytest.raises(InputError, match="frame rate is unknown"):
         parse_timeline("30f kick")
 
 
@@ -369,7 +369,7 @@ def test_the_table_is_read_by_its_columns(tmp_path):
         (HEADER + "a.bvh,30,9,1,,walking\n", ":2: end_frame 1 before"),
         (HEADER + "a.bvh,30,0,9,12,kick\n", ":2: key_frame 12 outside"),
         (HEADER + "a.bvh,30,0,9,12.5,kick\n", ":2: key_frame '12.5'"),
-        (HEADER + ",30,0,9,,kick\n", ":2: no file"),
+        (HEADER + ",30,0,9,,kick\n", ":2: the file is blank"),
         (HEADER + "a.bvh,30\n", ""),
     ],
 )

@@ -56,7 +56,7 @@ def test_the_table_is_the_tree_of_the_appendix():
 
 def test_labels_say_what_they_do_with_the_ball():
     assert find_label("receive").ball == "takes" and find_label("receive").part == "foot"
-    assert find_label("catchb").both_hands and find_label("catchb").title == "catch ball"
+    assert find_label("catchb").both_hands and find_label("catchb").title == "Catch, Two Hands"
     assert find_label("moonwalk").ball == find_label("moonwalk").part == ""
     assert list_labels(ball="carries") == ("dribble",)
     assert list_gaits() == ("standing", "walking", "jogging", "running", "sprinting")
@@ -64,8 +64,8 @@ def test_labels_say_what_they_do_with_the_ball():
 
 @pytest.mark.parametrize(
     "row, found",
-    [("kick,kick,discrete,,,,,,,,,", "again"), (SIDE_POKE.replace("sends", "shoots"), "ball 'shoots'"),
-     ("side_poke,side poke", "other cells")]
+    [("kick,kick,discrete,,,,,,,,,", "is repeated"), (SIDE_POKE.replace("sends", "shoots"), "ball 'shoots'"),
+     ("side_poke,side poke", "wrong columns")]
 )  # fmt: skip
 def test_a_wrong_row_is_reported_with_its_line(row, found, tmp_path, monkeypatch):
     table = tmp_path / "vocabulary.csv"

@@ -245,7 +245,7 @@ def test_a_wrong_command_line_is_status_2(run, arguments):
         ({"omega": "0.5"}, ["omega", "0.5", "1 or more"]),
         ({"seam-window": "wide"}, ["--seam-window", "wide"]),
         ({"track-window": "-1"}, ["--track-window", "-1"]),
-        ({"gait": "walking"}, ["--gait", "WORD=CLIP"]),
+        ({"gait": "walking"}, ["gait", "WORD=CLIP"]),
         ({"gait": "walking=missing.bvh"}, ["--gait", "missing.bvh"]),
         ({"seed": "x"}, ["--seed"]),
         ({"method": "magic"}, ["magic", "path"]),
@@ -370,7 +370,7 @@ def test_libraries_that_are_none(run, synthesize, match, clip_file, tmp_path):
 
 
 def test_what_the_library_lacks_is_status_3_and_the_nearest_0(synthesize, match, tmp_path):
-    assert_told(synthesize(annotations=match / "header.txt"), 3, "header", "kick", "--nearest")
+    assert_told(synthesize(annotations=match / "header.txt"), 3, "header", "kick", "Nearest Labels")
     assert files_in(tmp_path) == {}
     status, _, error = synthesize("--nearest", annotations=match / "header.txt", report=tmp_path / "r.json")
     assert status == 0 and any("used instead" in line for line in error)
@@ -525,7 +525,7 @@ def test_real_recordings(run, tmp_path_factory, scenario):
     written = ("--out", folder / "out.bvh", "--report", folder / "r.json")
     common = ("synthesize", *library, "--track", track, "--annotations", words, *written)
     asked = read_timeline(words, 30.0).keys
-    assert_told(run(*common), 3, "--nearest")
+    assert_told(run(*common), 3, "Nearest Labels")
     assert files_in(folder) == {}
     for method in ("path", "distance", "blocks"):
         status, _, error = run(*common, "--nearest", "--method", method)
@@ -549,7 +549,7 @@ def test_pins_height_foot_and_style_are_a_players_own(synthesize, tmp_path):
     status, _, error = synthesize(
         "--strong-foot", "left", "--style", "kick*", report=tmp_path / "r.json", pins=tmp_path / "pins.csv", height=2.0
     )
-    assert status == 0 and any("99 s: the pin of left_hand lies outside" in line for line in error)
+    assert status == 0 and any("99 s: the pin of left_hand is outside" in line for line in error)
     report = json.loads((tmp_path / "r.json").read_text())
     assert [pin["part"] for pin in report["pins"]] == ["gaze", "left_hand"] and report["pins"][0]["miss"] < 0.05
     assert stature(bvh.read(tmp_path / "out.bvh", 0.01).motion.skeleton) == pytest.approx(2.0, abs=1e-3)

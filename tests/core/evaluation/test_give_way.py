@@ -57,24 +57,24 @@ def test_a_foot_that_is_dragged_is_told(jog, told):
 def test_a_short_leg_is_told(jog, told):
     miss = np.zeros((241, 2))
     miss[30:45, 1] = 0.021
-    line = "11.0-11.5 s: a leg cannot reach where its foot should stand and ends up to 2.1 cm short"
+    line = "11.0-11.5 s: a leg is up to 2.1 cm too short to reach the place of its foot"
     assert told(jog, ik_miss=miss) == [line]
 
 
 def test_off_the_track_is_told(jog, told, track_of):
     (line,) = told(jog, track=track_of(jog, shift=(0.0, 0.3)))
-    assert line == "10.0-18.0 s: the body is off the track, by up to 0.30 m"
+    assert line == "10.0-18.0 s: the body is off the track by up to 0.30 m"
 
 
 def test_a_track_faster_than_the_library_is_told_but_not_where_running_is_made(jog, told):
     times = np.arange(10.0, 18.1, 0.04)
     fast = Track(times, np.stack([8.0 * (times - 10.0), 0 * times], axis=-1))
     (line,) = [line for line in told(jog, track=fast) if "faster than the library" in line]
-    assert line.startswith("10.0-18.0 s: the track asks for up to 8.0 m/s")
+    assert line.startswith("10.0-18.0 s: the track reaches 8.0 m/s")
     made = replace(jog, clips=(f"{MADE_FOLDER}steady_8.bvh",))
     lines = told(made, track=fast)
     assert not any("faster than the library" in line for line in lines)
-    assert any(line.startswith("10.0-18.0 s (8.0 s in all): made running") for line in lines)
+    assert any(line.startswith("10.0-18.0 s (8.0 s in all): synthetic running") for line in lines)
 
 
 def test_key_moments_late_or_out_of_reach_are_told(cut, told, still_ball):
@@ -83,8 +83,8 @@ def test_key_moments_late_or_out_of_reach_are_told(cut, told, still_ball):
     take = cut(("jog.bvh", 150, 150), asked=(asked,))
     take = replace(take, ball=still_ball(take, (0.0, 9.0, 0.11)))
     late, far = told(take, timeline=take.timeline)
-    assert late == "key moments not at their time: 12.4 s by +0.10 s"
-    assert far.startswith("the ball is out of the body's reach at key moments: 12.4 s by ")
+    assert late == "key moments are not at their time: 12.4 s by +0.10 s"
+    assert far.startswith("the body does not reach the ball at key moments: 12.4 s by ")
     away = np.linalg.norm(take.motion.root_positions[72, :2] - [0.0, 9.0])
     assert float(far.rpartition("by ")[2].removesuffix(" m")) == pytest.approx(away, abs=1.5)
 
@@ -93,9 +93,9 @@ def test_words_that_are_not_shown_are_told_but_for_key_moments_and_what_nobody_h
     spans = (Span(10.0, 14.0, ("jogging",)), Span(14.0, 18.0, ("walking", "header")))
     key = KeyMoment(12.5, ("kick", "right"))
     take = cut(("jog.bvh", 150, 180), ("walk.bvh", 0, 60), timeline=Timeline(spans, (key,)))
-    (line,) = [line for line in told(take, timeline=take.timeline) if "words" in line]
-    assert line == "14.0-16.0 s: words asked for and not shown: walking"
-    assert not any("words" in line for line in told(take, timeline=take.timeline, asked=Timeline()))
+    (line,) = [line for line in told(take, timeline=take.timeline) if "labels" in line]
+    assert line == "14.0-16.0 s: requested labels that are not shown: walking"
+    assert not any("labels" in line for line in told(take, timeline=take.timeline, asked=Timeline()))
 
 
 def test_a_body_in_the_ground_is_told(jog, told):

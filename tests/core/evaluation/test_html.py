@@ -71,7 +71,7 @@ def test_one_file_that_loads_and_runs_nothing(page):
 
 def test_every_section_and_picture_is_there(page):
     text = "".join(Tags(page).text)
-    for section in ("Over time", "Clips", "Words", "Key moments", "Worst seconds", "All figures"):
+    for section in ("Over time", "Clips", "Labels", "Key moments", "Worst seconds", "All figures"):
         assert section in text
     assert "14.50 s: kick right" in text and "jog.bvh" in text and "one & only" in text
     shown = pictures(page)
@@ -108,7 +108,7 @@ def test_names_are_escaped(take, track_of, library):
 def test_a_bare_motion_has_a_page_too(take, tmp_path):
     played = played_from_tables(take.motion)
     text = "".join(Tags(html_report(played, evaluate_played(played))).text)
-    assert "not known which clips" in text and "All figures" in text
+    assert "unknown without provenance" in text and "All figures" in text
 
 
 @pytest.mark.parametrize("count", [1, 2, 5])

@@ -288,7 +288,7 @@ def test_wrong_provenance_and_wrong_skeleton_are_told(uncut, library):
         played_from_tables(uncut.motion.frames(0, 10), provenance)
     offsets = uncut.motion.skeleton.offsets * np.linspace(1.0, 1.3, len(uncut.motion.skeleton))[:, None]
     taller = replace(uncut.motion, skeleton=replace(uncut.motion.skeleton, offsets=offsets))
-    with pytest.raises(InputError, match="another skeleton"):
+    with pytest.raises(InputError, match="its skeleton differs"):
         evaluate_played(played_from_tables(taller, provenance), library=library)
 
 
@@ -305,6 +305,6 @@ def test_table_puts_reports_side_by_side(uncut, track_of, library):
 def test_a_report_that_is_nested_too_deep_is_told():
     deep = json.loads('{"a":' * 900 + "1" + "}" * 900)
     for made in (flat, lambda report: table({"one": report})):
-        with pytest.raises(InputError, match="report: nested more than 30 deep"):
+        with pytest.raises(InputError, match="report: nested more than 30 levels deep"):
             made(deep)
     assert flat({"a": {"b": [{"c": 1}, {"c": 2}]}}) == {"a.b 1.c": 1, "a.b 2.c": 2}

@@ -265,7 +265,7 @@ def test_a_standing_root_above_the_hips_is_folded_and_put_back(tmp_path):
     assert (
         clip.motion.skeleton.names[0] == "Hips" and clip.form.above[0].name == "World" and not clip.form.above[0].moves
     )
-    assert any("World" in note and "standing still" in note for note in clip.notes)
+    assert any("World" in note and "static" in note for note in clip.notes)
     hips = root.places(iter(rows[2]))["Hips"]
     assert np.allclose(clip.motion.root_positions[2], ours(hips) * 0.01, atol=1e-9)
     bvh.write(tmp_path / "b.bvh", clip.motion, clip.form)
@@ -364,13 +364,13 @@ GOOD = document(body(), rows_for(body(), 3))
 ROW = GOOD.splitlines()[-2]
 FIRST = ROW.split()[5]
 BAD = {
-    "empty": (b"", "empty file"),
-    "blank": (b" \n\n", "empty file"),
+    "empty": (b"", "the file is empty"),
+    "blank": (b" \n\n", "the file is empty"),
     "binary": (b"\x89PNG\r\n\x1a\n" + bytes(50), ":1: starts with"),
     "html": (b"<html></html>", "expected HIERARCHY"),
     "cut hierarchy": (GOOD[:300], "no MOTION"),
     "cut before the frame time": (GOOD[: GOOD.index(b"Frame Time")], "Frame Time"),
-    "cut row": (GOOD[:-40], "cut off"),
+    "cut row": (GOOD[:-40], "truncated"),
     "missing rows": (GOOD.replace(b"Frames: 3", b"Frames: 5"), "3 rows of motion; expected 5"),
     "too many rows": (GOOD.replace(b"Frames: 3", b"Frames: 2"), "3 rows of motion; expected 2"),
     "no frames": (GOOD.replace(b"Frames: 3", b"Frames: 0"), "above 0"),
@@ -387,10 +387,10 @@ BAD = {
     "huge position": (GOOD.replace(ROW, b"1e30 " + ROW.split(b" ", 1)[1]), "beyond 1000 km"),
     "huge angle": (GOOD.replace(FIRST, b"1e30"), "expected an angle"),
     "bracket missing": (GOOD.replace(b"}", b"", 1), "bracket"),
-    "bracket too many": (GOOD.replace(b"}\nMOTION", b"}}\nMOTION"), "} too many"),
+    "bracket too many": (GOOD.replace(b"}\nMOTION", b"}}\nMOTION"), "one } too many"),
     "unknown channel": (GOOD.replace(b"Xrotation", b"Wrotation", 1), "CHANNELS"),
     "wrong channel count": (GOOD.replace(b"CHANNELS 3", b"CHANNELS 9", 1), "CHANNELS"),
-    "channel twice": (GOOD.replace(b"Zrotation Xrotation", b"Xrotation Xrotation", 1), "one channel twice"),
+    "channel twice": (GOOD.replace(b"Zrotation Xrotation", b"Xrotation Xrotation", 1), "a channel is repeated"),
     "offset is no number": (GOOD.replace(b"OFFSET 9.0", b"OFFSET nan", 1), "OFFSET and three numbers"),
     "offset missing": (GOOD.replace(b"OFFSET 9.0 -5.0 0.0\n", b"", 1), "no OFFSET"),
     "two bodies": (GOOD.replace(b"MOTION", b"ROOT b\n{\nOFFSET 0 0 0\n}\nMOTION"), "one ROOT"),

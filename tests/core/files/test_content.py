@@ -22,8 +22,8 @@ READERS = (bvh.read, read_ball, read_c3d, read_marker_set, read_model, read_mesh
 def test_each_reader_tells_what_it_is_given_instead_of_a_file(tmp_path, read):
     (tmp_path / "folder").mkdir()
     given = {"gone": "no such file; expected an? .+; check the path",
-             "folder": "a folder; expected an? .+; name a file",
-             "nul\0": "cannot be read .+; expected an? .+ that can be read"}  # fmt: skip
+             "folder": "is a folder; expected an? .+; choose a file",
+             "nul\0": "cannot be read .+; expected an? .+ that is readable"}  # fmt: skip
     for name, said in given.items():
         with pytest.raises(InputError, match=said) as told:
             read(tmp_path / name)
@@ -34,14 +34,14 @@ def test_each_reader_tells_what_it_is_given_instead_of_a_file(tmp_path, read):
 def test_a_file_that_may_not_be_read(tmp_path):
     (tmp_path / "a").write_text("a")
     (tmp_path / "a").chmod(0)
-    with pytest.raises(InputError, match=r"cannot be read \(Permission denied\); expected a thing that can be read"):
+    with pytest.raises(InputError, match=r"cannot be read \(Permission denied\); expected a thing that is readable"):
         content(tmp_path / "a", "a thing")
 
 
 def test_what_is_too_large_is_not_read(tmp_path):
     (tmp_path / "a").write_bytes(b"12345")
     assert content(tmp_path / "a", "a thing", 5) == b"12345"
-    with pytest.raises(InputError, match="5 bytes; expected a thing of at most 4; choose another file"):
+    with pytest.raises(InputError, match="has 5 bytes; expected a thing of at most 4; choose another file"):
         content(tmp_path / "a", "a thing", 4)
 
 
@@ -50,6 +50,6 @@ def test_text_is_utf8_and_loses_the_mark_at_its_start(tmp_path):
     assert utf8(tmp_path / "a", "a thing") == "Jörg\r\n"
     (tmp_path / "b").write_bytes("Jörg".encode("cp1252"))
     with pytest.raises(
-        InputError, match="no text in UTF-8; expected a thing; choose another file, or save it as UTF-8"
+        InputError, match="is not UTF-8 text; expected a thing; choose another file, or save it as UTF-8"
     ):
         utf8(tmp_path / "b", "a thing")

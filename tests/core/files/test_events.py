@@ -72,7 +72,7 @@ def test_a_provider_s_feet_hands_and_heads_are_kept():
 
 def test_a_second_file_that_is_missing_is_asked_for(tmp_path):
     (tmp_path / "g_f24.xml").write_bytes((files() / "opta_f24.xml").read_bytes())
-    with pytest.raises(InputError, match="no second file beside it for opta; expected one as g_f7.xml"):
+    with pytest.raises(InputError, match="the second file for opta is missing; expected a file such as g_f7.xml"):
         read_events(tmp_path / "g_f24.xml")
 
 
@@ -125,8 +125,8 @@ def test_the_plain_table_gets_the_match_s_players_and_periods(tmp_path):
 
 
 @pytest.mark.parametrize("text, part", [
-    ("", "an empty file"),
-    ("hello\n", "a form that is not known"),
+    ("", "the file is empty"),
+    ("hello\n", "unknown format"),
     ("time_s,type\n1,pass\n", "no column player"),
     ("time_s,type,player\n", "no events"),
     ("time_s,type,player\nx,pass,home_7\n", ":2: time_s 'x'"),
@@ -182,5 +182,5 @@ def test_players_are_found_by_id_number_or_name_and_teams_may_be_swapped():
     assert "1 of 4 players" in notes[0]
     swapped = [Who("1", "home", 3), Who("2", "away", 9)]
     found, notes = same_players(swapped, match)
-    assert [found[who][0] for who in swapped] == ["a3", "h9"] and "other way round" in notes[0]
+    assert [found[who][0] for who in swapped] == ["a3", "h9"] and "exchanged" in notes[0]
     assert Who.spelled("away_11") == Who("away_11", "away", 11, "away_11")

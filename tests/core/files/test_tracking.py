@@ -93,8 +93,8 @@ def test_a_track_needs_no_ball(tmp_path):
 @pytest.mark.parametrize(
     "text, part",
     [
-        ("", "an empty file"),
-        ("\n \n", "an empty file"),
+        ("", "the file is empty"),
+        ("\n \n", "the file is empty"),
         ("time,x,y\n0,1,2\n", "no column time_s, x_m, y_m"),
         ("time_s;x_m;y_m\n0;1;2\n", "no column time_s"),
         ("time_s,x_m,y_m\n", "0 samples"),
@@ -205,7 +205,7 @@ def test_a_cache_that_cannot_be_written_is_told(tmp_path):
     file, _ = made_tracab(tmp_path)
     (tmp_path / "cache").write_text("a file in the folder's place")
     match = read_match(file, cache_dir=tmp_path / "cache")
-    assert any("cannot be written" in note for note in match.notes)
+    assert any("is not writable" in note for note in match.notes)
 
 
 def test_a_player_can_be_followed(tmp_path):
@@ -231,10 +231,10 @@ def test_wrong_files_get_one_line(tmp_path):
     (tmp_path / "lonely.dat").write_bytes(file.read_bytes())
     cases = [
         ((tmp_path / "none.dat",), "no such file"),
-        ((tmp_path / "odd.txt",), "a form that is not known"),
+        ((tmp_path / "odd.txt",), "unknown format"),
         ((file, tmp_path / "bad_meta.xml"), "not readable as tracab"),
         ((file, None, "fifa"), "one of tracab"),
-        ((tmp_path / "lonely.dat",), "name it (--meta, in Blender Metadata)"),
+        ((tmp_path / "lonely.dat",), "choose the metadata file"),
         ((file, tmp_path / "none.xml"), "no such file"),
     ]
     for arguments, part in cases:
@@ -294,7 +294,7 @@ def test_a_provider_is_one_record(tmp_path, monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, "kloppy.acme", types.SimpleNamespace(load_lines=load))
     monkeypatch.setitem(PROVIDERS, "acme", acme)
     match = read_match(tmp_path / "game.acme", cache_dir=tmp_path / "cache")
-    assert match.provider == "acme" and "game.acme read as acme" in match.notes
+    assert match.provider == "acme" and "game.acme is read as acme" in match.notes
     np.testing.assert_allclose(match.positions[:2], players[::-1], atol=1e-9)
     assert (match.players[2].team, match.positions[2, 0].tolist()) == ("referee", [0.0, 5.0])
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "home"))

@@ -21,7 +21,7 @@ def test_a_link_stays_one_and_its_file_is_written(tmp_path):
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no pipes with names")
 def test_a_pipe_is_left_as_it_is(tmp_path, clip_file, capsys):
     os.mkfifo(tmp_path / "pipe.bvh")
-    with pytest.raises(InputError, match="a device or a pipe; expected a file name"):
+    with pytest.raises(InputError, match="a device or a pipe; expected a regular file"):
         atomic_write(tmp_path / "pipe.bvh", "text")
     clip = clip_file(tmp_path / "clip.bvh")
     assert main(["mirror", str(clip), str(tmp_path / "pipe.bvh")]) == 2
@@ -34,4 +34,4 @@ def test_mirror_and_retarget_write_bvh_only(tmp_path, clip_file, capsys):
     clip = str(clip_file(tmp_path / "clip.bvh"))
     for verb in (["mirror", clip, "{}"], ["retarget", clip, "--to", clip, "--out", "{}"]):
         assert main([word.format(tmp_path / "out.fbx") for word in verb]) == 2
-        assert "no file ending in .fbx" in capsys.readouterr().err and not (tmp_path / "out.fbx").exists()
+        assert "file type .fbx cannot be written" in capsys.readouterr().err and not (tmp_path / "out.fbx").exists()

@@ -31,7 +31,7 @@ def test_nothing_is_replaced(tmp_path, walk):
     with pytest.raises(InputError, match="already"):
         add_clip(tmp_path, "walk", walk)
     (tmp_path / "run.txt").write_text("0 1 running\n")
-    with pytest.raises(InputError, match="words already"):
+    with pytest.raises(InputError, match="already has labels"):
         add_clip(tmp_path, "run", walk, ["walking"])
     assert not (tmp_path / "run.bvh").exists()
 
@@ -40,7 +40,7 @@ def test_words_are_written_as_they_are_read(tmp_path, walk):
     add_clip(tmp_path, "throw", walk, ["Throwb high", "throwb"], key_seconds=1.2)
     assert (tmp_path / "throw.txt").read_text() == "72f throwb high\n"
     for word in ("#top", "3", "-low"):
-        with pytest.raises(InputError, match="words: .+ as a word"):
+        with pytest.raises(InputError, match="words: .+ is not a label"):
             add_clip(tmp_path, "other", walk, ["throwb", word])
     assert len(list(tmp_path.iterdir())) == 2
 

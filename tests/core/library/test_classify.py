@@ -121,7 +121,7 @@ def test_files_that_are_none_are_refused_in_one_line(known, tmp_path):
             classifier.read_classifier(bad)
     for wrong in (replace(known.space, scale=np.zeros(LENGTH)), replace(known.space, mean=np.full(LENGTH, np.nan))):
         classifier.write_classifier(bad, replace(known, space=wrong))
-        with pytest.raises(InputError, match="do not belong together"):
+        with pytest.raises(InputError, match="inconsistent or invalid"):
             classifier.read_classifier(bad)
 
 
@@ -139,7 +139,7 @@ def test_numbers_that_no_training_gives_are_refused(known, tmp_path, change):
     arrays.update({name: value(arrays, header) for name, value in change.items() if callable(value)})
     header["acts"][0].update({name: value for name, value in change.items() if not callable(value)})
     np.savez(path, **{**arrays, "header": np.frombuffer(json.dumps(header).encode(), np.uint8)})
-    with pytest.raises(InputError, match="do not belong together"):
+    with pytest.raises(InputError, match="inconsistent or invalid"):
         classifier.read_classifier(path)
 
 

@@ -35,7 +35,7 @@ def test_what_nobody_has_converted_is_left_out_and_told(foreign):
     folder, fbx, _ = foreign
     library = build(folder)
     assert all(not clip.path.endswith(".fbx") for clip in library.clips)
-    assert any("left out" in note and fbx.name in note for note in library.notes)
+    assert any("skipped" in note and fbx.name in note for note in library.notes)
 
 
 def test_a_conversion_is_the_clip_with_the_words_beside_the_source(foreign):
@@ -43,7 +43,7 @@ def test_a_conversion_is_the_clip_with_the_words_beside_the_source(foreign):
     convert(folder, fbx, bvh)
     for library in (build(folder), build(folder)):
         clip = next(clip for clip in library.clips if clip.path == fbx.relative_to(folder).as_posix())
-        assert clip.annotations and not any("left out" in note for note in library.notes)
+        assert clip.annotations and not any("skipped" in note for note in library.notes)
 
 
 def test_a_changed_source_is_not_answered_by_its_old_conversion(foreign):
@@ -53,7 +53,7 @@ def test_a_changed_source_is_not_answered_by_its_old_conversion(foreign):
     fbx.write_bytes(b"changed")
     library = build(folder)
     assert all(not clip.path.endswith(".fbx") for clip in library.clips)
-    assert any("left out" in note for note in library.notes)
+    assert any("skipped" in note for note in library.notes)
 
 
 def test_a_bvh_of_the_same_name_goes_first(foreign):

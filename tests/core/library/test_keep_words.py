@@ -41,7 +41,7 @@ def test_beside_the_clip(clip):
 
 def test_words_that_are_there_are_replaced_only_when_told(clip):
     clip.with_suffix(".txt").write_text("0 1 jogging   # by hand\n")
-    with pytest.raises(InputError, match="other words for this clip"):
+    with pytest.raises(InputError, match="other labels for this clip"):
         keep(clip)
     assert "by hand" in clip.with_suffix(".txt").read_text()
     keep(clip, overwrite=True)

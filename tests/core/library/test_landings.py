@@ -107,7 +107,7 @@ def test_a_dive_is_played_to_its_feet_on_the_track(keeper, track_of, timeline_of
     played = np.flatnonzero(sources == LANDING_FOLDER + "saves/dive.bvh")
     assert (sources == "saves/dive.bvh").any() and len(played) > 60 and np.all(np.diff(played) == 1)
     assert take.clip_frame[played].min() > the_dive(keeper).recorded - 1
-    assert any("made landing" in warning for warning in take.warnings)
+    assert any("synthetic landing" in warning for warning in take.warnings)
     heights = take.motion.root_positions[played, 2]
     assert heights.min() < 0.3 and heights[-1] > 0.8
     assert take.keys[0].clip == "saves/dive.bvh" and take.keys[0].frame == pytest.approx(150.0, abs=0.5)

@@ -36,7 +36,7 @@ def model(folder):
 def test_words_are_proposed_for_the_clips_without(folder, model, tmp_path, capsys):
     out = tmp_path / "proposed.csv"
     assert main(["library", str(folder), "--propose", str(out), "--learned", str(model)]) == 0
-    assert "for 2 clips without words" in capsys.readouterr().out
+    assert "for 2 clips without labels" in capsys.readouterr().out
     rows = read_annotation_csv(out)
     assert set(rows) == {"new/one.bvh", "new/two.bvh"}
     (kick,) = [row for row in rows["new/one.bvh"] if row.key is not None]
@@ -60,19 +60,19 @@ def test_proposals_are_no_examples_until_they_are_accepted(folder, tmp_path, cap
     shutil.copytree(folder, home)
     table = home / "annotations.csv"
     head = "file,fps,start_frame,end_frame,key_frame,labels,confidence,source,why"
-    learned = "new/one.bvh,120,125,185,156,kick right low,0.9,learned,looks like it"
+    learned = "new/one.bvh,120,125,185,156,kick right low,0.9,learned,similar to the examples"
     ruled = "new/two.bvh,120,0,60,,walking,0.8,rules,1.2 m/s"
     table.write_text(f"{head}\n{learned}\n{ruled}\n")
     assert main(["library", str(home), "--learn", out]) == 0
     told = capsys.readouterr()
     assert "learned from 4 clips" in told.out and "kick: 3 moments" in told.out
     (line,) = [line for line in told.err.splitlines() if line.startswith("note: ")]
-    assert "2 proposed rows are no example" in line
-    table.write_text(f"{head}\n{learned.removesuffix('looks like it')}\n{ruled}\n")
+    assert "2 proposed rows are not used until" in line
+    table.write_text(f"{head}\n{learned.removesuffix('similar to the examples')}\n{ruled}\n")
     assert main(["library", str(home), "--learn", out]) == 0
     told = capsys.readouterr()
     assert "learned from 5 clips" in told.out and "kick: 4 moments" in told.out
-    assert "1 proposed row is no example" in told.err
+    assert "1 proposed row is not used until" in told.err
 
 
 def test_a_library_of_proposals_alone_has_nothing_to_learn_from(folder, tmp_path, capsys):
@@ -82,7 +82,7 @@ def test_a_library_of_proposals_alone_has_nothing_to_learn_from(folder, tmp_path
     table.write_text(table.read_text().replace("new/", ""))
     assert main(["library", str(table.parent), "--learn", str(tmp_path / "m.npz")]) == 2
     (line,) = capsys.readouterr().err.splitlines()
-    assert "no clip with words" in line and "nobody has accepted" in line
+    assert "no clip with labels" in line and "until you accept" in line
 
 
 def test_rules_alone_where_nothing_was_learned(folder, tmp_path):
@@ -93,7 +93,7 @@ def test_rules_alone_where_nothing_was_learned(folder, tmp_path):
 
 @pytest.mark.parametrize("options, told", [
     (("--propose", "OUT/p.csv", "--learned", "OUT/none.npz"), "no such file"),
-    (("--learn", "OUT/m.npz", "--learned", "OUT/none.npz"), "given beside --learn"),
+    (("--learn", "OUT/m.npz", "--learned", "OUT/none.npz"), "set with --learn"),
     (("--propose", "OUT/none/p.csv"), "its folder does not exist"),
     (("--propose", "OUT/p.csv", "--least", "2"), "a number from 0 to 1"),
     (("--least", "0.3", "--learned", "OUT/none.npz"), "--propose"),
@@ -126,4 +126,4 @@ def test_a_recording_without_legs_is_named(tmp_path, capsys, option):
 
 def test_a_library_without_words_has_nothing_to_learn_from(folder, tmp_path, capsys):
     assert main(["library", str(folder / "new"), "--learn", str(tmp_path / "m.npz")]) == 2
-    assert "no clip with words" in capsys.readouterr().err
+    assert "no clip with labels" in capsys.readouterr().err

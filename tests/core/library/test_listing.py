@@ -42,7 +42,7 @@ def test_sliding_feet_and_a_drifting_floor_are_marked(clips_folder, tmp_path):
     for change, mark, line in (({"slides": 0.15, "slid": 0.4}, listing.FAIR, "feet slide: 15 cm/s (file: 40)"),
                                ({"slides": 0.5}, listing.POOR, "feet slide: 50 cm/s"),
                                ({"drift": 0.5}, listing.POOR, "floor levelled: 50 cm"),
-                               ({"pops": 3}, listing.GOOD, "jumps taken out: 3")):
+                               ({"pops": 3}, listing.GOOD, "jumps removed: 3")):
         mended = replace(clip.mended, **{"slid": 0.0, "slides": 0.0, "drift": 0.0, "pops": 0, **change})
         found = listing._quality(replace(clip, mended=mended), 1.0, 1.0)
         assert found[0] == mark and line in found[1]

@@ -110,7 +110,7 @@ def test_a_track_between_two_recordings_is_played_by_a_blend(library):
 def test_a_track_beyond_the_recordings_is_played_by_made_running_and_told(library):
     take = synthesize(library, Plan(track=straight(min(1.5 * library.fastest, 9.0))))
     assert any(name.startswith(MADE_FOLDER) for name in take.clips)
-    assert any("made" in warning for warning in take.warnings)
+    assert any("synthetic" in warning for warning in take.warnings)
 
 
 def test_a_kick_in_a_sprint_is_made(library):
@@ -142,7 +142,7 @@ def test_a_ball_taken_on_the_run_is_made_and_no_foot_slides(with_a_receive, spee
     (key,) = take.keys
     assert key.clip.startswith(MADE_FOLDER + TAKEN) == is_made and key.used_instead is None
     assert key.frame == pytest.approx(3.0 * take.motion.fps, abs=0.51)
-    assert any("a ball taken on the run" in line for line in take.warnings) == is_made
+    assert any("synthetic reception on the run" in line for line in take.warnings) == is_made
     body, places = identify(take.motion.skeleton), forward_kinematics(take.motion)[0]
     toes = places[:, [body.left.toe, body.right.toe]]
     assert stance_travel(toes, stances(take.contacts)).max(initial=0.0) < 0.15

@@ -68,7 +68,7 @@ def test_most_frames_choose_the_skeleton_unless_told(walk, other, tmp_path):
     brought = list(bring(paths, [other, walk], None, notes))
     assert [(motion.skeleton is walk.skeleton, moved) for motion, _, moved in brought] == [(True, True), (True, False)]
     assert [motion.fps for motion, _, _ in brought] == [30.0, 60.0]
-    assert notes == ["1 clips of 1 other skeletons brought to the one of 22 joints"]
+    assert notes == ["1 clips of 1 other skeletons retargeted to the one with 22 joints"]
     brought = list(bring(paths, [other, walk], other, []))
     assert [motion.skeleton.names == other.skeleton.names for motion, _, _ in brought] == [True, True]
     assert brought[1][1].shape == (len(walk), 2, 2)
@@ -80,7 +80,7 @@ def test_the_command_writes_the_targets_names_at_the_inputs_rate(walk, other, tm
     out = tmp_path / "out.bvh"
     assert main(["retarget", str(tmp_path / "in.bvh"), "--to", str(tmp_path / "to.bvh"), "--out", str(out)]) == 0
     told = capsys.readouterr()
-    assert str(out) in told.out and "unit 0.01 m (guessed)" in told.err
+    assert str(out) in told.out and "unit 0.01 m (estimated)" in told.err
     wrote, target = bvh.read(out), bvh.read(tmp_path / "to.bvh")
     assert wrote.motion.skeleton.names == target.motion.skeleton.names
     assert wrote.form.channels == target.form.channels

@@ -152,10 +152,9 @@ def test_what_was_done_is_told_once_per_kind(walk):
     mended = replace(done, drift=0.04, slid=True, slide=(0.3, 0.05), travel=0.2)
     lines = repair.describe_repairs([(done, 0), (mended, 3), (mended, 0)])
     assert lines == [
-        "3 single-frame jumps of joints taken out of 1 clips",
-        "floor levelled in 2 clips, by 4 cm in the median",
-        "standing feet held in 2 clips: they slid 30 cm/s and now 5 cm/s in the mean; "
-        "the way corrected by 0.20 m in the median",
+        "3 single-frame jumps of joints removed from 1 clips",
+        "floor levelled in 2 clips, by 4 cm (median)",
+        "feet planted in 2 clips: mean slide 30 cm/s before, 5 cm/s after; path corrected by 0.20 m (median)",
     ]
     assert repair.describe_repairs([(done, 0)]) == []
 

@@ -82,7 +82,7 @@ def test_one_marker_put_on_anew_is_told(known, clusters):
     moved[:, known.static.index("LWRA")] += [0.05, 0.0, 0.0]
     moved[:, known.static.index("LASI")] += [0.0, 0.06, 0.0]
     lines = check(known.trial, known.static.with_positions(moved), clusters)
-    assert len(lines) == 1 and "anew" in lines[0]
+    assert len(lines) == 1 and "attached again" in lines[0]
 
 
 def test_stretches_without_markers_are_told_with_their_seconds(known, clusters):
@@ -104,13 +104,13 @@ def test_a_static_that_lacks_markers_is_told_or_refused(known, clusters):
 def test_markers_of_no_segment_are_told(known, clusters):
     assert unused(known.trial, clusters) == []
     strange = known.trial.renamed({"LWRA": "STICK", "RWRA": "*4"})
-    assert unused(strange, clusters) == ["1 markers of no segment are not used: STICK"]
+    assert unused(strange, clusters) == ["1 markers belong to no segment and are not used: STICK"]
     assert unused(strange, clusters, ["STICK"]) == []
 
 
 def test_a_static_in_which_nothing_is_seen_is_refused_as_that(known, clusters):
     for static in (known.static.with_positions(known.static.positions * np.nan), known.static.frames(0, 0)):
-        with pytest.raises(InputError, match="no marker is seen"):
+        with pytest.raises(InputError, match="no marker is visible"):
             check(known.trial, static, clusters)
 
 

@@ -73,7 +73,7 @@ def test_the_same_input_gives_the_same_bits(made, known):
 def test_the_motion_stays_where_the_markers_are_unless_a_floor_is_asked_for(known, made):
     lifted = known.trial.with_positions(known.trial.positions + [0.0, 0.0, 0.8])
     out = reconstruct(lifted, model=made.model)
-    assert out.floor == pytest.approx(0.8, abs=0.05) and any("--floor" in line for line in out.warnings)
+    assert out.floor == pytest.approx(0.8, abs=0.05) and any("Floor at 0" in line for line in out.warnings)
     assert np.allclose(out.motion.root_positions - made.motion.root_positions, [0.0, 0.0, 0.8], atol=5e-3)
     moved = reconstruct(lifted, model=made.model, settings=ReconstructSettings(floor=True))
     lowered = out.trial.positions - [0.0, 0.0, out.floor]
@@ -169,7 +169,7 @@ def test_a_motion_is_added_to_a_library_with_its_words(run, place, tmp_path, mad
     assert status == 2 and "already" in error[0]
     (clips / "walk.bvh").unlink()
     status, _, error = run(place / "walk.trc", "--static", place / "static.trc", "--out", tmp_path / "p.bvh", *words)
-    assert status == 2 and "words already" in error[0] and not (tmp_path / "p.bvh").exists()
+    assert status == 2 and "already has labels" in error[0] and not (tmp_path / "p.bvh").exists()
 
 
 def test_how_a_ball_lies_in_the_hand_may_be_known():
@@ -195,7 +195,7 @@ def test_a_trial_of_a_folder_goes_without_somebody_elses_static(run, tmp_path, k
     rows = {row["trial"]: row for row in json.loads((out / "trials.json").read_text())["trials"]}
     assert rows["own"]["static"] == "static" and "goes without" not in rows["own"]["line"]
     taller = rows["taller"]
-    assert taller["static"] is None and "goes without a static" in taller["line"] and taller["bvh"]
+    assert taller["static"] is None and "reconstructed without a static" in taller["line"] and taller["bvh"]
 
 
 def test_a_folder_is_made_as_a_whole(run, place, tmp_path, known):
@@ -226,7 +226,7 @@ def test_a_folder_is_made_as_a_whole(run, place, tmp_path, known):
     (("{place}/walk.trc", "--marker-set", "mine", "--out", "{tmp}/o.bvh"), "plug_in_gait"),
     (("{place}/walk.trc", "--cutoff", "0", "--out", "{tmp}/o.bvh"), "hertz"),
     (("{place}", "--report", "{tmp}/r.json", "--out", "{tmp}/o"), "--report"),
-    (("{tmp}", "--out", "{tmp}/o"), "holds no .c3d"),
+    (("{tmp}", "--out", "{tmp}/o"), "contains no .c3d"),
     (("{place}", "--out", "{tmp}/o", "--add-to", "{tmp}/gone"), "gone: is not a folder"),
     (("{place}", "--out", "{tmp}/o", "--model", "{tmp}/m.json"), "m.json: no such file"),
     (("{place}", "--out", "{tmp}/o", "--marker-set", "mine"), "plug_in_gait"),

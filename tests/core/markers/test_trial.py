@@ -50,14 +50,14 @@ def test_parts_of_a_trial():
 
 @pytest.mark.parametrize("changes, said", [
     ({"labels": ("A", "B")}, "positions of shape"),
-    ({"labels": ("A", "B", "A")}, "'A' twice"),
+    ({"labels": ("A", "B", "A")}, "duplicate label 'A'"),
     ({"labels": ("A", "B", " ")}, "without a label"),
     ({"fps": 0}, "0 frames per second"),
     ({"fps": float("nan")}, "nan frames per second"),
     ({"start": float("inf")}, "starts at inf"),
     ({"residuals": np.ones((5, 2))}, "residuals of shape"),
     ({"positions": np.full((5, 3, 3), np.inf)}, "infinite"),
-    ({"positions": [["a"]]}, "no numbers"),
+    ({"positions": [["a"]]}, "not numbers"),
 ])  # fmt: skip
 def test_what_is_wrong_is_said(changes, said):
     with pytest.raises(InputError, match=said):
@@ -67,5 +67,5 @@ def test_what_is_wrong_is_said(changes, said):
 def test_a_label_that_is_not_there_is_told_with_what_is():
     with pytest.raises(InputError, match="no marker 'D'.*one of A, B, C"):
         trial().index("D")
-    with pytest.raises(InputError, match="'B' twice"):
+    with pytest.raises(InputError, match="duplicate label 'B'"):
         trial().renamed({"A": "B"})

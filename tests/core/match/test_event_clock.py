@@ -57,7 +57,7 @@ def test_few_events_that_do_not_fit_are_left_out_and_told():
     others = [event for event in sent if not 90.0 < event.time < 140.0][:20]
     found = aligned(MatchEvents((*moved, *others), "made"), touches, HALVES, (100.0, 128.0))
     assert not found.clocks and np.isnan(found.times).all() and (found.touches < 0).all()
-    assert len(found.notes) == 1 and "they are left out" in found.notes[0] and "fit (by chance" in found.notes[0]
+    assert len(found.notes) == 1 and "its events are ignored" in found.notes[0] and "fit (by chance" in found.notes[0]
 
 
 @pytest.mark.parametrize("lag, drift", [

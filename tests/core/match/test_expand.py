@@ -92,10 +92,10 @@ def test_nothing_of_a_player_who_is_not_there(library, weaving_player):
 
 
 def test_a_span_that_ends_before_it_starts_is_told(library, weaving_player):
-    with pytest.raises(InputError, match="an end behind the start"):
+    with pytest.raises(InputError, match="an end after the start"):
         expanded(library, weaving_player, 20.0, 10.0)
 
 
 def test_another_library_is_told(strikes_library, weaving_player):
-    with pytest.raises(InputError, match="the library that the match was made from"):
+    with pytest.raises(InputError, match="the library of this match"):
         expanded(strikes_library, weaving_player, 5.0, 10.0)

@@ -58,10 +58,11 @@ def test_what_decides_the_results_is_in_the_identity_and_nothing_else(order, tmp
 
 
 @pytest.mark.parametrize("more, told", [
-    ({"start": 5.0, "end": 5.0}, "--to: 5 s; expected later than --from 5 s"),
-    ({"start": 1234.5674, "end": 1234.567}, "--to: 1234.567 s; expected later than --from 1234.5674 s"),
+    ({"start": 5.0, "end": 5.0}, "end time: 5 s; expected later than the start, 5 s"),
+    ({"start": 1234.5674, "end": 1234.567}, "end time: 1234.567 s; expected later than the start, 1234.5674 s"),
     ({"window": 1.0}, "window: 1 s"),
-    ({"overlap": 200.0}, "overlap: 200 s"), ({"start": np.nan}, "--from: nan"), ({"end": np.nan}, "--to: nan"),
+    ({"overlap": 200.0}, "overlap: 200 s"), ({"start": np.nan}, "start time: not a number"),
+    ({"end": np.nan}, "end time: not a number"),
 ])  # fmt: skip
 def test_an_order_without_sense_is_told(order, more, told):
     with pytest.raises(InputError, match=told):
@@ -84,9 +85,9 @@ def test_a_folder_is_gone_on_with_by_the_same_order_only(order, tmp_path):
     with opened(order.out, known) as folder:
         assert folder.before["players"] == [{"id": "a"}] and folder.before["figure"] is None
     for more, key, told in (
-        ({"start": 1.0}, "key", "--from"), ({"seed": 1}, "other", "--seed"), ({}, "other", "library"),
+        ({"start": 1.0}, "key", "start time"), ({"seed": 1}, "other", "seed"), ({}, "other", "library"),
     ):  # fmt: skip
-        with pytest.raises(InputError, match=rf"out: holds the results of another order \(its {told} differs\)"):
+        with pytest.raises(InputError, match=rf"out: holds the results of another request \(its {told} differs\)"):
             with opened(order.out, identity(changed(order, **more), key)):
                 pass
 
@@ -125,7 +126,7 @@ with opened(Path({str(order.out)!r}), {known!r}):
 """
     other = subprocess.Popen([sys.executable, "-c", text], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
     assert other.stdout.readline() == b"in\n"
-    with pytest.raises(InputError, match=rf"another run \(process {other.pid}\) works in it"):
+    with pytest.raises(InputError, match=rf"another run \(process {other.pid}\) uses it"):
         with opened(order.out, known):
             pass
     other.kill()
@@ -148,9 +149,10 @@ def test_folders_that_are_none_of_a_match_are_told(order, tmp_path):
 
 
 @pytest.mark.parametrize("text, told", [
-    ("{", "no JSON"), ("[]", "no list of players"), ('{"players": [3]}', "no list of players"),
-    ('{"players": [], "version": 99}', "version 99"), ('{"players": []}', "no version"), ("[" * 100000, "no JSON"),
-    ("\0\0", "no JSON"), ('{"version": 1, "players": [{"id": ["a"]}]}', "no list of players"),
+    ("{", "not valid JSON"), ("[]", "no list of players"), ('{"players": [3]}', "no list of players"),
+    ('{"players": [], "version": 99}', "version 99"), ('{"players": []}', "no version"),
+    ("[" * 100000, "not valid JSON"),
+    ("\0\0", "not valid JSON"), ('{"version": 1, "players": [{"id": ["a"]}]}', "no list of players"),
     ('{"version": 1, "players": [{"id": ""}]}', "no list of players"),
 ])  # fmt: skip
 def test_a_state_that_cannot_be_read_is_told(tmp_path, text, told):
@@ -176,8 +178,10 @@ def cut(state: Path, drop: str = "") -> None:
     state.write_text(text if drop else text[: len(text) // 2])
 
 
-@pytest.mark.parametrize("drop, told", [("", "no JSON"), ("players", "no list of players"), ("digest", "no digest"),
-                                        ("version", "no version")])  # fmt: skip
+@pytest.mark.parametrize("drop, told", [
+    ("", "not valid JSON"), ("players", "no list of players"), ("digest", "no digest"),
+    ("version", "no version"),
+])  # fmt: skip
 def test_a_damaged_state_is_set_aside_and_the_work_goes_on(order, begun, drop, told):
     cut(order.out / "match.json", drop)
     damaged = (order.out / "match.json").read_bytes()
@@ -191,12 +195,12 @@ def test_a_damaged_state_is_set_aside_and_the_work_goes_on(order, begun, drop, t
 
 def test_an_empty_state_of_another_order_is_refused(order, begun):
     (order.out / "match.json").write_text("")
-    with pytest.raises(InputError, match="holds the results of another order"):
+    with pytest.raises(InputError, match="holds the results of another request"):
         with opened(order.out, identity(changed(order, seed=1), "key")):
             pass
     assert (order.out / "match.json").read_text() == ""
     with opened(order.out, begun) as folder:
-        assert "kept as match.json.damaged" in folder.notes[0]
+        assert "renamed to match.json.damaged" in folder.notes[0]
 
 
 def test_a_state_without_a_digest_and_without_pieces_is_refused(tmp_path):
@@ -212,7 +216,7 @@ def test_a_state_without_a_digest_and_without_pieces_is_refused(tmp_path):
 def test_a_damaged_state_of_another_order_or_version_is_refused(order, begun):
     other = identity(changed(order, seed=1), "key")
     cut(order.out / "match.json")
-    with pytest.raises(InputError, match="holds the results of another order; expected"):  # which, it does not say
+    with pytest.raises(InputError, match="holds the results of another request; expected"):  # which, it does not say
         with opened(order.out, other):
             pass
     (order.out / "match.json").write_text('{"players": [], "version": 99}')

@@ -183,7 +183,7 @@ def test_a_cut_state_is_told_and_nothing_is_searched_again(made, order_to, tmp_p
     state.write_bytes(state.read_bytes()[:-2000])
     pieces = {path: path.stat().st_mtime_ns for path in order.out.glob(".work/*/*.npz")}
     result = make_match(order)
-    assert [line for line in result.notes if "no JSON" in line and "kept as match.json.damaged" in line]
+    assert [line for line in result.notes if "not valid JSON" in line and "renamed to match.json.damaged" in line]
     assert pieces and pieces == {path: path.stat().st_mtime_ns for path in order.out.glob(".work/*/*.npz")}
     (order.out / "match.json.damaged").unlink()
     assert kept_files(order.out) == kept_files(made[0])

@@ -43,12 +43,12 @@ def test_a_player_and_the_ball(match, tmp_path):
     told = [json.loads(line) for line in error]
     shares = [line["progress"] for line in told if "progress" in line]
     assert status == 0 and "1 of 1 players, 2.0 s" in out and shares == sorted(shares) and shares[-1] > 0.9
-    assert any("small_meta.xml taken" in line.get("note", "") for line in told)
+    assert any("small_meta.xml is used" in line.get("note", "") for line in told)
     files = sorted(path.name for path in (tmp_path / "out").iterdir())
     assert files == [".work", "annotations", "ball.csv", "home_7.take.npz", "match.json"]
     assert read_state(tmp_path / "out")["status"] == "done"
     status, _, error = match("--no-figures", to=7)
-    assert status == 2 and "holds the results of another order (its --to differs)" in error[0]
+    assert status == 2 and "holds the results of another request (its end time differs)" in error[0]
 
 
 def test_without_solved_touches_there_are_no_words(match, tmp_path):
@@ -62,7 +62,7 @@ def test_a_player_whose_words_the_library_lacks_fails_where_that_is_asked(match,
     (tmp_path / "words").mkdir()
     (tmp_path / "words" / "home_7.txt").write_text("5 dive left high\n")
     status, _, error = match("--exact", "--no-figures", annotations=tmp_path / "words")
-    assert status == 2 and "no player could be made" in error[-1]
+    assert status == 2 and "no player could be synthesized" in error[-1]
     assert any("home_7" in line and "dive" in line for line in error)
     assert read_state(tmp_path / "out")["status"] == "failed"
 
@@ -75,8 +75,8 @@ def test_who_is_not_there_and_texts_of_nobody_are_told(match, tmp_path):
     span = {"from": 12, "to": 14}
     status, out, error = match("--players", "away_9", "home_7", "--no-figures", players=None, annotations=words, **span)
     assert status == 0 and "1 of 1 players" in out
-    assert "note: player away_9 is not made: he is not there from 12 to 14 s" in error
-    assert [line for line in error if "home_8.txt: not used" in line]
+    assert "note: player away_9 is left out: absent from 12 to 14 s" in error
+    assert [line for line in error if "home_8.txt: ignored" in line]
     assert not [line for line in error if "home_7.txt" in line]
 
 
@@ -85,14 +85,14 @@ def test_words_for_a_time_at_which_nobody_is_there_are_told(match, tmp_path):
     words.mkdir()
     (words / "home_7.txt").write_text("13 kick right\n75.25 kick right\n20 21 dribble\n13.5 15 dribble\n")
     span = {"from": 12, "to": 14, "players": None, "annotations": words}
-    told = "home_7.txt: 2 of your lines are not used (20 21 dribble ...), since home_7 is there from 12 to 14 s"
+    told = "home_7.txt: 2 of your lines are ignored (20 21 dribble ...), because home_7 is present from 12 to 14 s"
     status, _, error = match("--players", "home_7", "away_6", "--no-figures", **span)
     assert status == 0 and [line for line in error if ".txt" in line] == [f"note: {told}"]
     assert told in read_state(tmp_path / "out")["notes"]
     text = tmp_path / "out" / "annotations" / "away_6.txt"
     text.write_text(text.read_text() + "75.25 kick right\n")
     _, _, error = match("--players", "home_7", "away_6", "--no-figures", **span)
-    told = "away_6.txt: 1 of your lines is not used (75.25 kick right), since away_6 is there from 12 to 14 s"
+    told = "away_6.txt: 1 of your lines is ignored (75.25 kick right), because away_6 is present from 12 to 14 s"
     assert f"note: {told}" in error
 
 
@@ -106,14 +106,14 @@ def test_texts_of_players_who_are_away_are_told_where_everybody_is_asked_for(tmp
     order = dict(tracking=Path("t"), library=Path("l"), out=Path("o"), annotations=tmp_path)
     assert unused_lines([], MatchOrder(**order, players=("home 7",)), files) == []
     (line,) = unused_lines([], MatchOrder(**order), files)
-    assert line.startswith("home_7.txt, away_9.txt: not used")
+    assert line.startswith("home_7.txt, away_9.txt: ignored")
 
 
 def test_the_events_second_file_and_provider_may_be_named(match, tmp_path):
     """One that needs no second file says so; two files that lie apart are read, and are of another match."""
     named = {"events": SMALL / "small_events.csv", "events-meta": SMALL / "small_meta.xml", "events-provider": "csv"}
     status, _, error = match("--no-figures", **named)
-    assert status == 0 and any("small_meta.xml: not used, since events of csv are in one file" in one for one in error)
+    assert status == 0 and any("small_meta.xml: not used, because events of csv are in one file" in one for one in error)
     kloppy = pytest.importorskip("kloppy")
     folder = Path(kloppy.__file__).parent / "tests" / "files"
     if not (folder / "opta_f24.xml").is_file():
@@ -121,7 +121,7 @@ def test_the_events_second_file_and_provider_may_be_named(match, tmp_path):
     (tmp_path / "events").mkdir()
     apart = shutil.copy(folder / "opta_f24.xml", tmp_path / "events" / "monday.xml")
     status, _, error = match(events=apart, out=tmp_path / "new")
-    assert status == 2 and "no second file beside it for opta" in error[-1]
+    assert status == 2 and "the second file for opta is missing" in error[-1]
     named = {"events-meta": folder / "opta_f7.xml", "events-provider": "OPTA"}
     status, _, error = match(events=apart, out=tmp_path / "new", **named)
     assert status == 2 and "players" in error[-1] and "are not in the tracking" in error[-1]
@@ -136,24 +136,24 @@ def test_an_option_is_taken_out_however_it_is_written(written):
 @pytest.mark.parametrize("options, status, told", [
     ({"tracking": "no.dat"}, 2, "no.dat: no such file"),
     ({"library": "nowhere"}, 2, "nowhere"),
-    ({"from": 6, "to": 5}, 2, "--to: 5 s; expected later than --from 6 s"),
-    ({"from": 100, "to": 200}, 2, "--from, --to: 100 to 200 s; expected a second or more within 0 to 24 s"),
-    ({"players": "home_99"}, 2, "--players: 'home_99'; expected some of"),
-    ({"players": "away_9", "from": 15, "to": 20}, 2, "nobody is there from 15 to 20 s"),
+    ({"from": 6, "to": 5}, 2, "end time: 5 s; expected later than the start, 6 s"),
+    ({"from": 100, "to": 200}, 2, "time range: 100 to 200 s; expected a second or more within 0 to 24 s"),
+    ({"players": "home_99"}, 2, "players: 'home_99'; expected some of"),
+    ({"players": "away_9", "from": 15, "to": 20}, 2, "no player is present from 15 to 20 s"),
     ({"provider": "nobody"}, 2, "provider: 'nobody'"),
     ({"events": "no.csv"}, 2, "no.csv"),
     ({"meta": "no.xml"}, 2, "no.xml"),
     ({"events": str(SMALL / "small_events.csv"), "events-meta": "no.xml"}, 2, "no.xml"),
-    ({"events": str(SMALL / "small_events.csv"), "events-provider": "x"}, 2, "--events-provider: 'x'; expected one of"),
+    ({"events": str(SMALL / "small_events.csv"), "events-provider": "x"}, 2, "events provider: 'x'; expected one of"),
     ({"events": str(SMALL / "small_events.csv"), "events-provider": "opta"}, 2, "no second file beside it for opta"),
-    ({"events-meta": "no.xml"}, 2, "--events-meta: no.xml, without --events"),
-    ({"events-provider": "opta"}, 2, "--events-provider: opta, without --events"),
+    ({"events-meta": "no.xml"}, 2, "events metadata: no.xml, without an events file"),
+    ({"events-provider": "opta"}, 2, "events provider: opta, without an events file"),
     ({"workers": 0}, 2, "'0' is not 1 to 256"),
     ({"scheduler": "tcp://127.0.0.1:9"}, 2, "not allowed with argument --workers"),
-    ({"scheduler": "tcp://127.0.0.1:9", "workers": None}, 2, "--scheduler: tcp://127.0.0.1:9 does not answer"),
+    ({"scheduler": "tcp://127.0.0.1:9", "workers": None}, 2, "scheduler: tcp://127.0.0.1:9 does not answer"),
     ({"fps": 0}, 2, "1 to 480 frames per second"),
     ({"out": ""}, 2, "no folder is named"),
-    ({"from": "nan"}, 2, "--from: nan"),
+    ({"from": "nan"}, 2, "start time: not a number"),
     ({"seed": -5}, 2, "'-5' is not 0 to 2147483647"),
     ({"annotations": "nowhere"}, 2, "nowhere: no such folder"),
     ({"out": "no/such/place"}, 2, "the folder above it does not exist"),

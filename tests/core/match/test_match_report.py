@@ -107,7 +107,7 @@ def test_the_page_tells_who_when_and_which_frame(tmp_path):
     assert "110 s (1:50)" in text and "frame 300" in text
     assert "30.0 cm off the track" in text and "ball 20.0 m away" in text
     assert "bpy.ops.beyond_mocap.match_second(seconds=110, player=&#x27;a&#x27;)" in text
-    assert "2 of 2 players made" in text and "Partial" not in text
+    assert "2 of 2 players finished" in text and "Partial" not in text
     assert "0.21" in text and "12.3 s" in text and "ball &lt;measured&gt; in 80 %" in text
 
 
@@ -133,7 +133,7 @@ def test_failed_and_unreadable_players_are_marked_and_the_rest_is_told(tmp_path)
     (folder / "file-c.report.json").write_text('{"fps": 30.0, "per_sec', "utf-8")
     (folder / "file-d.report.json").unlink()
     text = page(folder)
-    assert "1 of 4 players made" in text and "Partial: 3 not made" in text
+    assert "1 of 4 players finished" in text and "Partial: 3 not finished" in text
     assert "no &lt;bones&gt; &amp; no luck" in text and "cannot be read" in text
     assert "file-d.report.json is missing" in text
 
@@ -157,18 +157,18 @@ def test_a_player_who_comes_late_and_unknown_values(tmp_path):
 @pytest.mark.parametrize("changed", [{"to_s": 1e12}, {"to_s": 10**400}, {"from_s": -1e300}])
 def test_seconds_that_no_match_has_do_not_stop_the_page(tmp_path, changed):
     text = page(written(tmp_path, {"a": report(root_error_m=column(0.002, s7=0.08))}, **changed))
-    assert "1 of 1 players made" in text and "8.0 cm off the track" in text
+    assert "1 of 1 players finished" in text and "8.0 cm off the track" in text
 
 
 @pytest.mark.parametrize("changed, told", [
     ({"warnings": 5}, "its warnings are no list"), ({"warnings": None}, "its warnings are no list"),
-    ({"skate": json.loads('{"a":' * 900 + "1" + "}" * 900)}, "nested more than 30 deep"),
+    ({"skate": json.loads('{"a":' * 900 + "1" + "}" * 900)}, "nested more than 30 levels deep"),
     ({"root_error_m": {"mean": 10**400}}, ""), ({"per_second": {"start_s": 1e300, "root_error_m": [1.0]}}, ""),
 ])
 def test_odd_values_of_one_player_touch_nobody_else(tmp_path, changed, told):
     folder = written(tmp_path, {"a": {**report(), **changed}, "b": report(root_error_m=column(0.002, s7=0.08))})
     text = page(folder)
-    assert told in text and f"{1 if told else 2} of 2 players made" in text and "8.0 cm off the track" in text
+    assert told in text and f"{1 if told else 2} of 2 players finished" in text and "8.0 cm off the track" in text
 
 
 @pytest.mark.parametrize("told", ["", "[]", "{\"players\": 3}", "{\"players\": [{\"name\": \"x\"}]}", "{", "\xff",
@@ -184,13 +184,13 @@ def test_an_empty_folder_and_an_empty_match(tmp_path):
     with pytest.raises(InputError, match="match.json"):
         page(tmp_path)
     (tmp_path / "match.json").write_text('{"players": []}', "utf-8")
-    assert "0 of 0 players made" in page(tmp_path)
+    assert "0 of 0 players finished" in page(tmp_path)
 
 
 def test_reports_without_seconds_still_make_a_page(tmp_path):
     one = report()
     del one["per_second"]
-    assert "No report tells figures by the second" in page(written(tmp_path, {"a": one, "b": {"version": 1}}))
+    assert "No report has figures by the second" in page(written(tmp_path, {"a": one, "b": {"version": 1}}))
 
 
 def test_a_thumbnail_is_asked_for_each_worst_second_and_shown_the_right_way_up(tmp_path):

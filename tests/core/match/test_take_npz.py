@@ -122,15 +122,15 @@ def first(header) -> dict:
 
 
 @pytest.mark.parametrize("change, told", [
-    (lambda h: h.update(format="a cake"), "no player of a match"),
-    (lambda h: h.update(version=99), "another Beyond Mocap"),
+    (lambda h: h.update(format="a cake"), "not a player of a match"),
+    (lambda h: h.update(version=99), "run the match again"),
     (lambda h: h.pop("player"), "player"),
     (lambda h: h.update(window=0.0), "window: 0 s; expected 1 s or more"),
     (lambda h: h.update(correction=[25.0]), "2 values"),
     (lambda h: h.update(correction=[-1.0, 2]), "above 0"),
     (lambda h: h.update(correction=[25.0, 99]), "rising"),
     (lambda h: h["stretches"].append(first(h)), "no such array"),
-    (lambda h: h["stretches"].pop(), "belongs to nothing"),
+    (lambda h: h["stretches"].pop(), "which is not used"),
     (lambda h: first(h)["settings"].update(fps="fast"), "a number"),
     (lambda h: first(h)["settings"].update(method="blocks"), "path"),
     (lambda h: first(h)["settings"].update(alpha=7.0), "alpha"),
@@ -140,7 +140,7 @@ def first(header) -> dict:
     (lambda h: first(h)["placed"][0].__setitem__(1, 9), "clip 9"),
     (lambda h: first(h)["touches"].pop(0), "rows"),
     (lambda h: first(h)["touches"][0].__setitem__(1, "yes"), "true or false"),
-    (lambda h: first(h)["keys"][0].__setitem__(1, ["a b"]), "as a word"),
+    (lambda h: first(h)["keys"][0].__setitem__(1, ["a b"]), "is not a label"),
     (lambda h: first(h)["pins"][0].update(part="nose"), "nose"),
 ])
 def test_a_wrong_text_is_told(tmp_path, whole, change, told):
@@ -151,8 +151,8 @@ def test_a_wrong_text_is_told(tmp_path, whole, change, told):
 
 
 @pytest.mark.parametrize("changed, told", [
-    ({"times": np.zeros((200, 1), np.int32)}, "two or more that rise"),
-    ({"times": np.ones((1, 1), np.int32)}, "two or more that rise"),
+    ({"times": np.zeros((200, 1), np.int32)}, "two or more, ascending"),
+    ({"times": np.ones((1, 1), np.int32)}, "two or more, ascending"),
     ({"positions": np.zeros((3, 2), np.int32)}, "200"),
     ({"positions": np.zeros((200, 3), np.int32)}, "shape"),
     ({"positions": np.zeros((200, 2))}, "whole numbers"),
@@ -160,10 +160,10 @@ def test_a_wrong_text_is_told(tmp_path, whole, change, told):
     ({"clip": np.array([0, -1, 0], np.int16)}, "0 to 1"),
     ({"length": np.array([5, 0, 5], np.int32)}, "a frame or more"),
     ({"length": np.array([2**31 - 1] * 3, np.int32)}, "a frame or more"),
-    ({"first": np.array([0.0, 1e300, 0.0])}, "any clip"),
+    ({"first": np.array([0.0, 1e300, 0.0])}, "too large for a clip"),
     ({"first": np.array([0.0, np.nan, 0.0])}, "no number"),
     ({"rate": None}, "no such array"),
-    ({"more": np.zeros(3)}, "belongs to nothing"),
+    ({"more": np.zeros(3)}, "which is not used"),
     ({"rate": np.array(["a", "b", "c"])}, "values of type"),
 ])
 def test_a_wrong_array_is_told(tmp_path, whole, changed, told):
@@ -182,7 +182,7 @@ def test_what_is_no_such_file_is_told(tmp_path, data, told):
 
 def test_a_file_cut_short_is_told(tmp_path, whole):
     (tmp_path / "x.npz").write_bytes(whole[: len(whole) // 2])
-    with pytest.raises(InputError, match="damaged, cut short"):
+    with pytest.raises(InputError, match="damaged, truncated"):
         read_player(tmp_path / "x.npz")
 
 

@@ -42,8 +42,8 @@ def test_a_curve_is_gone_along_at_its_own_length():
 
 
 @pytest.mark.parametrize("speeds, part", [
-    ([0.0, 0.0], "speed 0 at points 1 and 2"), ([1.0, 12.5], "12.5 m/s"), ([1.0, np.nan], "a speed that is none"),
-    ([-1.0, 1.0], "a speed that is none"), ([1e-5, 1e-5], "an hour at most"),
+    ([0.0, 0.0], "speed 0 at both points 1 and 2"), ([1.0, 12.5], "12.5 m/s"), ([1.0, np.nan], "an invalid speed"),
+    ([-1.0, 1.0], "an invalid speed"), ([1e-5, 1e-5], "an hour at most"),
 ])
 def test_speeds_that_make_no_sense_are_told(speeds, part):
     with pytest.raises(InputError, match="curve Way") as caught:

@@ -176,7 +176,7 @@ def test_players_of_another_scene_are_named_and_stay(run, tmp_path):
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "Zoe.bvh").write_text("hers")
     status, _, error = run({**SAMPLES["dropped"], "passes": SAMPLES["dropped"]["passes"][3:]})
-    assert status == 0 and [line for line in error if "left there: Zoe" in line]
+    assert status == 0 and [line for line in error if "of another scene: Zoe" in line]
     assert (tmp_path / "out" / "Zoe.bvh").read_text() == "hers"
 
 

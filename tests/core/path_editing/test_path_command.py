@@ -99,10 +99,10 @@ def test_a_skeleton_without_legs_rides_and_is_told(run, place, tmp_path):
 
 
 def test_a_path_far_longer_than_the_motion_is_told(run):
-    assert any("of 9.4 m; --cycle goes on" in line for line in run()[2])
+    assert any("of 9.4 m of the path; --cycle repeats it" in line for line in run()[2])
     for more, curve in ((["--cycle"], "bend"), ([], "short"), (["--no-arc-length"], "bend"),
                         (["--end", "repeat"], "bend")):
-        assert not any("goes on" in line for line in run(*more, curve=curve)[2]), more
+        assert not any("repeats it" in line for line in run(*more, curve=curve)[2]), more
 
 
 def test_the_unit_is_told_where_it_is_not_the_inputs(run):

@@ -30,7 +30,7 @@ def test_points_in_the_order_of_their_rows(tmp_path, content, points):
 
 
 @pytest.mark.parametrize("content, part", [
-    (b"", "an empty file"),
+    (b"", "the file is empty"),
     (b"\x00\x01", "binary"),
     (b"\xff\xfex\x00", "binary"),
     (b"a,b\n1,2\n", ":1: no column x_m, y_m"),
@@ -50,7 +50,7 @@ def test_points_in_the_order_of_their_rows(tmp_path, content, points):
     (b"x_m,y_m,z_m\n1,2,0\n1,3,nan\n", ":3: z_m 'nan'"),
     (b"x_m,y_m\n1,2\n1,2e5\n", ":3: y_m 2e5"),
     (b"x_m,y_m\n" + b"-9000,0\n9000,0\n" * 4, "126 km"),
-    (b"x_m,y_m,x_m\n1,2,3\n1,2,3\n", "a column twice"),
+    (b"x_m,y_m,x_m\n1,2,3\n1,2,3\n", "a column is repeated"),
 ])  # fmt: skip
 def test_what_is_no_path_is_told_with_its_line(tmp_path, content, part):
     (tmp_path / "c.csv").write_bytes(content)

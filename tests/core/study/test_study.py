@@ -89,7 +89,7 @@ def test_pairs_are_of_one_scenario_and_each_comes_once_either_way_round():
     (CLIPS[:-1], "0 clips of scenario 's5' by 'theirs'"),
     ((*CLIPS, Clip("x.mp4", "ours", "s1")), "2 clips of scenario 's1' by 'ours'"),
     (CLIPS[:2] + CLIPS[2::3], "1 systems"),
-    ((*CLIPS[:-1], Clip("good.mp4", "theirs", "s5")), "good.mp4 twice"),
+    ((*CLIPS[:-1], Clip("good.mp4", "theirs", "s5")), "good.mp4 is listed twice"),
 ])
 def test_an_unfair_table_is_refused(clips, words):
     with pytest.raises(InputError, match=words):
@@ -154,7 +154,7 @@ def test_a_typed_table_comes_back(tmp_path):
 
 @pytest.mark.parametrize("row, words", [
     ("other,R01,age,25-34", "study other"), ("ID,R09,age,25-34", "R09"), ("ID,R01,nope,3", "nope"),
-    ("ID,R01,age,12", "12"), ("ID,R01,CLIP,6", "6"), ("ID,R01,CLIP,3\nID,R01,CLIP,4", "R01 says 4"),
+    ("ID,R01,age,12", "12"), ("ID,R01,CLIP,6", "6"), ("ID,R01,CLIP,3\nID,R01,CLIP,4", "R01 answers 4"),
 ])
 def test_answers_that_cannot_be_are_told_with_their_line(tmp_path, row, words):
     study = ordered(CLIPS, 2)
@@ -315,7 +315,7 @@ def test_only_movies_are_copied_under_neutral_names(tmp_path, capfd):
     argv = ["--raters", "2", "--out", str(tmp_path / "o"), "--copy"]
     assert main(["study", "order", str(tmp_path / "clips.csv"), *argv]) == 0
     assert sorted(path.suffix for path in (tmp_path / "o" / "clips").iterdir()) == [".mp4", ".webm"]
-    assert "2 of 4 clips are no movies" in capfd.readouterr().err
+    assert "2 of 4 clips are not movies" in capfd.readouterr().err
 
 
 def test_a_report_never_takes_the_place_of_answers(tmp_path, capfd):

@@ -59,7 +59,7 @@ def test_a_pin_out_of_reach_is_told_and_reported(library, track, take):
         library, replace(take.plan, pins=(pin_near(take, 9.0, (0.0, 0.0, 2.0)), Pin(99, "gaze", (0, 0, 1)))), take
     )
     assert any("9 s: the pin of left_hand is out of reach by" in line for line in found.warnings)
-    assert any("99 s: the pin of gaze lies outside the track" in line for line in found.warnings)
+    assert any("99 s: the pin of gaze is outside the track" in line for line in found.warnings)
     report = evaluate(found, track, library)
     assert report["pins"][0]["miss"] > 0.5 and report["pins"][1]["miss"] is None and "pins" not in evaluate(take, track,
                                                                                                             library)
@@ -105,7 +105,7 @@ def test_clips_of_a_style_are_taken_rather_than_others(clip_file, track_of, tmp_
         take = synthesize(library, Plan(track=track, style=(folder,), method=method))
         shown = np.array(take.clips)[take.clip]
         assert np.mean(np.char.startswith(shown, folder)) > 0.9
-    assert "style 'c': the library has no such word, folder or clip" in synthesize(
+    assert "style 'c': the library has no such label, folder or clip" in synthesize(
         library, Plan(track=track, style=("c",), method=method)
     ).warnings
 

@@ -156,11 +156,11 @@ def test_what_is_no_file_of_weights_is_told(tmp_path):
     refused(tmp_path / "none.npz", "no such file")
     refused(tmp_path, "folder")
     (tmp_path / "text.npz").write_text("HIERARCHY\nROOT Hips\n")
-    refused(tmp_path / "text.npz", "of something else")
+    refused(tmp_path / "text.npz", "of another kind")
     (tmp_path / "empty.npz").write_bytes(b"")
     refused(tmp_path / "empty.npz")
     np.savez(tmp_path / "other.npz", weights=np.zeros(4))
-    refused(tmp_path / "other.npz", "of something else")
+    refused(tmp_path / "other.npz", "other content")
     np.savez(tmp_path / "x.checkpoint.npz", told=np.array("{}"), leaf_0000=np.zeros(4))
     refused(tmp_path / "x.checkpoint.npz", "the checkpoint of a training")
     np.save(tmp_path / "one.npy", np.zeros(4))
@@ -178,7 +178,7 @@ def test_an_object_is_never_unpickled(tmp_path):
     ("hip/weights/1", lambda a: a[:2], "layer 2"),
     ("body/biases/2", lambda a: a[0], "layer 3"),
     ("body/input_scale", lambda a: a * 0, "scale"),
-    ("left_leg/weights/0", lambda a: a * np.nan, "no number"),
+    ("left_leg/weights/0", lambda a: a * np.nan, "NaN or infinite"),
     ("offsets", lambda a: a[:2], "shape"),
     ("joint_limits", lambda a: a[:, ::-1], "joint_limits"),
     ("reference", lambda a: a[None], "reference"),
@@ -234,7 +234,7 @@ def test_a_header_that_claims_a_huge_array_is_not_believed(tmp_path):
             header = {"descr": array.dtype.str, "fortran_order": False, "shape": shape}
             np.lib.format.write_array_header_1_0(out, header)
             archive.writestr(name + ".npy", out.getvalue() + array.tobytes())
-    refused(tmp_path / "x.npz", "as many as the shape says")
+    refused(tmp_path / "x.npz", "the shape's number of bytes")
 
 
 def test_a_file_too_large_is_told(tmp_path, monkeypatch):

@@ -48,7 +48,7 @@ def test_the_same_figures_twice(place):
 @pytest.mark.parametrize("more, words", [
     ({"folder": "nowhere"}, "nowhere"), ({"model": "throws/throws.csv"}, "throws.csv"),
     ({"more": ("--subject", "nobody")}, "nobody"), ({"more": ("--html", "THERE/no/r.html")}, "r.html"),
-    ({"more": ("--html", "THERE/throws/throws.csv")}, "something else"),
+    ({"more": ("--html", "THERE/throws/throws.csv")}, "another file"),
 ])
 def test_what_is_wrong_is_one_line(place, capfd, more, words):
     extra = [word.replace("THERE", str(place)) for word in more.pop("more", ())]

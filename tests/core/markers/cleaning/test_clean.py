@@ -281,4 +281,4 @@ def test_what_many_markers_have_in_common_is_one_line(walk):
 
     _, report = clean(spoiled(walk, hide), clusters_of(walk))
     assert len(report.gaps) == 8 and len(report.lines) == 1
-    assert report.lines[0].startswith("32 frames not seen and filled: ") and len(spans_of(report.lines[0])) == 8
+    assert report.lines[0].startswith("32 occluded frames filled: ") and len(spans_of(report.lines[0])) == 8

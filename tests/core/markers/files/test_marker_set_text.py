@@ -63,7 +63,7 @@ def test_a_set_is_chosen_by_name_or_file(tmp_path):
     (tmp_path / "mine.txt").write_text(TEXT)
     assert chosen_set("Plug_in_Gait").name == "plug_in_gait"
     assert chosen_set(str(tmp_path / "mine.txt")).name == "mine"
-    with pytest.raises(InputError, match="--marker-set: no marker set 'yours'.*plug_in_gait"):
+    with pytest.raises(InputError, match="marker set: no marker set 'yours'.*plug_in_gait"):
         chosen_set("yours")
 
 
@@ -73,12 +73,12 @@ def test_a_set_is_chosen_by_name_or_file(tmp_path):
     ("segment Hip: A", "no segment 'Hip'"),
     ("segment: A", "x:11: 'segment'"),
     ("landmark nose: LASI", "no landmark 'nose'"),
-    ("landmark left_psis: LPSI", "which no segment carries"),
+    ("landmark left_psis: LPSI", "which is on no segment"),
     ("colour: red", "x:11: 'colour'"),
     ("segment Head: ", "x:11: no labels"),
     ("segment Head: A,,B", "an empty label"),
     ("segment Head: Joe:A", "without a colon"),
-    ("segment Head: LASI", "'LASI' twice"),
+    ("segment Head: LASI", "'LASI' on two segments"),
     ("also LASI: LPSI", "'LPSI' for 'Left PSI' and 'LASI'"),
 ])  # fmt: skip
 def test_what_is_wrong_is_told_with_its_line(line, said):

@@ -69,19 +69,19 @@ def test_a_number_that_is_none_in_a_text():
     (["joints"], [], "joints: none"),
     (["joints"], {}, "joints: {}; expected a list"),
     (["joints", 1, "parent"], "Hop", "joint 2: parent: no joint 'Hop'"),
-    (["joints", 1, "parent"], "Hand", "parents out of order"),
-    (["joints", 0, "parent"], "Hips", "parents out of order"),
+    (["joints", 1, "parent"], "Hand", "joints out of order"),
+    (["joints", 0, "parent"], "Hips", "joints out of order"),
     (["joints", 2, "name"], "Arm", "joints: 'Arm' twice"),
     (["joints", 1, "order"], "XXY", "axis order"),
     (["joints", 1, "free"], [1, 2, 3], "joint 2: free"),
-    (["joints", 1, "low"], [0.1, 0, 0], "limits that leave out zero"),
+    (["joints", 1, "low"], [0.1, 0, 0], "limits that exclude zero"),
     (["joints", 1, "low"], [0, 0], "joint 2: low: 2 values"),
     (["joints", 1, "offset"], [0, 1e9, 0], "joint 2: offset: 1e\\+09 m"),
     (["joints", 1, "stiffness"], -1, "stiffness below zero"),
     (["joints", 1, "colour"], "red", "joint 2: \"colour\""),
     (["markers"], [], "no markers"),
     (["markers", 0, "joint"], "Foot", "marker 1: joint: no joint 'Foot'"),
-    (["markers", 0, "label"], "B b", "two markers of one name"),
+    (["markers", 0, "label"], "B b", "two markers with one name"),
     (["markers", 0, "sigma"], 0, "sigma"),
     (["markers", 0, "place"], [1, 2], "marker 1: place"),
     (["ball", "radius"], 37, "ball: radius: 37 m"),
@@ -102,7 +102,7 @@ def test_a_value_that_is_too_deep_to_be_shown_is_told():
     deep = []
     for _ in range(100000):
         deep = [deep]
-    with pytest.raises(InputError, match="player 1: a value nested too deep; expected a number"):
+    with pytest.raises(InputError, match="player 1: a value nested too deeply; expected a number"):
         number(deep, "player 1")
 
 
@@ -110,7 +110,7 @@ def test_files_that_are_none(tmp_path):
     (tmp_path / "a").write_bytes(b"\xff\xfe")
     (tmp_path / "b").write_text("[" * 100000)
     (tmp_path / "c").write_text('{"version": 1,\n "joints"')
-    for name, said in (("missing", "no such file"), (".", "a folder"), ("a", "no text"), ("b", "b"), ("c", "c:2:10")):
+    for name, said in (("missing", "no such file"), (".", "a folder"), ("a", "not UTF-8"), ("b", "b"), ("c", "c:2:10")):
         with pytest.raises(InputError, match=said) as told:
             read_model(tmp_path / name)
         assert "\n" not in str(told.value)

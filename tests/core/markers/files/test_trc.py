@@ -106,19 +106,19 @@ def test_markers_without_a_label(body, lines, read):
 
 def test_more_markers_than_said_are_told(body, lines, read):
     lines[2] = lines[2].replace("\t17\t", "\t16\t")
-    assert "17 markers, not the 16 of the head" in read(lines).notes
+    assert "17 markers, not 16 as in the header" in read(lines).notes
 
 
 def test_frames_that_are_left_out_come_back_as_not_seen(body, lines, read):
     trial = read(lines[:10] + lines[13:])
     assert len(trial) == 12 and not trial.seen[4:7].any() and trial.seen[7:].all()
-    assert "3 frames that the times leave out, not seen" in trial.notes
+    assert "3 frames missing in the times, added as not visible" in trial.notes
 
 
 def test_a_rate_by_the_times(body, lines, read):
     lines[2] = lines[2].replace("100.0", "60.0")
     trial = read(lines)
-    assert trial.fps == 100 and "100 frames per second by the times; the head says 60" in trial.notes
+    assert trial.fps == 100 and "100 frames per second by the times; the header says 60" in trial.notes
 
 
 @pytest.mark.parametrize("digits", [2, 3, 4])
@@ -154,7 +154,7 @@ def set_line(number, change):
 
 @pytest.mark.parametrize("change, said", [
     (lambda lines: [], "an empty file"),
-    (lambda lines: ["a", "b"], "made.trc:1: no line that begins with Frame#"),
+    (lambda lines: ["a", "b"], "made.trc:1: no line that starts with Frame#"),
     (lambda lines: ["\0\1\2"], "binary content"),
     (lambda lines: lines[:6], "no rows below the head"),
     (set_line(3, lambda line: "Frame#\tTime"), "made.trc:4: 'Frame# Time'"),
@@ -165,10 +165,10 @@ def set_line(number, change):
     (set_line(17, lambda line: line[:100]), "made.trc:18: .* the row is cut off"),
     (set_line(7, lambda line: line.replace("000\t1", "000\tI", 1)), "made.trc:8: 'I.*' in column 3; expected a num"),
     (set_line(9, lambda line: line.replace("0.030000", "0.010000")), "Time of frame 4 is 0.010000, after 0.020000"),
-    (set_line(9, lambda line: line.replace("0.030000", "0.035000")), "beside 100 frames per second.*resample"),
-    (set_line(17, lambda line: line.replace("0.110000", "99990.11")), "leave out 9999000 frames"),
+    (set_line(9, lambda line: line.replace("0.030000", "0.035000")), "off 100 frames per second.*resample"),
+    (set_line(17, lambda line: line.replace("0.110000", "99990.11")), "skip 9999000 frames"),
     (lambda lines: [line.replace("100.0\t", "0\t") for line in lines[:5]] + lines[6:7], "nan frames per second"),
-    (set_line(2, lambda line: line.replace("mm", "m")), "a body of 1507 m in the header's unit 'm'.*--unit"),
+    (set_line(2, lambda line: line.replace("mm", "m")), "a body of 1507 m in the header's unit 'm'.*set the unit"),
 ])  # fmt: skip
 def test_what_is_wrong_is_told(lines, read, change, said):
     with pytest.raises(InputError, match=said):

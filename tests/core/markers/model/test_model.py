@@ -118,7 +118,7 @@ def test_labels_are_matched_whatever_their_case_and_by_aliases():
 
 @pytest.mark.parametrize("segments, landmarks, what", [
     ({"Hip": ("A",)}, {}, "segment 'Hip'"),
-    ({"Hips": ("A",), "Head": ("A",)}, {}, "'A' twice"),
+    ({"Hips": ("A",), "Head": ("A",)}, {}, "'A' on two segments"),
     ({"Hips": ("A",)}, {"left_nose": ("A",)}, "landmark 'left_nose'"),
     ({"Hips": ("A",)}, {"left_asis": ("B",)}, "landmark on 'B'"),
     ({}, {}, "no segment"),

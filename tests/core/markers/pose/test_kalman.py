@@ -74,5 +74,5 @@ def test_what_cannot_be_smoothed_is_told_and_stays(walk):
 
 @pytest.mark.parametrize("worth", [np.ones(3), np.full((401, 25), np.nan)])
 def test_a_worth_of_another_shape_is_refused(walk, worth):
-    with pytest.raises(InputError, match="worth"):
+    with pytest.raises(InputError, match="weights"):
         kalman(walk, worth)

@@ -144,7 +144,7 @@ def test_a_marker_that_only_is_called_a_ball_is_left_aside(known):
 
 
 def test_markers_beside_the_motion_are_said(known):
-    with pytest.raises(InputError, match="beside the motion"):
+    with pytest.raises(InputError, match="away from the motion"):
         release(known.trial.with_positions(known.trial.positions + [5.0, 0.0, 0.0]), known.motion)
 
 
@@ -158,7 +158,7 @@ def test_no_throw_is_said(known):
 
 
 def test_another_trials_motion_is_said(known):
-    with pytest.raises(InputError, match="the motion that was made from this trial"):
+    with pytest.raises(InputError, match="the motion of this trial"):
         release(known.trial, known.motion.frames(0, 40))
 
 
@@ -188,5 +188,5 @@ def test_the_verb_names_the_file_whose_motion_it_is_not(known, tmp_path, capsys)
     given = ["release", str(tmp_path / "t.trc"), "--motion", str(tmp_path / "m.bvh"), "--report"]
     assert main([*given, str(tmp_path / "r.json"), "--ball-csv", str(tmp_path / "b.csv")]) == 2
     told = capsys.readouterr().err.strip()
-    assert f"{tmp_path / 't.trc'}: " in told and "\n" not in told and "made from this trial" in told
+    assert f"{tmp_path / 't.trc'}: " in told and "\n" not in told and "the motion of this trial" in told
     assert len(list(tmp_path.iterdir())) == 2

@@ -66,7 +66,7 @@ def test_without_mirrors_only_the_recorded_side_serves(order):
 
 
 def test_what_the_library_lacks_is_told_with_what_it_has(order):
-    with pytest.raises(NotInLibrary, match=r"4 s.*'header'.*nearest: .*kick.*--nearest") as told:
+    with pytest.raises(NotInLibrary, match=r"4 s.*'header'.*nearest: .*kick.*Nearest Labels") as told:
         order((4.0, "header"))
     assert "\n" not in str(told.value) and told.value.nearest and told.value.exit_status == 3
 
